@@ -1,0 +1,31 @@
+"""Fixtures shared by the whole suite."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Return the folder of real open meshes beside the checkout; tests that need it skip where it is absent."""
+    folder = SHARED / "data"
+    if not folder.is_dir():
+        pytest.skip(f"no real meshes: the folder {folder.name!r} of shared test data is not beside this checkout")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def oracle() -> Path:
+    """Return the independent referee script beside the checkout; tests that need it skip where it is absent."""
+    script = SHARED / "oracle" / "vertical_error.py"
+    if not script.is_file():
+        pytest.skip("no independent referee: vertical_error.py is not beside this checkout")
+    return script
