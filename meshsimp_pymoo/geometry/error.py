@@ -1,0 +1,760 @@
+"""How far a simplified mesh is from the original one, and how many triangles it has: the two objectives.
+
+The error of a mesh is the sum of d_p over all N original vertices p (Campomanes-Alvarez et al. 2013, Eqs. 2-4):
+
+* p covered by an emitted triangle: d_p = |z_p - z~_p|, with z~ linear on that triangle;
+* p not covered: its distance in space to the point of the mesh that is nearest to it in the plane (``outside="nearest"``),
+  or 0 (``outside="ignore"``, the paper's reading).
+
+One compiled call does it for one subset or for many: gather, triangulate, emit (slivers, footprint), measure. It allocates
+nothing of the order of N; all it needs is in a :class:`Workspace`, one for each thread.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from meshsimp_pymoo.geometry.footprint import inside
+from meshsimp_pymoo.geometry.nearest import build_grid, nearest_segment
+from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.geometry.model import OpenModel
+
+FOOTPRINTS = ("model", "hull")
+OUTSIDES = ("nearest", "ignore")
+
+# A hull triangle lower than this, in diagonals of the model's bounding box in the plane, is an artefact of rounding.
+SLIVER_HEIGHT = 1e-9
+# A vertex counts as covered up to this far outside a triangle, in barycentric coordinates: rounding of rotated borders.
+COVER_TOLERANCE = 1e-9
+
+# Columns of the table that evaluation fills, one row a subset.
+ERROR, TRIANGLES, VERTICES, SQUARES, MAXIMUM, UNCOVERED = range(6)
+NO_SITE = 0xFFFFFFFF
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What is said of a simplified mesh.
+
+    Attributes
+    ----------
+    error : float
+        Sum of d_p over all N original vertices [model units].
+    triangles : int
+        Number of triangles of the mesh.
+    vertices : int
+        Number of vertices its triangles use.
+    mean_error, rms_error, max_error : float
+        Mean, root mean square and maximum of d_p over all N original vertices [model units].
+    uncovered : int
+        Number of original vertices that no triangle covers.
+    """
+
+    error: float
+    triangles: int
+    vertices: int
+    mean_error: float
+    rms_error: float
+    max_error: float
+    uncovered: int
+
+
+@dataclass(frozen=True)
+class Simplified:
+    """A simplified mesh in vector order, with its quality.
+
+    Attributes
+    ----------
+    faces : (M, 3) int32 array
+        Triangles as rows of ``model.points``, counter-clockwise from above, the smallest row first, sorted.
+    quality : Quality
+        Its numbers.
+    deviation : (N,) float array
+        d_p at every original vertex [model units].
+    covered : (N,) bool array
+        Whether a triangle covers it.
+    """
+
+    faces: np.ndarray
+    quality: Quality
+    deviation: np.ndarray
+    covered: np.ndarray
+
+
+class Workspace:
+    """The arrays one thread needs to evaluate subsets of a model of N vertices; 140 N bytes, made once."""
+
+    def __init__(self, n_vertices: int) -> None:
+        n = n_vertices + 1
+        self.side_limit = max(int(np.sqrt(n_vertices) / 2), 4)
+        self.arrays = (
+            np.empty(n, np.int32),  # sites: rows of the kept vertices
+            np.empty(n, np.int32),  # dropped: rows of the others
+            np.empty(2 * n, np.float64),  # their coordinates, flat
+            np.empty(n, np.float64),  # their heights
+            np.empty(n, np.uint8),  # inserted
+            np.empty(16 * n, np.uint32),  # the triangles' records
+            np.empty(2 * n, np.uint8),  # emitted triangles
+            np.empty(2 * n, np.uint32),  # stack
+            np.empty(n, np.uint32),  # a triangle of each site
+            np.empty(self.side_limit**2 + 1, np.int32),  # the outline's cells
+        )
+
+
+_local = threading.local()
+
+
+def _workspace(n_vertices: int) -> Workspace:
+    """This thread's workspace, made anew when the model's size changes."""
+    kept = getattr(_local, "workspace", None)
+    if kept is None or kept[0] != n_vertices:
+        kept = (n_vertices, Workspace(n_vertices))
+        _local.workspace = kept
+    return kept[1]
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _gather(
+    xy: np.ndarray,
+    z: np.ndarray,
+    kept: np.ndarray,
+    has_twins: bool,
+    sites: np.ndarray,
+    dropped: np.ndarray,
+    site_xy: np.ndarray,
+    site_z: np.ndarray,
+) -> int:
+    """Copy the kept vertices together; of several at one (x, y) only the first becomes a site. Return their number."""
+    n = 0
+    m = 0
+    for i in range(len(z)):
+        x = xy[2 * i]
+        y = xy[2 * i + 1]
+        take = np.int64(kept[i])
+        if has_twins and take and n > 0 and site_xy[2 * n - 2] == x and site_xy[2 * n - 1] == y:
+            take = 0
+        sites[n] = i
+        site_xy[2 * n] = x
+        site_xy[2 * n + 1] = y
+        site_z[n] = z[i]
+        dropped[m] = i
+        n += take
+        m += 1 - take
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bool:
+    """Whether a triangle's height over its longest edge is below ``min_height``; the same answer for all its rotations."""
+    a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
+    while a > b or a > c:
+        a, b, c = b, c, a
+    ux = xy[2 * b] - xy[2 * a]
+    uy = xy[2 * b + 1] - xy[2 * a + 1]
+    vx = xy[2 * c] - xy[2 * a]
+    vy = xy[2 * c + 1] - xy[2 * a + 1]
+    wx = vx - ux
+    wy = vy - uy
+    area = ux * vy - uy * vx
+    longest = max(ux * ux + uy * uy, vx * vx + vy * vy, wx * wx + wy * wy)
+    return area <= 0.0 or area * area < min_height * min_height * longest
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _emit(
+    xy: np.ndarray,
+    mesh: np.ndarray,
+    end: int,
+    min_height: float,
+    model_xy: np.ndarray,
+    side: int,
+    state: np.ndarray,
+    start: np.ndarray,
+    items: np.ndarray,
+    faces: np.ndarray,
+    emitted: np.ndarray,
+    stack: np.ndarray,
+) -> int:
+    """Mark the triangles of the mesh: no ghosts, no slivers at the hull, none outside the footprint. Return their number."""
+    for t in range(0, end, RECORD):
+        emitted[t // RECORD] = 0 if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX else 1
+    for ghost in range(0, end, RECORD):
+        if emitted[ghost // RECORD] == 1:
+            continue
+        if (mesh[ghost] | mesh[ghost + 1] | mesh[ghost + 2]) <= LAST_INDEX:
+            continue
+        # Peel from the outside in: a sliver that goes exposes its neighbours.
+        depth = 0
+        stack[0] = ghost
+        depth = 1
+        while depth > 0:
+            depth -= 1
+            outer = stack[depth]
+            for k in range(3):
+                t = mesh[outer + 4 + k] & TRIANGLE
+                if emitted[t // RECORD] == 1 and _is_sliver(xy, mesh, t, min_height):
+                    emitted[t // RECORD] = 0
+                    stack[depth] = t
+                    depth += 1
+    n_triangles = 0
+    for t in range(0, end, RECORD):
+        if emitted[t // RECORD] == 0:
+            continue
+        if side > 0:
+            a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
+            while a > b or a > c:
+                a, b, c = b, c, a
+            x = (xy[2 * a] + xy[2 * b] + xy[2 * c]) / 3.0
+            y = (xy[2 * a + 1] + xy[2 * b + 1] + xy[2 * c + 1]) / 3.0
+            if not inside(model_xy, side, state, start, items, faces, x, y):
+                emitted[t // RECORD] = 0
+                continue
+        n_triangles += 1
+    return n_triangles
+
+
+@njit(cache=True, nogil=True)
+def _outline(mesh: np.ndarray, end: int, emitted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Halfedges between an emitted triangle and one that is not, as (start, end, third) sites, and their order of choice.
+
+    The order is that of the written mesh: triangle by triangle (least vertex first), edge by edge.
+    """
+    m = 0
+    for t in range(0, end, RECORD):
+        if emitted[t // RECORD] == 1:
+            for k in range(3):
+                m += emitted[(mesh[t + 4 + k] & TRIANGLE) // RECORD] == 0
+    ends = np.empty((m, 3), np.int32)
+    key = np.empty(m, np.int64)
+    m = 0
+    for t in range(0, end, RECORD):
+        if emitted[t // RECORD] == 1:
+            least = 0
+            if mesh[t + 1] < mesh[t]:
+                least = 1
+            if mesh[t + 2] < mesh[t + least]:
+                least = 2
+            a = np.int64(mesh[t + least])
+            b = np.int64(mesh[t + (least + 1) % 3])
+            for k in range(3):
+                if emitted[(mesh[t + 4 + k] & TRIANGLE) // RECORD] == 0:
+                    ends[m, 0] = mesh[t + k]
+                    ends[m, 1] = mesh[t + (k + 1) % 3]
+                    ends[m, 2] = mesh[t + (k + 2) % 3]
+                    key[m] = (a << 33) | (b << 2) | ((k - least + 3) % 3)
+                    m += 1
+    return ends, key
+
+
+@njit(cache=True, nogil=True)
+def _outside_cost(
+    xy: np.ndarray,
+    z: np.ndarray,
+    unit: float,
+    ends: np.ndarray,
+    key: np.ndarray,
+    side: int,
+    start: np.ndarray,
+    items: np.ndarray,
+    x: float,
+    y: float,
+    height: float,
+    guess: int,
+) -> tuple[float, bool, int]:
+    """d_p of a vertex that lies in no emitted triangle, whether it is covered after all (by rounding), its segment."""
+    k, t, d = nearest_segment(xy, ends, key, side, start, items, x, y, guess)
+    a, b, c = ends[k, 0], ends[k, 1], ends[k, 2]
+    ux = xy[2 * b] - xy[2 * a]
+    uy = xy[2 * b + 1] - xy[2 * a + 1]
+    vx = xy[2 * c] - xy[2 * a]
+    vy = xy[2 * c + 1] - xy[2 * a + 1]
+    px = x - xy[2 * a]
+    py = y - xy[2 * a + 1]
+    area = ux * vy - uy * vx
+    wb = (px * vy - py * vx) / area
+    wc = (py * ux - px * uy) / area
+    wa = 1.0 - wb - wc
+    if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
+        return abs(wa * z[a] + wb * z[b] + wc * z[c] - height), True, k
+    dz = (1.0 - t) * z[a] + t * z[b] - height
+    return np.sqrt(d * unit * unit + dz * dz), False, k
+
+
+@njit(cache=True, nogil=True)
+def _evaluate_one(
+    model: tuple,  # type: ignore[type-arg]
+    workspace: tuple,  # type: ignore[type-arg]
+    kept: np.ndarray,
+    use_footprint: bool,
+    nearest: bool,
+    row: np.ndarray,
+    deviation: np.ndarray,
+    covered: np.ndarray,
+) -> int:
+    """Fill ``row`` with the six numbers of one subset; return the end of the triangles' records in the workspace."""
+    xy, z, corners, has_twins, unit, min_height, exact_area, exact_lift, side, state, start, items, faces = model
+    sites, dropped, site_xy, site_z, inserted, mesh, emitted, stack, site_triangle, cells = workspace
+    n_all = len(z)
+    n = _gather(xy, z, kept, has_twins, sites, dropped, site_xy, site_z)
+    first = np.empty(len(corners), np.int64)
+    for k in range(len(corners)):
+        q = np.searchsorted(sites[:n], corners[k])
+        first[k] = q if q < n and sites[q] == corners[k] else -1
+    end = triangulate(site_xy, n, first, np.empty(0, np.int64), inserted, mesh, exact_area, exact_lift)
+    n_triangles = _emit(
+        site_xy,
+        mesh,
+        end,
+        min_height,
+        xy,
+        side if use_footprint else 0,
+        state,
+        start,
+        items,
+        faces,
+        emitted,
+        stack,
+    )
+    if n_triangles == 0:
+        row[ERROR] = np.inf
+        row[TRIANGLES] = 0
+        row[VERTICES] = 0
+        row[SQUARES] = np.inf
+        row[MAXIMUM] = np.inf
+        row[UNCOVERED] = n_all
+        return end
+    for j in range(n):
+        site_triangle[j] = NO_SITE
+    for t in range(0, end, RECORD):
+        if emitted[t // RECORD] == 1:
+            site_triangle[mesh[t]] = t
+            site_triangle[mesh[t + 1]] = t
+            site_triangle[mesh[t + 2]] = t
+    total = 0.0
+    squares = 0.0
+    maximum = 0.0
+    uncovered = 0
+    # The outline's grid is built when the first vertex outside needs it.
+    ends = np.empty((0, 3), np.int32)
+    key = np.empty(0, np.int64)
+    outline_items = np.empty(0, np.int32)
+    outline_side = 0
+    guess = 0
+    t = 0
+    last = -1
+    n_sites_used = 0
+    for q in range(n_all):
+        # First the dropped vertices, in vector order, then the sites that no emitted triangle uses.
+        if q < n_all - n:
+            i = dropped[q]
+            j = i - q - 1
+            if j != last and j >= 0:
+                last = j
+                if site_triangle[j] != NO_SITE:
+                    t = site_triangle[j]
+            x = xy[2 * i]
+            y = xy[2 * i + 1]
+            height = z[i]
+            t = locate(site_xy, mesh, t, x, y, exact_area)
+            if emitted[t // RECORD] == 1:
+                a = mesh[t]
+                b = mesh[t + 1]
+                c = mesh[t + 2]
+                ax = site_xy[2 * a] - x
+                ay = site_xy[2 * a + 1] - y
+                bx = site_xy[2 * b] - x
+                by = site_xy[2 * b + 1] - y
+                cx = site_xy[2 * c] - x
+                cy = site_xy[2 * c + 1] - y
+                wa = bx * cy - by * cx
+                wb = cx * ay - cy * ax
+                wc = ax * by - ay * bx
+                d = abs((wa * site_z[a] + wb * site_z[b] + wc * site_z[c]) / (wa + wb + wc) - height)
+                total += d
+                squares += d * d
+                maximum = max(maximum, d)
+                if len(deviation) > 0:
+                    deviation[i] = d
+                    covered[i] = True
+                continue
+        else:
+            j = q - (n_all - n)
+            i = sites[j]
+            if site_triangle[j] != NO_SITE:
+                n_sites_used += 1
+                if len(deviation) > 0:
+                    deviation[i] = 0.0
+                    covered[i] = True
+                continue
+            x = xy[2 * i]
+            y = xy[2 * i + 1]
+            height = z[i]
+        if outline_side == 0:
+            ends, key = _outline(mesh, end, emitted)
+            limit = int(np.sqrt(len(cells) - 1))
+            outline_side = min(max(len(key) // 4, 1), limit)
+            outline_items = build_grid(site_xy, ends, len(key), outline_side, cells)
+        d, is_covered, guess = _outside_cost(
+            site_xy, site_z, unit, ends, key, outline_side, cells, outline_items, x, y, height, guess
+        )
+        if not is_covered:
+            uncovered += 1
+            if not nearest:
+                d = 0.0
+        total += d
+        squares += d * d
+        maximum = max(maximum, d)
+        if len(deviation) > 0:
+            deviation[i] = d
+            covered[i] = is_covered
+    row[ERROR] = total
+    row[TRIANGLES] = n_triangles
+    row[VERTICES] = n_sites_used
+    row[SQUARES] = squares
+    row[MAXIMUM] = maximum
+    row[UNCOVERED] = uncovered
+    return end
+
+
+@njit(cache=True, nogil=True)
+def _evaluate_many(
+    model: tuple,  # type: ignore[type-arg]
+    workspace: tuple,  # type: ignore[type-arg]
+    kept: np.ndarray,
+    use_footprint: bool,
+    nearest: bool,
+    table: np.ndarray,
+) -> None:
+    no_deviation = np.empty(0, np.float64)
+    no_cover = np.empty(0, np.bool_)
+    for k in range(len(kept)):
+        _evaluate_one(model, workspace, kept[k], use_footprint, nearest, table[k], no_deviation, no_cover)
+
+
+def evaluate_subsets(
+    model: OpenModel,
+    kept: np.ndarray,
+    *,
+    footprint: str = "model",
+    outside: str = "nearest",
+    n_threads: int = 1,
+) -> np.ndarray:
+    """Evaluate many subsets; this is the call that a search spends its time in.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    kept : (P, N) bool array
+        One subset a row, in vector order.
+    footprint : {"model", "hull"}
+        Which triangles are emitted.
+    outside : {"nearest", "ignore"}
+        What an uncovered vertex costs.
+    n_threads : int
+        Threads to share the rows among; the result is the same for any number.
+
+    Returns
+    -------
+    (P, 6) float array
+        Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of squared d_p), MAXIMUM, UNCOVERED. A subset that emits no triangle
+        has error, squares and maximum inf.
+    """
+    use_footprint, nearest = _rules(footprint, outside)
+    rows = np.ascontiguousarray(np.atleast_2d(kept), np.bool_)
+    if rows.shape[1] != model.n_vertices:
+        raise ValueError(f"a subset of {model.name} has {model.n_vertices} entries, one a vertex, not {rows.shape[1]}")
+    if not rows.flags.writeable:
+        rows = rows.copy()
+    arguments = model.kernel_arguments
+    table = np.empty((len(rows), 6))
+
+    def evaluate(part: slice) -> None:
+        workspace = _workspace(model.n_vertices)
+        _evaluate_many(arguments, workspace.arrays, rows[part], use_footprint, nearest, table[part])
+
+    if n_threads <= 1 or len(rows) < 2 * n_threads:
+        evaluate(slice(0, len(rows)))
+        return table
+    # Several parts a thread, since subsets differ in size.
+    cuts = np.linspace(0, len(rows), min(4 * n_threads, len(rows)) + 1).astype(int)
+    list(_executor(n_threads).map(evaluate, [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]))
+    return table
+
+
+_executors: dict[int, ThreadPoolExecutor] = {}
+
+
+def _executor(n_threads: int) -> ThreadPoolExecutor:
+    """One pool of threads a process and size, so that the threads and their workspaces are made once."""
+    if n_threads not in _executors:
+        _executors[n_threads] = ThreadPoolExecutor(n_threads, thread_name_prefix="meshsimp")
+    return _executors[n_threads]
+
+
+def _forget_threads() -> None:
+    """A forked child has none of its parent's threads."""
+    _executors.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_threads)
+
+
+def simplify(
+    model: OpenModel, kept: np.ndarray, *, footprint: str = "model", outside: str = "nearest"
+) -> Simplified:
+    """Triangulate the kept vertices and measure the result: the phenotype of one chromosome.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    kept : (N,) bool array
+        The vertices that stay, in vector order.
+    footprint, outside : str
+        As in :func:`evaluate_subsets`.
+
+    Returns
+    -------
+    Simplified
+
+    Raises
+    ------
+    ValueError
+        If no triangle is emitted: fewer than 3 vertices, all on one line, or all triangles outside the footprint.
+
+    Examples
+    --------
+    >>> from meshsimp_pymoo.datasets import load
+    >>> from meshsimp_pymoo.geometry.model import load_model
+    >>> roof = load_model(load("roof:3"))
+    >>> corners = np.isin(np.arange(roof.n_vertices), roof.corners)
+    >>> simplify(roof, corners).quality.error        # the ridge of 3 vertices falls from height 1 to the ground
+    3.0
+    """
+    use_footprint, nearest = _rules(footprint, outside)
+    row = np.array(kept, np.bool_, order="C")
+    if row.shape != (model.n_vertices,):
+        raise ValueError(f"a subset of {model.name} has shape ({model.n_vertices},), one entry a vertex, not {row.shape}")
+    workspace = _workspace(model.n_vertices)
+    numbers = np.empty(6)
+    deviation = np.zeros(model.n_vertices)
+    covered = np.zeros(model.n_vertices, np.bool_)
+    end = _evaluate_one(
+        model.kernel_arguments, workspace.arrays, row, use_footprint, nearest, numbers, deviation, covered
+    )
+    if numbers[TRIANGLES] == 0:
+        raise ValueError(
+            f"{int(row.sum())} kept vertices of {model.name} span no triangle of the mesh; "
+            "keep more of them, the corners first"
+        )
+    sites, mesh, emitted = workspace.arrays[0], workspace.arrays[5], workspace.arrays[6]
+    records = mesh[:end].reshape(-1, RECORD)[emitted[: end // RECORD] == 1, :3].astype(np.int64)
+    turn = records.argmin(axis=1)
+    faces = np.stack([records[np.arange(len(records)), (turn + k) % 3] for k in range(3)], axis=1)
+    faces = faces[np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))]
+    return Simplified(sites[faces], as_quality(numbers, model.n_vertices), deviation, covered)
+
+
+def as_quality(row: np.ndarray, n_vertices: int) -> Quality:
+    """Name the columns of one row of :func:`evaluate_subsets`."""
+    return Quality(
+        error=float(row[ERROR]),
+        triangles=int(row[TRIANGLES]),
+        vertices=int(row[VERTICES]),
+        mean_error=float(row[ERROR] / n_vertices),
+        rms_error=float(np.sqrt(row[SQUARES] / n_vertices)),
+        max_error=float(row[MAXIMUM]),
+        uncovered=int(row[UNCOVERED]),
+    )
+
+
+def _rules(footprint: str, outside: str) -> tuple[bool, bool]:
+    if footprint not in FOOTPRINTS:
+        raise ValueError(f"footprint={footprint!r} is unknown; choose one of {', '.join(map(repr, FOOTPRINTS))}")
+    if outside not in OUTSIDES:
+        raise ValueError(f"outside={outside!r} is unknown; choose one of {', '.join(map(repr, OUTSIDES))}")
+    return footprint == "model", outside == "nearest"
+
+
+def mesh_quality(
+    model: OpenModel,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    *,
+    outside: str = "nearest",
+    frame: str = "file",
+) -> Quality:
+    """Measure any mesh against the model by the same error: decimated, folded, with vertices of its own.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    vertices : (V, 3) float array
+        Vertices [model units].
+    faces : (M, 3) int array
+        Triangles. Where several of them cover a point, the smallest of the differences counts.
+    outside : {"nearest", "ignore"}
+        What an uncovered vertex costs.
+    frame : {"file", "local"}
+        Whether ``vertices`` are in the frame of the model's file or in that of ``model.points``.
+
+    Returns
+    -------
+    Quality
+
+    Raises
+    ------
+    ValueError
+        If there is no face with an area in the plane, or the arrays do not fit together.
+    """
+    deviation, covered, n_used = mesh_deviation(model, vertices, faces, outside=outside, frame=frame)
+    n = model.n_vertices
+    return Quality(
+        error=float(deviation.sum()),
+        triangles=len(faces),
+        vertices=n_used,
+        mean_error=float(deviation.sum() / n),
+        rms_error=float(np.sqrt((deviation**2).sum() / n)),
+        max_error=float(deviation.max()),
+        uncovered=int(n - covered.sum()),
+    )
+
+
+def mesh_deviation(
+    model: OpenModel,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    *,
+    outside: str = "nearest",
+    frame: str = "file",
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Return d_p (N,), covered (N,) and the number of vertices used, for any mesh; see :func:`mesh_quality`."""
+    _, nearest = _rules("model", outside)
+    if frame not in ("file", "local"):
+        raise ValueError(f"frame={frame!r} is unknown; choose 'file' or 'local'")
+    vertices = np.asarray(vertices, float).reshape(-1, 3)
+    faces = np.ascontiguousarray(np.asarray(faces).reshape(-1, 3), np.int64)
+    if len(faces) == 0:
+        raise ValueError("a mesh without faces has no error; it needs at least one triangle")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError(f"faces index rows {faces.min()} to {faces.max()} of {len(vertices)} vertices")
+    if not np.isfinite(vertices).all():
+        raise ValueError(f"{int((~np.isfinite(vertices)).any(axis=1).sum())} of {len(vertices)} vertices are not finite")
+    local = model.to_local(vertices) if frame == "file" else vertices
+    xy = np.ascontiguousarray(local[:, :2] / model.unit).ravel()
+    height = np.ascontiguousarray(local[:, 2])
+    samples, z = model.kernel_arguments[:2]
+    extent = float(np.ptp(model.xy, axis=0).max())
+    deviation = np.empty(model.n_vertices)
+    covered = np.empty(model.n_vertices, np.bool_)
+    if not _mesh_deviation(samples, z, xy, height, faces, model.unit, extent, nearest, deviation, covered):
+        raise ValueError(f"none of the {len(faces)} faces has an area in the plane")
+    return deviation, covered, len(np.unique(faces))
+
+
+# Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are degenerate.
+SOLID_AREA = 1e-14
+
+
+@njit(cache=True, nogil=True)
+def _mesh_deviation(
+    samples: np.ndarray,
+    z: np.ndarray,
+    xy: np.ndarray,
+    height: np.ndarray,
+    faces: np.ndarray,
+    unit: float,
+    extent: float,
+    nearest: bool,
+    deviation: np.ndarray,
+    covered: np.ndarray,
+) -> bool:
+    """Fill d_p and its coverage for an arbitrary mesh; return False if it has no solid face."""
+    n = len(z)
+    # Samples by cell of the unit square, about two in each.
+    side = max(int(np.sqrt(n / 2)), 1)
+    start = np.zeros(side * side + 2, np.int64)
+    for i in range(n):
+        column = min(int(samples[2 * i] * side), side - 1)
+        row = min(int(samples[2 * i + 1] * side), side - 1)
+        start[row * side + column + 2] += 1
+    for k in range(2, side * side + 2):
+        start[k] += start[k - 1]
+    items = np.empty(n, np.int64)
+    for i in range(n):
+        column = min(int(samples[2 * i] * side), side - 1)
+        row = min(int(samples[2 * i + 1] * side), side - 1)
+        items[start[row * side + column + 1]] = i
+        start[row * side + column + 1] += 1
+    for i in range(n):
+        deviation[i] = np.inf
+        covered[i] = False
+    ends = np.empty((3 * len(faces), 2), np.int64)
+    key = np.empty(3 * len(faces), np.int64)
+    m = 0
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        ax, ay, bx, by, cx, cy = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1], xy[2 * c], xy[2 * c + 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(area) <= SOLID_AREA * extent * extent:
+            continue
+        for k in range(3):
+            ends[m, 0] = faces[f, k]
+            ends[m, 1] = faces[f, (k + 1) % 3]
+            key[m] = 3 * f + k
+            m += 1
+        low_x, high_x = min(ax, bx, cx), max(ax, bx, cx)
+        low_y, high_y = min(ay, by, cy), max(ay, by, cy)
+        margin = 1e-9 * (high_x - low_x + high_y - low_y)
+        first_column = max(int((low_x - margin) * side), 0)
+        last_column = min(int((high_x + margin) * side), side - 1) if high_x + margin >= 0.0 else -1
+        first_row = max(int((low_y - margin) * side), 0)
+        last_row = min(int((high_y + margin) * side), side - 1) if high_y + margin >= 0.0 else -1
+        for row in range(first_row, last_row + 1):
+            for column in range(first_column, last_column + 1):
+                cell = row * side + column
+                for q in range(start[cell], start[cell + 1]):
+                    i = items[q]
+                    px = samples[2 * i]
+                    py = samples[2 * i + 1]
+                    wb = ((px - ax) * (cy - ay) - (py - ay) * (cx - ax)) / area
+                    wc = ((py - ay) * (bx - ax) - (px - ax) * (by - ay)) / area
+                    wa = 1.0 - wb - wc
+                    if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
+                        d = abs(wa * height[a] + wb * height[b] + wc * height[c] - z[i])
+                        deviation[i] = min(deviation[i], d)
+                        covered[i] = True
+    if m == 0:
+        return False
+    outline_side = min(max(int(np.sqrt(m / 2)), 1), 4096)
+    cells = np.empty(outline_side * outline_side + 1, np.int64)
+    outline_items = np.empty(0, np.int32)
+    built = False
+    guess = 0
+    for i in range(n):
+        if covered[i]:
+            continue
+        if not nearest:
+            deviation[i] = 0.0
+            continue
+        if not built:
+            outline_items = build_grid(xy, ends, m, outline_side, cells)
+            built = True
+        guess, t, d = nearest_segment(
+            xy, ends, key, outline_side, cells, outline_items, samples[2 * i], samples[2 * i + 1], guess
+        )
+        dz = (1.0 - t) * height[ends[guess, 0]] + t * height[ends[guess, 1]] - z[i]
+        deviation[i] = np.sqrt(d * unit * unit + dz * dz)
+    return True

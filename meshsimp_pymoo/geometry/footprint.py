@@ -1,0 +1,186 @@
+"""Where the original mesh is: is a point of the plane inside its projection?
+
+``footprint="model"`` asks this for the centroid of every triangle, thousands of times an evaluation. So the plane is cut
+once into square cells: those that no outline edge crosses are inside or outside as a whole; only in the others are the few
+faces that touch the cell asked.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+OUTSIDE, INSIDE, MIXED = 0, 1, 2
+
+
+class Footprint(NamedTuple):
+    """The projection of a mesh, ready for :func:`inside`; cells are square, row by row from the origin.
+
+    Attributes
+    ----------
+    side : int
+        Cells along one side of the unit square; 0 where the projection is convex, so that all of the hull is inside.
+    state : (side * side,) uint8 array
+        OUTSIDE, INSIDE or MIXED.
+    start : (side * side + 1,) int32 array
+        Where the faces of a MIXED cell begin in ``items``.
+    items : (M,) int32 array
+        Faces that touch the MIXED cells.
+    faces : (T, 3) int32 array
+        Vertex rows of the faces.
+    """
+
+    side: int
+    state: np.ndarray
+    start: np.ndarray
+    items: np.ndarray
+    faces: np.ndarray
+
+
+@njit(cache=True, nogil=True)
+def _left_of(xy: np.ndarray, a: int, b: int, x: float, y: float) -> float:
+    """Twice the signed area of (a, b, (x, y)), computed so that swapping a and b only swaps its sign."""
+    if a < b:
+        return (xy[2 * a] - x) * (xy[2 * b + 1] - y) - (xy[2 * a + 1] - y) * (xy[2 * b] - x)
+    return -((xy[2 * b] - x) * (xy[2 * a + 1] - y) - (xy[2 * b + 1] - y) * (xy[2 * a] - x))
+
+
+@njit(cache=True, nogil=True)
+def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x: float, y: float) -> bool:
+    u = _left_of(xy, faces[f, 0], faces[f, 1], x, y)
+    v = _left_of(xy, faces[f, 1], faces[f, 2], x, y)
+    w = _left_of(xy, faces[f, 2], faces[f, 0], x, y)
+    if u == 0.0 and v == 0.0 and w == 0.0:
+        return False
+    return (u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)
+
+
+@njit(cache=True, nogil=True)
+def inside(
+    xy: np.ndarray,
+    side: int,
+    state: np.ndarray,
+    start: np.ndarray,
+    items: np.ndarray,
+    faces: np.ndarray,
+    x: float,
+    y: float,
+) -> bool:
+    """Whether (x, y) lies in the closed projection; ``xy`` are the model's flat coordinates in the unit square."""
+    if side == 0:
+        return True
+    column = min(max(int(x * side), 0), side - 1)
+    row = min(max(int(y * side), 0), side - 1)
+    cell = row * side + column
+    if state[cell] != MIXED:
+        return state[cell] == INSIDE
+    for k in range(start[cell], start[cell + 1]):
+        if _in_face(xy, faces, items[k], x, y):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _cell_span(low: float, high: float, side: int) -> tuple[int, int]:
+    """First and last cell that [low, high] touches, with a margin for rounding."""
+    margin = 1e-12
+    first = min(max(int((low - margin) * side), 0), side - 1)
+    last = min(max(int((high + margin) * side), 0), side - 1)
+    return first, last
+
+
+@njit(cache=True, nogil=True)
+def _row_span(ax: float, ay: float, bx: float, by: float, row: int, side: int) -> tuple[int, int]:
+    """Columns that the segment a-b touches in a row of cells; the outermost rows reach to infinity."""
+    low = min(ax, bx)
+    high = max(ax, bx)
+    if ay != by:
+        y0 = row / side if row > 0 else -np.inf
+        y1 = (row + 1) / side if row < side - 1 else np.inf
+        t0 = (y0 - ay) / (by - ay)
+        t1 = (y1 - ay) / (by - ay)
+        if t0 > t1:
+            t0, t1 = t1, t0
+        t0 = min(max(t0 - 1e-9, 0.0), 1.0)
+        t1 = min(max(t1 + 1e-9, 0.0), 1.0)
+        x0 = ax + t0 * (bx - ax)
+        x1 = ax + t1 * (bx - ax)
+        low = min(x0, x1)
+        high = max(x0, x1)
+    return _cell_span(low, high, side)
+
+
+@njit(cache=True, nogil=True)
+def _mark_outline(xy: np.ndarray, edges: np.ndarray, side: int, state: np.ndarray) -> None:
+    for k in range(len(edges)):
+        a = edges[k, 0]
+        b = edges[k, 1]
+        ax, ay, bx, by = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1]
+        first_row, last_row = _cell_span(min(ay, by), max(ay, by), side)
+        for row in range(first_row, last_row + 1):
+            first, last = _row_span(ax, ay, bx, by, row, side)
+            for column in range(first, last + 1):
+                state[row * side + column] = MIXED
+
+
+@njit(cache=True, nogil=True)
+def _face_cells(
+    xy: np.ndarray, faces: np.ndarray, side: int, state: np.ndarray, start: np.ndarray, items: np.ndarray, fill: bool
+) -> None:
+    """Count (then list) the faces of each MIXED cell, by bounding box; set the cells whose centre a face holds INSIDE."""
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        low_x = min(xy[2 * a], xy[2 * b], xy[2 * c])
+        high_x = max(xy[2 * a], xy[2 * b], xy[2 * c])
+        low_y = min(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+        high_y = max(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+        first_row, last_row = _cell_span(low_y, high_y, side)
+        first, last = _cell_span(low_x, high_x, side)
+        for row in range(first_row, last_row + 1):
+            for column in range(first, last + 1):
+                cell = row * side + column
+                if state[cell] == MIXED:
+                    if fill:
+                        items[start[cell]] = f
+                    start[cell] += 1
+                elif not fill and _in_face(xy, faces, f, (column + 0.5) / side, (row + 0.5) / side):
+                    state[cell] = INSIDE
+
+
+def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, convex: bool) -> Footprint:
+    """Cut the plane into cells for :func:`inside`.
+
+    Parameters
+    ----------
+    xy : (N, 2) float array
+        Coordinates in the unit square.
+    faces : (T, 3) int32 array
+        The original mesh.
+    outline : (E, 2) int array
+        Edges that may bound the projection: border edges, and edges between faces of opposite orientation (folds).
+    convex : bool
+        Whether the projection is the convex hull of ``xy``; then nothing needs to be asked.
+
+    Returns
+    -------
+    Footprint
+    """
+    none = np.zeros(0, np.int32)
+    faces = np.ascontiguousarray(faces, np.int32)
+    if convex:
+        return Footprint(0, np.zeros(0, np.uint8), none, none, faces)
+    flat = np.ascontiguousarray(xy, float).ravel()
+    # About two faces a cell: fine enough that most cells are whole, coarse enough to stay small beside the model.
+    side = int(np.clip(np.sqrt(len(faces) / 2), 8, 8192))
+    state = np.zeros(side * side, np.uint8)
+    _mark_outline(flat, np.ascontiguousarray(outline, np.int64), side, state)
+    counts = np.zeros(side * side + 1, np.int64)
+    _face_cells(flat, faces, side, state, counts, none, False)
+    start = np.zeros(side * side + 1, np.int64)
+    np.cumsum(counts[:-1], out=start[1:])
+    items = np.zeros(start[-1], np.int32)
+    cursor = start.copy()
+    _face_cells(flat, faces, side, state, cursor, items, True)
+    return Footprint(side, state, start.astype(np.int32), items, faces)

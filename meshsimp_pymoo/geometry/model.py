@@ -1,0 +1,415 @@
+"""The original mesh, turned upright and put in vector order: what a chromosome is a chromosome of."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from scipy.spatial import ConvexHull, QhullError
+
+from meshsimp_pymoo.geometry.error import SLIVER_HEIGHT
+from meshsimp_pymoo.geometry.footprint import Footprint, make_footprint
+from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, from_trimesh, read_source
+from meshsimp_pymoo.geometry.orient import check_open_surface, front_patch, up_direction, upright_rotation
+from meshsimp_pymoo.geometry.predicates import exact_ranges
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# Resolution of the Hilbert curve in bits along one side: finer than any raster, and two of them fit an int64.
+HILBERT_BITS = 26
+
+
+@dataclass(frozen=True, eq=False)
+class OpenModel:
+    """An open mesh that is nearly a height field z = f(x, y), in vector order.
+
+    The vertices are stored along a Hilbert curve over (x, y), so that a neighbour on the vector is a neighbour in space, a
+    contiguous segment is a patch, and triangulating needs no sorting. The order is a function of the positions alone:
+    listing the same vertices otherwise in the file gives the same model but for ``source_index``.
+
+    Vertices that share one (x, y) stay apart: each has a place in the chromosome and a share in the error. Where several
+    of them are kept, the first in vector order (the lowest) carries the surface.
+
+    Attributes
+    ----------
+    name : str
+        Where it came from, for messages.
+    points : (N, 3) float array
+        Vertices, upright (height along z), from a local origin [file units].
+    faces : (T, 3) int32 array
+        Triangles of the original mesh, counter-clockwise from above, as rows of ``points``.
+    corners : (4,) int array
+        The vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending; fewer where
+        one vertex is extreme in several directions.
+    source_index : (N,) int array
+        Row of each vertex in the file.
+    file_points : (N, 3) float array
+        The vertices exactly as in the file, in vector order [file units].
+    attributes : dict of str to (N, ...) array
+        Colours and other per-vertex attributes of the file, in vector order.
+    up : (3,) float array
+        Unit vector of the file's frame that points to +z here.
+    rotation : (3, 3) float array
+        Upright coordinates are ``file_points @ rotation.T - origin``.
+    origin : (3,) float array
+        The local origin in the upright frame [file units].
+    xy : (N, 2) float array
+        ``points[:, :2] / unit``, rounded to multiples of 2**-52: the coordinates all predicates work on.
+    unit : float
+        Side of the unit square, a power of two [file units].
+    facts : dict
+        What was found while checking the surface (see :func:`meshsimp_pymoo.geometry.orient.check_open_surface`).
+    """
+
+    name: str
+    points: FloatArray
+    faces: npt.NDArray[np.int32]
+    corners: IntArray
+    source_index: IntArray
+    file_points: FloatArray
+    attributes: dict[str, npt.NDArray[Any]]
+    up: FloatArray
+    rotation: FloatArray
+    origin: FloatArray
+    xy: FloatArray
+    unit: float
+    facts: Any = field(default=None, repr=False)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of original vertices."""
+        return len(self.points)
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box in space [file units]."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the geometry: the same for the same vertices and faces in the same file order."""
+        digest = hashlib.sha256()
+        for array in (self.points, self.faces, self.source_index):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    @cached_property
+    def neighbours(self) -> tuple[IntArray, npt.NDArray[np.int32]]:
+        """Mesh one-rings in CSR form: those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``, ascending."""
+        return _one_rings(self.faces, self.n_vertices)
+
+    @cached_property
+    def hull(self) -> IntArray:
+        """Vertices on the convex hull in the plane, those inside its edges included, ascending."""
+        return _on_hull(self.xy)
+
+    @cached_property
+    def footprint(self) -> Footprint:
+        """The projection of the original faces, for ``footprint="model"``."""
+        outline, area = _outline_edges(self.xy, self.faces)
+        corners = np.unique(outline)
+        hull_area = ConvexHull(self.xy[corners]).volume if len(corners) > 2 else 0.0
+        return make_footprint(self.xy, self.faces, outline, convex=abs(area - hull_area) <= 1e-9 * hull_area)
+
+    @cached_property
+    def kernel_arguments(self) -> tuple[Any, ...]:
+        """What the compiled evaluation needs of a model, in its order."""
+        xy = np.ascontiguousarray(self.xy)
+        extent = np.ptp(xy, axis=0)
+        area, lift = exact_ranges(xy)
+        has_twins = bool((xy[1:] == xy[:-1]).all(axis=1).any())
+        height = np.ascontiguousarray(self.points[:, 2])
+        diagonal = float(np.hypot(extent[0], extent[1]))
+        return (
+            xy.ravel(),
+            height,
+            np.ascontiguousarray(self.corners, np.int64),
+            has_twins,
+            float(self.unit),
+            SLIVER_HEIGHT * diagonal,
+            area,
+            lift,
+            *self.footprint,
+        )
+
+    def to_local(self, points: npt.ArrayLike) -> FloatArray:
+        """Turn points (M, 3) of the file's frame into this model's upright local frame [file units]."""
+        return np.asarray(points, float) @ self.rotation.T - self.origin
+
+    def __len__(self) -> int:
+        return self.n_vertices
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> OpenModel:
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        lazy = ("neighbours", "footprint", "kernel_arguments", "hull", "hash")
+        return {name: value for name, value in self.__dict__.items() if name not in lazy}
+
+
+def load_model(
+    model: str | Path | SourceMesh | OpenModel | Any,
+    *,
+    up: str | npt.ArrayLike = "auto",
+    patch: str | None = None,
+    spacing: tuple[float, float] | None = None,
+    nodata: float | None = None,
+) -> OpenModel:
+    """Read, check and orient a mesh.
+
+    Parameters
+    ----------
+    model : path, SourceMesh, trimesh.Trimesh or OpenModel
+        The mesh; an :class:`OpenModel` is returned as it is.
+    up : "auto", an axis such as "z" or "-x", or a vector
+        Direction of the height; "auto" is the one that the most projected area agrees with.
+    patch : "front", optional
+        Cut out the largest connected patch that faces ``up`` and does not overlap itself.
+    spacing : (dx, dy), optional
+        Sample distances of a height grid [units].
+    nodata : float, optional
+        Height that means "no sample" in a height grid.
+
+    Returns
+    -------
+    OpenModel
+
+    Raises
+    ------
+    ModelError
+        If it cannot be read or is no open height field; the message names the cause and the way out.
+    """
+    if isinstance(model, OpenModel):
+        return model
+    if isinstance(model, SourceMesh):
+        source = model
+    elif isinstance(model, (str, Path)):
+        source = read_source(model, spacing=spacing, nodata=nodata)
+    elif hasattr(model, "vertices") and hasattr(model, "faces"):
+        source = from_trimesh(model)
+    else:
+        raise TypeError(
+            f"a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, not {type(model).__name__}"
+        )
+    if patch not in (None, "front"):
+        raise ModelError(f'patch={patch!r} is unknown; use patch="front" or leave it out')
+    if patch == "front":
+        source = front_patch(source, up)
+    return build_model(source, up=up)
+
+
+def build_model(source: SourceMesh, *, up: str | npt.ArrayLike = "auto") -> OpenModel:
+    """Turn a source mesh upright, check that it is an open height field and put it in vector order."""
+    used = np.zeros(len(source.points), bool)
+    used[source.faces] = True
+    n_unused = len(used) - int(used.sum())
+    if n_unused:
+        warnings.warn(
+            f"{source.name}: {n_unused} of {len(used)} vertices belong to no face and are left out",
+            ModelWarning,
+            stacklevel=3,
+        )
+    direction = np.asarray(up_direction(source, up), float)
+    rotation = np.asarray(upright_rotation(direction), float)
+    upright = source.points @ rotation.T
+    faces, facts = check_open_surface(source, upright)
+    rows = np.flatnonzero(used)
+    upright = upright[rows]
+    origin = upright.min(axis=0)
+    points = upright - origin
+    unit, xy = _unit_square(points)
+    order = vector_order(xy, points[:, 2])
+    rows = rows[order]
+    place = np.full(len(used), -1, np.int32)
+    place[rows] = np.arange(len(rows), dtype=np.int32)
+    xy = np.ascontiguousarray(xy[order])
+    return OpenModel(
+        name=source.name,
+        points=np.ascontiguousarray(points[order]),
+        faces=np.ascontiguousarray(place[faces]),
+        corners=find_corners(xy),
+        source_index=rows,
+        file_points=source.points[rows],
+        attributes=_take(source.attributes, rows),
+        up=direction,
+        rotation=rotation,
+        origin=origin,
+        xy=xy,
+        unit=unit,
+        facts=facts,
+    )
+
+
+def _take(attributes: Mapping[str, npt.NDArray[Any]], rows: IntArray) -> dict[str, npt.NDArray[Any]]:
+    return {name: values[rows] for name, values in attributes.items()}
+
+
+def _unit_square(points: FloatArray) -> tuple[float, FloatArray]:
+    """Scale by a power of two into the unit square and round to multiples of 2**-52, so that differences are exact."""
+    extent = float(np.ptp(points[:, :2], axis=0).max())
+    unit = float(2.0 ** np.ceil(np.log2(extent)))
+    xy = points[:, :2] / unit
+    return unit, (xy + 1.0) - 1.0
+
+
+def vector_order(xy: FloatArray, z: FloatArray) -> IntArray:
+    """Return the order of vertices along a Hilbert curve, ties by x, y, z: a function of the positions alone.
+
+    Parameters
+    ----------
+    xy : (N, 2) float array
+        Coordinates in the unit square.
+    z : (N,) float array
+        Heights; decide between vertices at one (x, y).
+
+    Returns
+    -------
+    (N,) int array
+        Rows in vector order.
+
+    References
+    ----------
+    D. Hilbert, "Ueber die stetige Abbildung einer Linie auf ein Flaechenstueck", Mathematische Annalen 38, 1891.
+    """
+    key = _hilbert_keys(np.ascontiguousarray(xy, float))
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    tied = np.zeros(len(key), bool)
+    same = key[1:] == key[:-1]
+    tied[1:] |= same
+    tied[:-1] |= same
+    if tied.any():
+        rows = order[tied]
+        order[tied] = rows[np.lexsort((z[rows], xy[rows, 1], xy[rows, 0], key[tied]))]
+    return order
+
+
+@njit(cache=True)
+def _hilbert_keys(xy: np.ndarray) -> np.ndarray:
+    keys = np.empty(len(xy), np.int64)
+    limit = 2**HILBERT_BITS - 1
+    for i in range(len(xy)):
+        x = min(int(xy[i, 0] * 2.0**HILBERT_BITS), limit)
+        y = min(int(xy[i, 1] * 2.0**HILBERT_BITS), limit)
+        key = np.int64(0)
+        s = np.int64(1) << (HILBERT_BITS - 1)
+        while s > 0:
+            rx = 1 if x & s else 0
+            ry = 1 if y & s else 0
+            key = (key << 2) | ((3 * rx) ^ ry)
+            if ry == 0:
+                if rx == 1:
+                    x = limit - x
+                    y = limit - y
+                x, y = y, x
+            s >>= 1
+        keys[i] = key
+    return keys
+
+
+def find_corners(xy: FloatArray) -> IntArray:
+    """Return the vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending.
+
+    Of equally extreme vertices the one furthest clockwise counts, so that the four corners of a diamond are found too. If
+    they all lie on one line, the vertex farthest from that line joins them: corners always span a triangle.
+
+    Examples
+    --------
+    >>> find_corners(np.array([[0.0, 0], [0, 1], [0.5, 0.5], [1, 0], [1, 1]]))
+    array([0, 1, 3, 4])
+    """
+    low = xy.min(axis=0)
+    span = np.ptp(xy, axis=0)
+    square = (xy - low) / np.where(span > 0, span, 1.0)
+    x, y = square[:, 0], square[:, 1]
+    chosen: set[int] = set()
+    for sx, sy, second in ((1, 1, x), (-1, 1, y), (-1, -1, -x), (1, -1, -y)):
+        score = sx * x + sy * y
+        best = np.flatnonzero(score == score.max())
+        best = best[second[best] == second[best].max()]
+        chosen.add(int(best[0]))
+    corners = np.array(sorted(chosen))
+    base = xy[corners[0]]
+    ends = xy[corners] - base
+    far = ends[np.argmax((ends**2).sum(axis=1))]
+    if np.all(far[0] * ends[:, 1] == far[1] * ends[:, 0]):
+        away = np.abs(far[0] * (xy[:, 1] - base[1]) - far[1] * (xy[:, 0] - base[0]))
+        corners = np.unique(np.append(corners, int(np.argmax(away))))
+    return corners.astype(np.int64)
+
+
+def _on_hull(xy: FloatArray) -> IntArray:
+    """Vertices within the sliver height of the convex hull's edges."""
+    try:
+        hull = ConvexHull(xy)
+    except QhullError as error:  # build_model has refused models without area
+        raise ModelError(f"the convex hull of {len(xy)} vertices has no area") from error
+    tolerance = SLIVER_HEIGHT * float(np.hypot(*np.ptp(xy, axis=0)))
+    on = np.zeros(len(xy), bool)
+    on[hull.vertices] = True
+    normals = np.unique(hull.equations, axis=0)
+    candidates = np.flatnonzero(~on)
+    for normal in normals:
+        distance = xy[candidates] @ normal[:2] + normal[2]
+        on[candidates[np.abs(distance) <= tolerance]] = True
+    return np.flatnonzero(on)
+
+
+def _outline_edges(xy: FloatArray, faces: npt.NDArray[np.int32]) -> tuple[IntArray, float]:
+    """Edges that may bound the projection (borders and folds), and the sum of the projected face areas."""
+    a, b, c = (xy[faces[:, k]] for k in range(3))
+    double = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    up = double > 0
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    edges.sort(axis=1)
+    side = np.tile(up, 3)
+    key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
+    order = np.argsort(key, kind="stable")
+    key, side, edges = key[order], side[order], edges[order]
+    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
+    count = np.diff(np.r_[first, len(key)])
+    facing = np.add.reduceat(side.astype(np.int64), first)
+    bounding = (count == 1) | ((facing > 0) & (facing < count)) | (facing == 0)
+    return edges[first[bounding]], float(np.abs(double).sum() / 2)
+
+
+@njit(cache=True)
+def _ring_lists(faces: np.ndarray, indptr: np.ndarray, raw: np.ndarray) -> None:
+    for f in range(len(faces)):
+        for k in range(3):
+            a = faces[f, k]
+            raw[indptr[a]] = faces[f, (k + 1) % 3]
+            raw[indptr[a] + 1] = faces[f, (k + 2) % 3]
+            indptr[a] += 2
+
+
+@njit(cache=True)
+def _unique_rings(start: np.ndarray, raw: np.ndarray, indptr: np.ndarray, indices: np.ndarray) -> None:
+    m = 0
+    for i in range(len(start) - 1):
+        ring = np.sort(raw[start[i] : start[i + 1]])
+        for k in range(len(ring)):
+            if k == 0 or ring[k] != ring[k - 1]:
+                indices[m] = ring[k]
+                m += 1
+        indptr[i + 1] = m
+
+
+def _one_rings(faces: npt.NDArray[np.int32], n: int) -> tuple[IntArray, npt.NDArray[np.int32]]:
+    start = np.zeros(n + 1, np.int64)
+    np.cumsum(2 * np.bincount(faces.ravel(), minlength=n), out=start[1:])
+    raw = np.empty(start[-1], np.int32)
+    _ring_lists(faces, start.copy(), raw)
+    indptr = np.zeros(n + 1, np.int64)
+    indices = np.empty(len(raw), np.int32)
+    _unique_rings(start, raw, indptr, indices)
+    return indptr, indices[: indptr[-1]].copy()
