@@ -170,6 +170,18 @@ def _is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> b
 
 
 @njit(cache=True, nogil=True, forceinline=True)
+def _third_of_sum(a: float, b: float, c: float) -> float:
+    """The mean of three numbers, rounded the same way in whatever order they come."""
+    low = a if a < b else b
+    high = b if a < b else a
+    middle = c if c > low else low
+    lowest = c if c < low else low
+    highest = middle if middle > high else high
+    middle = high if middle > high else middle
+    return (lowest + middle + highest) * (1.0 / 3.0)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def _emit(
     xy: np.ndarray,
     mesh: np.ndarray,
@@ -211,10 +223,8 @@ def _emit(
             continue
         if side > 0:
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
-            while a > b or a > c:
-                a, b, c = b, c, a
-            x = (xy[2 * a] + xy[2 * b] + xy[2 * c]) / 3.0
-            y = (xy[2 * a + 1] + xy[2 * b + 1] + xy[2 * c + 1]) / 3.0
+            x = _third_of_sum(xy[2 * a], xy[2 * b], xy[2 * c])
+            y = _third_of_sum(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
             if not inside(model_xy, side, state, start, items, faces, x, y):
                 emitted[t // RECORD] = 0
                 continue
@@ -256,37 +266,58 @@ def _outline(mesh: np.ndarray, end: int, emitted: np.ndarray) -> tuple[np.ndarra
 
 
 @njit(cache=True, nogil=True)
-def _outside_cost(
+def _measure_bare(
     xy: np.ndarray,
     z: np.ndarray,
+    bare: np.ndarray,
+    n_bare: int,
+    site_xy: np.ndarray,
+    site_z: np.ndarray,
     unit: float,
-    ends: np.ndarray,
-    key: np.ndarray,
-    side: int,
-    start: np.ndarray,
-    items: np.ndarray,
-    x: float,
-    y: float,
-    height: float,
-    guess: int,
-) -> tuple[float, bool, int]:
-    """d_p of a vertex that lies in no emitted triangle, whether it is covered after all (by rounding), its segment."""
-    k, t, d = nearest_segment(xy, ends, key, side, start, items, x, y, guess)
-    a, b, c = ends[k, 0], ends[k, 1], ends[k, 2]
-    ux = xy[2 * b] - xy[2 * a]
-    uy = xy[2 * b + 1] - xy[2 * a + 1]
-    vx = xy[2 * c] - xy[2 * a]
-    vy = xy[2 * c + 1] - xy[2 * a + 1]
-    px = x - xy[2 * a]
-    py = y - xy[2 * a + 1]
-    area = ux * vy - uy * vx
-    wb = (px * vy - py * vx) / area
-    wc = (py * ux - px * uy) / area
-    wa = 1.0 - wb - wc
-    if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
-        return abs(wa * z[a] + wb * z[b] + wc * z[c] - height), True, k
-    dz = (1.0 - t) * z[a] + t * z[b] - height
-    return np.sqrt(d * unit * unit + dz * dz), False, k
+    mesh: np.ndarray,
+    end: int,
+    emitted: np.ndarray,
+    cells: np.ndarray,
+    nearest: bool,
+    row: np.ndarray,
+    deviation: np.ndarray,
+    covered: np.ndarray,
+) -> None:
+    """Add the cost of the vertices that lie in no emitted triangle, by the nearest point of the mesh's outline."""
+    ends, key = _outline(mesh, end, emitted)
+    side = min(max(len(key) // 4, 1), int(np.sqrt(len(cells) - 1)))
+    items = build_grid(site_xy, ends, len(key), side, cells)
+    guess = 0
+    for q in range(n_bare):
+        i = bare[q]
+        x = xy[2 * i]
+        y = xy[2 * i + 1]
+        guess, t, d2 = nearest_segment(site_xy, ends, key, side, cells, items, x, y, guess)
+        a, b, c = ends[guess, 0], ends[guess, 1], ends[guess, 2]
+        ux = site_xy[2 * b] - site_xy[2 * a]
+        uy = site_xy[2 * b + 1] - site_xy[2 * a + 1]
+        vx = site_xy[2 * c] - site_xy[2 * a]
+        vy = site_xy[2 * c + 1] - site_xy[2 * a + 1]
+        px = x - site_xy[2 * a]
+        py = y - site_xy[2 * a + 1]
+        area = ux * vy - uy * vx
+        wb = (px * vy - py * vx) / area
+        wc = (py * ux - px * uy) / area
+        wa = 1.0 - wb - wc
+        is_covered = wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
+        if is_covered:
+            # Within rounding of the border, as on the sides of a turned rectangle.
+            d = abs(wa * site_z[a] + wb * site_z[b] + wc * site_z[c] - z[i])
+        else:
+            row[UNCOVERED] += 1
+            dz = (1.0 - t) * site_z[a] + t * site_z[b] - z[i]
+            d = np.sqrt(d2 * unit * unit + dz * dz) if nearest else 0.0
+        row[ERROR] += d
+        row[SQUARES] += d * d
+        row[MAXIMUM] = max(row[MAXIMUM], d)
+        if len(deviation) > 0:
+            deviation[i] = d
+            covered[i] = is_covered
 
 
 @njit(cache=True, nogil=True)
@@ -342,86 +373,65 @@ def _evaluate_one(
     total = 0.0
     squares = 0.0
     maximum = 0.0
-    uncovered = 0
-    # The outline's grid is built when the first vertex outside needs it.
-    ends = np.empty((0, 3), np.int32)
-    key = np.empty(0, np.int64)
-    outline_items = np.empty(0, np.int32)
-    outline_side = 0
-    guess = 0
+    # Vertices in no emitted triangle are listed for later; the list takes the place of the dropped ones already seen.
+    n_bare = 0
     t = 0
     last = -1
-    n_sites_used = 0
-    for q in range(n_all):
-        # First the dropped vertices, in vector order, then the sites that no emitted triangle uses.
-        if q < n_all - n:
-            i = dropped[q]
-            j = i - q - 1
-            if j != last and j >= 0:
-                last = j
-                if site_triangle[j] != NO_SITE:
-                    t = site_triangle[j]
-            x = xy[2 * i]
-            y = xy[2 * i + 1]
-            height = z[i]
-            t = locate(site_xy, mesh, t, x, y, exact_area)
-            if emitted[t // RECORD] == 1:
-                a = mesh[t]
-                b = mesh[t + 1]
-                c = mesh[t + 2]
-                ax = site_xy[2 * a] - x
-                ay = site_xy[2 * a + 1] - y
-                bx = site_xy[2 * b] - x
-                by = site_xy[2 * b + 1] - y
-                cx = site_xy[2 * c] - x
-                cy = site_xy[2 * c + 1] - y
-                wa = bx * cy - by * cx
-                wb = cx * ay - cy * ax
-                wc = ax * by - ay * bx
-                d = abs((wa * site_z[a] + wb * site_z[b] + wc * site_z[c]) / (wa + wb + wc) - height)
-                total += d
-                squares += d * d
-                maximum = max(maximum, d)
-                if len(deviation) > 0:
-                    deviation[i] = d
-                    covered[i] = True
-                continue
-        else:
-            j = q - (n_all - n)
-            i = sites[j]
+    for q in range(n_all - n):
+        i = dropped[q]
+        # The site before this vertex on the curve is close to it, and so is any triangle of that site.
+        j = i - q - 1
+        if j != last and j >= 0:
+            last = j
             if site_triangle[j] != NO_SITE:
-                n_sites_used += 1
-                if len(deviation) > 0:
-                    deviation[i] = 0.0
-                    covered[i] = True
-                continue
-            x = xy[2 * i]
-            y = xy[2 * i + 1]
-            height = z[i]
-        if outline_side == 0:
-            ends, key = _outline(mesh, end, emitted)
-            limit = int(np.sqrt(len(cells) - 1))
-            outline_side = min(max(len(key) // 4, 1), limit)
-            outline_items = build_grid(site_xy, ends, len(key), outline_side, cells)
-        d, is_covered, guess = _outside_cost(
-            site_xy, site_z, unit, ends, key, outline_side, cells, outline_items, x, y, height, guess
-        )
-        if not is_covered:
-            uncovered += 1
-            if not nearest:
-                d = 0.0
+                t = site_triangle[j]
+        x = xy[2 * i]
+        y = xy[2 * i + 1]
+        t = locate(site_xy, mesh, t, x, y, exact_area)
+        if emitted[t // RECORD] == 0:
+            dropped[n_bare] = i
+            n_bare += 1
+            continue
+        a = mesh[t]
+        b = mesh[t + 1]
+        c = mesh[t + 2]
+        ax = site_xy[2 * a] - x
+        ay = site_xy[2 * a + 1] - y
+        bx = site_xy[2 * b] - x
+        by = site_xy[2 * b + 1] - y
+        cx = site_xy[2 * c] - x
+        cy = site_xy[2 * c + 1] - y
+        wa = bx * cy - by * cx
+        wb = cx * ay - cy * ax
+        wc = ax * by - ay * bx
+        d = abs((wa * site_z[a] + wb * site_z[b] + wc * site_z[c]) / (wa + wb + wc) - z[i])
         total += d
         squares += d * d
         maximum = max(maximum, d)
         if len(deviation) > 0:
             deviation[i] = d
-            covered[i] = is_covered
+            covered[i] = True
+    n_used = 0
+    for j in range(n):
+        i = sites[j]
+        if site_triangle[j] == NO_SITE:
+            dropped[n_bare] = i
+            n_bare += 1
+            continue
+        n_used += 1
+        if len(deviation) > 0:
+            deviation[i] = 0.0
+            covered[i] = True
     row[ERROR] = total
     row[TRIANGLES] = n_triangles
-    row[VERTICES] = n_sites_used
+    row[VERTICES] = n_used
     row[SQUARES] = squares
     row[MAXIMUM] = maximum
-    row[UNCOVERED] = uncovered
+    row[UNCOVERED] = 0
+    if n_bare > 0:
+        _measure_bare(
+            xy, z, dropped, n_bare, site_xy, site_z, unit, mesh, end, emitted, cells, nearest, row, deviation, covered
+        )
     return end
 
 

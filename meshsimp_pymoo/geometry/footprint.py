@@ -58,6 +58,16 @@ def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x: float, y: float) -> b
 
 
 @njit(cache=True, nogil=True)
+def _in_some_face(
+    xy: np.ndarray, start: np.ndarray, items: np.ndarray, faces: np.ndarray, cell: int, x: float, y: float
+) -> bool:
+    for k in range(start[cell], start[cell + 1]):
+        if _in_face(xy, faces, items[k], x, y):
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def inside(
     xy: np.ndarray,
     side: int,
@@ -68,18 +78,12 @@ def inside(
     x: float,
     y: float,
 ) -> bool:
-    """Whether (x, y) lies in the closed projection; ``xy`` are the model's flat coordinates in the unit square."""
-    if side == 0:
-        return True
-    column = min(max(int(x * side), 0), side - 1)
-    row = min(max(int(y * side), 0), side - 1)
-    cell = row * side + column
-    if state[cell] != MIXED:
-        return state[cell] == INSIDE
-    for k in range(start[cell], start[cell + 1]):
-        if _in_face(xy, faces, items[k], x, y):
-            return True
-    return False
+    """Whether (x, y) in the unit square lies in the closed projection; ``xy`` are the model's flat coordinates."""
+    cell = min(int(y * side), side - 1) * side + min(int(x * side), side - 1)
+    kind = state[cell]
+    if kind == MIXED:
+        return _in_some_face(xy, start, items, faces, cell, x, y)
+    return kind == INSIDE
 
 
 @njit(cache=True, nogil=True)
@@ -126,6 +130,22 @@ def _mark_outline(xy: np.ndarray, edges: np.ndarray, side: int, state: np.ndarra
 
 
 @njit(cache=True, nogil=True)
+def _apart(xy: np.ndarray, a: int, b: int, c: int, x: float, y: float, size: float) -> bool:
+    """Whether a line along an edge of face (a, b, c) separates it from a cell; the cell is taken a little larger."""
+    margin = 1e-3 * size
+    x0, x1, y0, y1 = x - margin, x + size + margin, y - margin, y + size + margin
+    turn = _left_of(xy, a, b, xy[2 * c], xy[2 * c + 1])
+    for _ in range(3):
+        corners = 0
+        for px, py in ((x0, y0), (x1, y0), (x0, y1), (x1, y1)):
+            corners += _left_of(xy, a, b, px, py) * turn < 0.0
+        if corners == 4:
+            return True
+        a, b, c = b, c, a
+    return False
+
+
+@njit(cache=True, nogil=True)
 def _face_cells(
     xy: np.ndarray, faces: np.ndarray, side: int, state: np.ndarray, start: np.ndarray, items: np.ndarray, fill: bool
 ) -> None:
@@ -142,6 +162,8 @@ def _face_cells(
             for column in range(first, last + 1):
                 cell = row * side + column
                 if state[cell] == MIXED:
+                    if _apart(xy, a, b, c, column / side, row / side, 1.0 / side):
+                        continue
                     if fill:
                         items[start[cell]] = f
                     start[cell] += 1
@@ -172,8 +194,8 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     if convex:
         return Footprint(0, np.zeros(0, np.uint8), none, none, faces)
     flat = np.ascontiguousarray(xy, float).ravel()
-    # About two faces a cell: fine enough that most cells are whole, coarse enough to stay small beside the model.
-    side = int(np.clip(np.sqrt(len(faces) / 2), 8, 8192))
+    # Two cells a face: fine enough that few cells are mixed and each of those has few faces, and still small beside the model.
+    side = int(np.clip(np.sqrt(2 * len(faces)), 8, 8192))
     state = np.zeros(side * side, np.uint8)
     _mark_outline(flat, np.ascontiguousarray(outline, np.int64), side, state)
     counts = np.zeros(side * side + 1, np.int64)

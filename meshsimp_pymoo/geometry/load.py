@@ -211,10 +211,10 @@ def grid_source(
 
     Examples
     --------
-    A cell with one corner missing is a single triangle:
+    A full cell is two triangles, one that lacks a corner is one:
 
-    >>> grid_source([[0.0, 1.0], [2.0, float("nan")]]).points.tolist()
-    [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, -1.0, 2.0]]
+    >>> grid_source([[0.0, 1.0, 4.0], [2.0, 3.0, float("nan")]]).faces.tolist()
+    [[0, 3, 4], [0, 4, 1], [1, 4, 2]]
     """
     if isinstance(elevation, np.ma.MaskedArray):
         hidden = np.ma.getmaskarray(elevation)

@@ -64,7 +64,7 @@ def build_grid(xy: np.ndarray, ends: np.ndarray, m: int, side: int, start: np.nd
     return items
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def _to_segment(xy: np.ndarray, a: int, b: int, x: float, y: float) -> tuple[float, float]:
     """Squared distance from (x, y) to the segment a-b and the parameter of its nearest point."""
     ax = xy[2 * a]
@@ -79,7 +79,7 @@ def _to_segment(xy: np.ndarray, a: int, b: int, x: float, y: float) -> tuple[flo
     return dx * dx + dy * dy, t
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def nearest_segment(
     xy: np.ndarray,
     ends: np.ndarray,

@@ -190,8 +190,8 @@ class SurfaceFacts:
     components : int
         Parts connected through edges of two faces.
     border_edges, border_loops : int
-        Edges of one face, and the closed loops they form; where loops touch in a vertex they count
-        separately.
+        Edges of one face, and the closed loops one walks along them, always beside the same fan of faces: two
+        holes that touch in a vertex are one loop, two parts that touch in one have a loop each.
     pinch_vertices : int
         Border vertices in which two or more fans of faces meet. They are no fault.
     nonmanifold_edges : int
@@ -482,9 +482,10 @@ def _given_direction(up: Up) -> FloatArray:
             f"up={up!r} is no direction; "
             "give 'auto', an axis (x, y, z, -x, -y, -z) or a vector such as 0,0.5,1"
         )
-    if abs(vector @ vector - 1) <= 4 * np.finfo(float).eps:
+    longest = np.abs(vector).max()
+    if longest <= 1 and abs(vector @ vector - 1) <= 4 * np.finfo(float).eps:
         return vector  # a unit vector comes back as it is
-    vector = vector / np.abs(vector).max()
+    vector = vector / longest
     return vector / np.linalg.norm(vector)
 
 
