@@ -170,15 +170,15 @@ def _is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> b
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _third_of_sum(a: float, b: float, c: float) -> float:
-    """The mean of three numbers, rounded the same way in whatever order they come."""
+def _sum_of_three(a: float, b: float, c: float) -> float:
+    """Their sum, rounded the same way in whatever order they come."""
     low = a if a < b else b
     high = b if a < b else a
     middle = c if c > low else low
     lowest = c if c < low else low
     highest = middle if middle > high else high
     middle = high if middle > high else middle
-    return (lowest + middle + highest) * (1.0 / 3.0)
+    return lowest + middle + highest
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -223,9 +223,9 @@ def _emit(
             continue
         if side > 0:
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
-            x = _third_of_sum(xy[2 * a], xy[2 * b], xy[2 * c])
-            y = _third_of_sum(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-            if not inside(model_xy, side, state, start, items, faces, x, y):
+            x3 = _sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
+            y3 = _sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+            if not inside(model_xy, side, state, start, items, faces, x3, y3):
                 emitted[t // RECORD] = 0
                 continue
         n_triangles += 1

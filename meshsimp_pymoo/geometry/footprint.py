@@ -40,18 +40,21 @@ class Footprint(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def _left_of(xy: np.ndarray, a: int, b: int, x: float, y: float) -> float:
-    """Twice the signed area of (a, b, (x, y)), computed so that swapping a and b only swaps its sign."""
+def _left_of(xy: np.ndarray, a: int, b: int, x3: float, y3: float) -> float:
+    """Which side of the line from a to b a third of (x3, y3) lies on: positive on the left, 0 on the line.
+
+    Swapping a and b only swaps the sign. Three times the point is asked for, since a centroid on a grid is exact only so.
+    """
     if a < b:
-        return (xy[2 * a] - x) * (xy[2 * b + 1] - y) - (xy[2 * a + 1] - y) * (xy[2 * b] - x)
-    return -((xy[2 * b] - x) * (xy[2 * a + 1] - y) - (xy[2 * b + 1] - y) * (xy[2 * a] - x))
+        return (3.0 * xy[2 * a] - x3) * (3.0 * xy[2 * b + 1] - y3) - (3.0 * xy[2 * a + 1] - y3) * (3.0 * xy[2 * b] - x3)
+    return -((3.0 * xy[2 * b] - x3) * (3.0 * xy[2 * a + 1] - y3) - (3.0 * xy[2 * b + 1] - y3) * (3.0 * xy[2 * a] - x3))
 
 
 @njit(cache=True, nogil=True)
-def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x: float, y: float) -> bool:
-    u = _left_of(xy, faces[f, 0], faces[f, 1], x, y)
-    v = _left_of(xy, faces[f, 1], faces[f, 2], x, y)
-    w = _left_of(xy, faces[f, 2], faces[f, 0], x, y)
+def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x3: float, y3: float) -> bool:
+    u = _left_of(xy, faces[f, 0], faces[f, 1], x3, y3)
+    v = _left_of(xy, faces[f, 1], faces[f, 2], x3, y3)
+    w = _left_of(xy, faces[f, 2], faces[f, 0], x3, y3)
     if u == 0.0 and v == 0.0 and w == 0.0:
         return False
     return (u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)
@@ -59,10 +62,10 @@ def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x: float, y: float) -> b
 
 @njit(cache=True, nogil=True)
 def _in_some_face(
-    xy: np.ndarray, start: np.ndarray, items: np.ndarray, faces: np.ndarray, cell: int, x: float, y: float
+    xy: np.ndarray, start: np.ndarray, items: np.ndarray, faces: np.ndarray, cell: int, x3: float, y3: float
 ) -> bool:
     for k in range(start[cell], start[cell + 1]):
-        if _in_face(xy, faces, items[k], x, y):
+        if _in_face(xy, faces, items[k], x3, y3):
             return True
     return False
 
@@ -75,14 +78,15 @@ def inside(
     start: np.ndarray,
     items: np.ndarray,
     faces: np.ndarray,
-    x: float,
-    y: float,
+    x3: float,
+    y3: float,
 ) -> bool:
-    """Whether (x, y) in the unit square lies in the closed projection; ``xy`` are the model's flat coordinates."""
-    cell = min(int(y * side), side - 1) * side + min(int(x * side), side - 1)
+    """Whether a third of (x3, y3), in the unit square, lies in the closed projection; ``xy`` are the model's coordinates."""
+    scale = side / 3.0
+    cell = min(int(y3 * scale), side - 1) * side + min(int(x3 * scale), side - 1)
     kind = state[cell]
     if kind == MIXED:
-        return _in_some_face(xy, start, items, faces, cell, x, y)
+        return _in_some_face(xy, start, items, faces, cell, x3, y3)
     return kind == INSIDE
 
 
@@ -134,11 +138,11 @@ def _apart(xy: np.ndarray, a: int, b: int, c: int, x: float, y: float, size: flo
     """Whether a line along an edge of face (a, b, c) separates it from a cell; the cell is taken a little larger."""
     margin = 1e-3 * size
     x0, x1, y0, y1 = x - margin, x + size + margin, y - margin, y + size + margin
-    turn = _left_of(xy, a, b, xy[2 * c], xy[2 * c + 1])
+    turn = _left_of(xy, a, b, 3.0 * xy[2 * c], 3.0 * xy[2 * c + 1])
     for _ in range(3):
         corners = 0
         for px, py in ((x0, y0), (x1, y0), (x0, y1), (x1, y1)):
-            corners += _left_of(xy, a, b, px, py) * turn < 0.0
+            corners += _left_of(xy, a, b, 3.0 * px, 3.0 * py) * turn < 0.0
         if corners == 4:
             return True
         a, b, c = b, c, a
@@ -167,7 +171,7 @@ def _face_cells(
                     if fill:
                         items[start[cell]] = f
                     start[cell] += 1
-                elif not fill and _in_face(xy, faces, f, (column + 0.5) / side, (row + 0.5) / side):
+                elif not fill and _in_face(xy, faces, f, 3.0 * (column + 0.5) / side, 3.0 * (row + 0.5) / side):
                     state[cell] = INSIDE
 
 

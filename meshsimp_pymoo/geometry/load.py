@@ -827,7 +827,6 @@ def _read_obj(path: Path, name: str) -> SourceMesh:
     if (corners < 0).any():  # -1 is the last vertex before the face's own line
         before = np.repeat(np.cumsum(is_vertex)[face_at], counts)
         corners = np.where(corners < 0, before + corners + 1, corners)
-        corners = np.where(corners < 1, -1, corners)
     return build_source(table[:, :3], _fans(corners - 1, counts), attributes, name)
 
 

@@ -111,7 +111,7 @@ def up_direction(source: SourceMesh, up: Up = "auto") -> FloatArray:
         return _given_direction(up)
     if source.up is not None:
         return _given_direction(source.up)
-    normals = _area_vectors(_local_points(source), source.faces)
+    normals = _area_vectors(source.points, source.faces)
     areas = np.linalg.norm(normals, axis=1)
     total = normals.sum(axis=0)
     length = float(np.linalg.norm(total))
@@ -169,8 +169,6 @@ def upright_rotation(up: Up) -> FloatArray:
     if np.count_nonzero(z) == 1:
         return start
     x = start[0] - (start[0] @ z) * z
-    x /= np.linalg.norm(x)
-    x -= (x @ z) * z  # once more: the first projection leaves a rounding error along z
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z])
 
@@ -308,9 +306,8 @@ def surface_facts(source: SourceMesh, upright: FloatArray) -> SurfaceFacts:
     SurfaceFacts
     """
     used = np.unique(source.faces)
-    points = upright - _middle(upright[used])
     faces = source.faces
-    normals = _area_vectors(points, faces)
+    normals = _area_vectors(upright, faces)
     areas = np.linalg.norm(normals, axis=1)
     net = float(normals[:, 2].sum())
     flipped = net < 0
@@ -321,7 +318,7 @@ def surface_facts(source: SourceMesh, upright: FloatArray) -> SurfaceFacts:
     folded = ~vertical & (normals[:, 2] < 0)
     facing = np.flatnonzero(~vertical & ~folded)
     hidden = np.zeros(len(faces), bool)
-    hidden[facing[_hidden_faces(points, faces[facing])]] = True
+    hidden[facing[_hidden_faces(upright, faces[facing])]] = True
 
     edges = _Edges.of(faces)
     nonmanifold = np.flatnonzero(edges.counts > 2)
@@ -351,7 +348,7 @@ def surface_facts(source: SourceMesh, upright: FloatArray) -> SurfaceFacts:
         vertical_faces=int(vertical.sum()),
         flipped=flipped,
         net_share=abs(net) / max(float(areas.sum()), 1e-300),
-        width_share=_width_share(points[used, :2]),
+        width_share=_width_share(upright[used, :2]),
     )
 
 
@@ -489,14 +486,11 @@ def _given_direction(up: Up) -> FloatArray:
     return vector / np.linalg.norm(vector)
 
 
-def _middle(points: FloatArray) -> FloatArray:
-    """Return the middle of the bounding box; areas taken around it do not cancel far from the origin."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    return low + (high - low) / 2
-
-
 def _local_points(source: SourceMesh) -> FloatArray:
-    return source.points - _middle(source.points[np.unique(source.faces)])
+    """Shift to the middle of the used vertices: rotations round relative to the coordinates."""
+    used = source.points[np.unique(source.faces)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    return source.points - (low + (high - low) / 2)
 
 
 def _area_vectors(points: FloatArray, faces: IntArray) -> FloatArray:
@@ -604,11 +598,8 @@ def _largest_part(faces: IntArray, chosen: IntArray, weight: FloatArray) -> IntA
     heavier stays.
     """
     while True:
-        half = faces[chosen]
-        edges = _Edges.of(half)
-        first, second = edges.pairs()
-        opposite = half.ravel()[first] != half.ravel()[second]
-        label = _face_components(len(chosen), first[opposite] // 3, second[opposite] // 3)
+        first, second = _Edges.of(faces[chosen]).pairs()
+        label = _face_components(len(chosen), first // 3, second // 3)
         best = int(np.argmax(np.bincount(label, weights=weight[chosen])))
         part = chosen[label == best]
         directed = faces[part].ravel() * (int(faces.max()) + 1) + np.roll(faces[part], -1, axis=1).ravel()
