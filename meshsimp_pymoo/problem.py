@@ -52,12 +52,12 @@ class ThreadRunner:
     def __init__(self, n_threads: int | None = None) -> None:
         if n_threads is not None and n_threads < 1:
             raise ValueError(f"n_threads={n_threads} is no number of threads; give 1 or more")
-        self.n_threads = n_threads
+        self.n_threads = n_threads or os.cpu_count() or 1
 
     def __call__(self, f: Any, X: npt.NDArray[Any]) -> list[dict[str, Any]]:
         """Return what ``f`` gives for every row of X, the rows evaluated together."""
         problem: MeshProblem = f.problem
-        table = problem.evaluate_subsets(X, n_threads=self.n_threads or os.cpu_count() or 1)
+        table = problem.evaluate_subsets(X, n_threads=self.n_threads)
         return [problem.outcome(row) for row in table]
 
 

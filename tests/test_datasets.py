@@ -1,0 +1,229 @@
+"""Built-in models: known answers, any size, helpful refusals."""
+
+from __future__ import annotations
+
+import matplotlib.cbook
+import numpy as np
+import pytest
+
+from meshsimp_pymoo import datasets
+from meshsimp_pymoo.datasets import describe, find_source, load, names
+from meshsimp_pymoo.geometry.error import simplify
+from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.geometry.model import load_model
+
+SMALL = {"jacksboro": "jacksboro:40", "topobathy": "topobathy:9", "face": "face:300", "crater": "crater:13"}
+
+
+def subset(model, *positions):
+    """Return the chromosome that keeps the vertices at these (x, y) in the frame of the file."""
+    xy = model.file_points[:, :2]
+    kept = np.zeros(model.n_vertices, dtype=bool)
+    for position in positions:
+        found = np.flatnonzero((xy == position).all(axis=1))
+        assert len(found) == 1, f"no single vertex at {position}"
+        kept[found] = True
+    return kept
+
+
+CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_built_in_is_an_open_height_field_that_can_be_simplified(name):
+    model = load_model(load(SMALL.get(name, name)))
+    assert model.up.tolist() == [0, 0, 1]
+    everything = simplify(model, np.ones(model.n_vertices, dtype=bool))
+    assert everything.quality.error == pytest.approx(0, abs=1e-9 * model.diagonal * model.n_vertices)
+    assert everything.quality.vertices == model.n_vertices
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_built_in_is_the_same_again_and_its_name_spells_it(name):
+    one, two = load(SMALL.get(name, name)), load(SMALL.get(name, name))
+    assert np.array_equal(one.points, two.points)
+    assert np.array_equal(one.faces, two.faces)
+    assert np.array_equal(load(one.name).points, one.points)
+
+
+def test_jacksboro_is_the_whole_dem_in_metres_on_an_exact_grid():
+    whole = load("jacksboro")
+    assert whole.points.shape == (344 * 403, 3) == (138_632, 3)
+    assert whole.points[:, 2].min() == 236
+    assert whole.points[:, 2].max() == 1076
+    dx, dy = whole.points[1, 0] - whole.points[0, 0], whole.points[0, 1] - whole.points[403, 1]
+    assert dx == pytest.approx(74.4, abs=0.1)  # 3 seconds of arc at 36.6 degrees north
+    assert dy == pytest.approx(92.7, abs=0.1)
+    assert (dx * 1024).is_integer()
+    assert (dy * 1024).is_integer()
+
+
+def test_a_stride_takes_every_nth_post():
+    whole, part = load("jacksboro"), load("jacksboro:11")
+    every_11th = whole.points.reshape(344, 403, 3)[::11, ::11].reshape(-1, 3)
+    assert len(part.points) == 32 * 37
+    assert np.array_equal(part.points, every_11th)
+
+
+def test_topobathy_has_its_north_up_and_sea_below_zero():
+    source = load("topobathy")
+    assert len(source.points) == 91 * 120
+    with np.load(matplotlib.cbook.get_sample_data("topobathy.npz", asfileobj=False)) as file:
+        north_row = file["topo"][np.argmax(file["latitude"])]
+    northernmost = source.points[source.points[:, 1] == source.points[:, 1].max()]
+    assert np.array_equal(northernmost[np.argsort(northernmost[:, 0]), 2], north_row)
+    assert source.points[:, 2].min() < -1000
+
+
+@pytest.mark.parametrize("side", [3, 17, 33])
+def test_a_roof_is_exact_with_4_triangles_and_costs_its_known_error_without_its_ridge(side):
+    roof = load_model(load("roof", side=side))
+    ridge = simplify(roof, subset(roof, *CORNERS, (0, -1), (0, 1)))
+    assert (ridge.quality.error, ridge.quality.triangles) == (0.0, 4)
+    flat = simplify(roof, subset(roof, *CORNERS))
+    assert (flat.quality.error, flat.quality.triangles) == (side * (side - 1) / 2, 2)
+
+
+@pytest.mark.parametrize("side", [5, 17])
+def test_a_pyramid_is_exact_with_4_triangles_and_costs_its_known_error_without_its_apex(side):
+    pyramid = load_model(load("pyramid", side=side))
+    apex = simplify(pyramid, subset(pyramid, *CORNERS, (0, 0)))
+    assert (apex.quality.error, apex.quality.triangles) == (0.0, 4)
+    flat = simplify(pyramid, subset(pyramid, *CORNERS))
+    assert flat.quality.error == pytest.approx(side * (side - 2) / 3, rel=1e-12)
+
+
+def test_a_plane_is_exact_with_2_triangles():
+    plane = load_model(load("plane"))
+    flat = simplify(plane, subset(plane, *CORNERS))
+    assert (flat.quality.error, flat.quality.triangles) == (0.0, 2)
+
+
+@pytest.mark.parametrize("name", ["face", "ring", "horseshoe"])
+@pytest.mark.parametrize("vertices", [60, 61, 922, 2622])
+def test_scattered_models_have_exactly_the_wanted_number_of_vertices_on_one_surface(name, vertices):
+    model = load_model(load(name, vertices=vertices))
+    assert model.n_vertices == vertices
+    assert model.facts.components == 1
+    assert model.facts.border_loops == (2 if name == "ring" else 1)
+    assert model.facts.pinch_vertices == 0
+
+
+def test_the_seed_moves_the_vertices_of_a_face_and_the_noise_its_heights():
+    face, other = load("face:300"), load("face:300,seed=2")
+    assert not np.array_equal(face.points[:, :2], other.points[:, :2])
+    smooth = load("face:300,noise=0")
+    assert np.array_equal(face.points[:, :2], smooth.points[:, :2])
+    deviation = face.points[:, 2] - smooth.points[:, 2]
+    assert deviation.std() == pytest.approx(0.08, rel=0.2)
+
+
+def test_a_face_has_a_nose_above_its_cheeks_and_eyes_in_sockets():
+    face = load("face:20000,noise=0")
+
+    def height(x, y):
+        return face.points[np.argmin(np.hypot(face.points[:, 0] - x, face.points[:, 1] - y)), 2]
+
+    assert height(0, -22) > height(35, -22) + 20
+    assert height(0, 20) > height(22, 20) + 5
+    assert height(40, -5) > height(60, -5)
+    assert height(0, -53) < height(0, -48)  # the line between the lips
+
+
+@pytest.mark.parametrize(("name", "least"), [("ring", 0.1), ("horseshoe", 0.2)])
+def test_hull_triangles_outside_the_outline_are_left_out_by_the_footprint(name, least):
+    model = load_model(load(name))
+    kept = np.ones(model.n_vertices, dtype=bool)
+
+    def area(footprint):
+        corners = model.points[simplify(model, kept, footprint=footprint).faces][:, :, :2]
+        u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()
+
+    assert area("model") < (1 - least) * area("hull")
+
+
+def test_a_terrain_can_be_scattered_to_any_number_of_its_posts():
+    whole, part = load("jacksboro:5"), load("jacksboro:5,vertices=922")
+    assert len(part.points) == 922
+    posts = {tuple(point) for point in whole.points.tolist()}
+    assert all(tuple(point) in posts for point in part.points.tolist())
+    for axis in (0, 1):  # the corners stay, so the terrain keeps its extent
+        assert part.points[:, axis].min() == whole.points[:, axis].min()
+        assert part.points[:, axis].max() == whole.points[:, axis].max()
+    assert load_model(part).facts.border_loops == 1
+
+
+def test_parameters_by_keyword_win_over_spelled_ones():
+    assert load("roof:17", side=9).name == "roof:9"
+    assert load("roof").name == load("roof:17").name == "roof"
+    assert load("face:300,noise=0").name == "face:300,noise=0.0"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("jaksboro", r"jaksboro: no such file, .*did you mean 'jacksboro'\?\); built-in models: jacksboro, "),
+        ("Roof:17", r"did you mean 'roof'\?"),
+        ("qqqq", r"no built-in model of that name; built-in models: jacksboro, topobathy, face"),
+        ("roof:18", r"roof:18: side is 18; it must be a power of two plus one \(say 17 or 33\)"),
+        ("roof:1", r"side is 1; it must be 3 to 4097"),
+        ("roof:1.5", r"side must be a whole number, not '1.5'"),
+        ("roof:", r"side must be a whole number, not ''"),
+        ("roof:big", r"side must be a whole number, not 'big'"),
+        ("face:59", r"vertices is 59; it must be 60 to 2000000"),
+        ("face:300,2", r"'2' needs a name, as in face:300,seed=2"),
+        ("face:300,sed=2", r"no parameter 'sed' \(did you mean 'seed'\?\); face takes vertices, seed, noise"),
+        ("face:300,vertices=300", r"vertices is given twice"),
+        ("face:300,seed=-1", r"seed must be 0 or more, not -1"),
+        ("face:300,noise=-1", r"noise is -1; it must be 0 or more"),
+        ("face:300,noise=nan", r"noise must be a number, not 'nan'"),
+        ("jacksboro:0", r"stride is 0; a grid of 344 x 403 posts can be read at 1 to 343"),
+        ("jacksboro:344", r"stride is 344; "),
+        ("jacksboro:11,vertices=5000", r"vertices is 5000; it must be 4 to 1184"),
+    ],
+)
+def test_wrong_names_and_parameters_are_refused_with_the_way_out(name, message):
+    with pytest.raises(ModelError, match=message) as caught:
+        load(name)
+    assert "\n" not in str(caught.value)
+
+
+def test_true_is_no_number():
+    with pytest.raises(ModelError, match="side must be a whole number, not True"):
+        load("roof", side=True)
+
+
+def test_describe_lists_every_model_with_its_parameters():
+    lines = describe()
+    assert list(lines) == names()
+    assert lines["face"].startswith("face:vertices=2500,seed=1,noise=0.08 - a synthetic scan of a face")
+    assert all("\n" not in line and not line.endswith(".") for line in lines.values())
+
+
+def test_a_file_wins_over_a_built_in_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof").write_text("no mesh")
+    with pytest.raises(ModelError, match="unknown suffix"):
+        find_source("roof")
+    assert find_source("plane").name == "plane"
+
+
+def test_what_looks_like_a_file_is_looked_for_as_a_file(tmp_path):
+    with pytest.raises(ModelError, match=r"face\.ply: no such file"):
+        find_source("face.ply")
+    with pytest.raises(ModelError, match="no such file"):
+        find_source(str(tmp_path / "roof"))
+    with pytest.raises(ModelError, match=r"did you mean 'face'"):
+        find_source("fase:noise=0.5")
+
+
+def test_spacing_is_for_grids_in_files():
+    with pytest.raises(ModelError, match="roof: spacing and nodata describe height grids in files"):
+        find_source("roof", spacing=2.0)
+
+
+def test_missing_sample_data_are_named(monkeypatch, tmp_path):
+    monkeypatch.setattr(matplotlib.cbook, "get_sample_data", lambda file, asfileobj: str(tmp_path / file))
+    with pytest.raises(ModelError, match=r"jacksboro_fault_dem.npz is missing; reinstall matplotlib"):
+        datasets.load("jacksboro")

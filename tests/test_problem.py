@@ -1,0 +1,319 @@
+from __future__ import annotations
+
+import copy
+import itertools
+import pickle
+from multiprocessing.pool import ThreadPool
+
+import numpy as np
+import pytest
+import trimesh
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.indicators.hv import HV
+from pymoo.operators.mutation.bitflip import BitflipMutation
+from pymoo.optimize import minimize
+from pymoo.parallelization import DaskParallelization, JoblibParallelization, StarmapParallelization
+
+from meshsimp_pymoo import MeshProblem, NeighbourShift, OAX, PinnedCorners, RandomSubset
+from meshsimp_pymoo.algorithms import nsga2_v1, nsga2_v2
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.geometry import error
+from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, grid_source
+from meshsimp_pymoo.problem import ThreadRunner
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return MeshProblem("face:300")
+
+
+def subsets(problem, n=20, seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.random((n, problem.n_var)) < rng.random((n, 1))
+
+
+def test_objectives_are_error_and_triangles_of_the_kept_and_pinned_vertices(problem):
+    X = subsets(problem)
+    F = problem.evaluate(X)
+    table = error.evaluate_subsets(problem.model, X | problem.pinned)
+    np.testing.assert_array_equal(F, table[:, [error.ERROR, error.TRIANGLES]])
+    np.testing.assert_array_equal(problem.evaluate(X[0]), F[0])
+
+
+def test_the_other_quality_numbers_come_along(problem):
+    out = problem.evaluate(subsets(problem, 3), return_as_dictionary=True)
+    for i, kept in enumerate(subsets(problem, 3)):
+        quality = problem.quality(kept)
+        for key in ("vertices", "mean_error", "rms_error", "max_error", "uncovered"):
+            assert out[key][i] == pytest.approx(getattr(quality, key))
+
+
+def test_a_known_chromosome_is_not_triangulated_again(monkeypatch):
+    problem = MeshProblem("roof:9")
+    seen = []
+    kernel = problem._kernel
+    monkeypatch.setattr(problem, "_kernel", lambda X, n: seen.append(len(X)) or kernel(X, n))
+    X = subsets(problem, 10)
+    first = problem.evaluate(np.vstack([X, X[:3]]))
+    again = problem.evaluate(X[::-1])
+    assert seen == [10]
+    np.testing.assert_array_equal(first[:10], again[::-1])
+    np.testing.assert_array_equal(first[10:], first[:3])
+
+
+def test_the_memo_is_bounded_and_forgets_the_oldest():
+    problem = MeshProblem("roof:9", memo=5)
+    X = subsets(problem, 12)
+    F = problem.evaluate(X)
+    assert len(problem._memo) == 5
+    np.testing.assert_array_equal(problem.evaluate(X), F)
+    np.testing.assert_array_equal(MeshProblem("roof:9", memo=0).evaluate(X), F)
+
+
+@pytest.mark.parametrize("dtype", [float, np.int8, object])
+def test_genomes_that_are_not_bool_are_refused_with_the_operators_to_pass(problem, dtype):
+    X = np.ones((2, problem.n_var), dtype)
+    with pytest.raises(TypeError, match=r"RandomSubset.*PinnedCorners"):
+        problem.evaluate(X)
+    with pytest.raises(TypeError, match="NeighbourShift"):
+        problem.mesh(X[0])
+
+
+def test_pymoo_s_default_operators_are_refused_at_the_first_generation(problem):
+    with pytest.raises(TypeError, match="pymoo's defaults make real numbers"):
+        minimize(problem, NSGA2(pop_size=8), ("n_gen", 1), seed=1)
+
+
+def test_a_subset_without_a_triangle_gets_the_worst_objectives():
+    elevation = np.zeros((9, 9))
+    elevation[2:7, 2:7] = np.nan  # both triangles of the corners have their centroid in this hole
+    ring = MeshProblem(grid_source(elevation, 1.0, 1.0), up="z")
+    F = ring.evaluate(np.zeros(ring.n_var, bool))
+    np.testing.assert_array_equal(F, ring.worst)
+    everything = ring.evaluate(np.ones(ring.n_var, bool))
+    assert (everything < F).all()
+    with pytest.raises(ValueError, match="span no triangle"):
+        ring.mesh(np.zeros(ring.n_var, bool))
+
+
+def test_constraints_bound_triangles_and_error():
+    problem = MeshProblem("face:300", max_triangles=120, max_error=40.0)
+    out = problem.evaluate(subsets(problem), return_as_dictionary=True)
+    np.testing.assert_allclose(out["G"][:, 0], out["F"][:, 1] - 120)
+    np.testing.assert_allclose(out["G"][:, 1], out["F"][:, 0] - 40.0)
+    result = minimize(
+        MeshProblem("face:300", max_triangles=120), nsga2_v1(pop_size=20), ("n_gen", 12), seed=1
+    )
+    assert (result.F[:, 1] <= 120).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"max_triangles": 0}, "leaves no mesh"),
+        ({"max_error": -1.0}, "is no error"),
+        ({"max_error": float("nan")}, "is no error"),
+        ({"footprint": "box"}, "'box' is unknown"),
+        ({"outside": "zero"}, "'zero' is unknown"),
+        ({"n_threads": 0}, "no number of threads"),
+    ],
+)
+def test_impossible_arguments_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        MeshProblem("roof:3", **arguments)
+
+
+# --------------------------------------------------------------------------------------------------- pinning
+
+
+def test_pinned_vertices_by_name_row_and_position():
+    source = load("face:300")
+    base = MeshProblem(source)
+    assert base.pinned.sum() == len(base.model.corners)
+    by_row = MeshProblem(source, pin=[7, 100])
+    assert set(np.flatnonzero(by_row.pinned & ~base.pinned)) <= {
+        int(np.flatnonzero(base.model.source_index == row)[0]) for row in (7, 100)
+    }
+    by_position = MeshProblem(source, pin=source.points[[7, 100]])
+    np.testing.assert_array_equal(by_position.pinned, by_row.pinned)
+    flat = MeshProblem(source, pin=source.points[[7, 100], :2], up="z")
+    np.testing.assert_array_equal(flat.pinned, by_row.pinned)
+    mixed = MeshProblem(source, pin=["hull", 7, list(source.points[100])])
+    np.testing.assert_array_equal(np.flatnonzero(mixed.pinned & ~by_row.pinned), np.setdiff1d(base.model.hull, np.flatnonzero(by_row.pinned)))
+    assert 7 in mixed.model.source_index[mixed.pinned]
+    # Pinned vertices are in every mesh.
+    mesh = by_row.mesh(np.zeros(by_row.n_var, bool))
+    for row in (7, 100):
+        assert (mesh.vertices == source.points[row]).all(axis=1).any()
+
+
+@pytest.mark.parametrize(
+    ("pin", "message"),
+    [
+        ("edge", "'edge' is unknown"),
+        ([400], "row 400"),
+        ([-1], "row -1"),
+        ([2.5], "no row of the file"),
+        ([[1e6, 0.0, 0.0]], "away, more than 1%"),
+        ([[1.0, 2.0, 3.0, 4.0]], "shape"),
+    ],
+)
+def test_pins_that_are_not_there_are_refused(pin, message):
+    with pytest.raises(ModelError, match=message):
+        MeshProblem("face:300", pin=pin)
+
+
+# -------------------------------------------------------------------------------------------------- the mesh
+
+
+def test_the_mesh_has_original_vertices_only_in_the_file_s_frame_and_its_attributes():
+    source = load("face:300")
+    turn = trimesh.geometry.align_vectors([0, 0, 1], [1, 2, 2])[:3, :3]
+    points = source.points @ turn.T + [5e5, 4e6, 100]
+    color = np.random.default_rng(0).integers(0, 255, (300, 4)).astype(np.uint8)
+    problem = MeshProblem(
+        SourceMesh(points, source.faces, {"color": color, "label": np.arange(300)}, "tilted"), up=(1, 2, 2)
+    )
+    kept = subsets(problem, 1)[0]
+    mesh = problem.mesh(kept)
+    rows = mesh.vertex_attributes["label"]
+    np.testing.assert_array_equal(mesh.vertices, points[rows])
+    np.testing.assert_array_equal(mesh.visual.vertex_colors, color[rows])
+    assert len(mesh.faces) == problem.quality(kept).triangles
+    assert (mesh.face_normals @ np.array([1, 2, 2]) > 0).all()
+    assert np.unique(mesh.faces).size == len(mesh.vertices)
+    assert np.unique(mesh.edges_sorted, axis=0, return_counts=True)[1].max() == 2
+
+
+def test_a_trimesh_and_a_model_serve_as_input():
+    source = load("face:300")
+    mesh = trimesh.Trimesh(source.points, source.faces, process=False)
+    one, two = MeshProblem(source), MeshProblem(mesh)
+    three = MeshProblem(one.model)
+    X = subsets(one, 4)
+    np.testing.assert_array_equal(one.evaluate(X), two.evaluate(X))
+    np.testing.assert_array_equal(one.evaluate(X), three.evaluate(X))
+
+
+# ------------------------------------------------------------------------------------- pymoo's machinery
+
+
+@pytest.mark.parametrize("n_threads", [1, 2, 3])
+def test_results_do_not_depend_on_the_number_of_threads(n_threads):
+    run = minimize(MeshProblem("face:300", n_threads=n_threads), nsga2_v2(pop_size=20), ("n_gen", 6), seed=3)
+    base = minimize(MeshProblem("face:300"), nsga2_v2(pop_size=20), ("n_gen", 6), seed=3)
+    assert run.X.tobytes() == base.X.tobytes()
+    assert run.F.tobytes() == base.F.tobytes()
+
+
+def test_pymoo_s_runners_give_the_same_result():
+    base = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=12), ("n_gen", 4), seed=1)
+    with ThreadPool(2) as pool:
+        starmap = MeshProblem("roof:5", elementwise_runner=StarmapParallelization(pool.starmap))
+        result = minimize(starmap, nsga2_v1(pop_size=12), ("n_gen", 4), seed=1)
+    np.testing.assert_array_equal(result.F, base.F)
+
+
+@pytest.mark.slow
+def test_joblib_s_processes_give_the_same_result():
+    pytest.importorskip("joblib", reason="pymoo's JoblibParallelization needs joblib, which is not installed")
+    base = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
+    runner = JoblibParallelization(n_jobs=2)
+    result = minimize(MeshProblem("roof:5", elementwise_runner=runner), nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
+    np.testing.assert_array_equal(result.F, base.F)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of distributed's own making, while its cluster comes and goes
+def test_dask_s_workers_give_the_same_result():
+    distributed = pytest.importorskip("distributed", reason="pymoo's DaskParallelization needs dask[distributed], not installed")
+    base = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        problem = MeshProblem("roof:5", elementwise_runner=DaskParallelization(client))
+        result = minimize(problem, nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
+    np.testing.assert_array_equal(result.F, base.F)
+
+
+def test_problems_pickle_without_memory_of_the_run_and_copies_are_shared():
+    problem = MeshProblem("face:300", max_triangles=200, pin=[5])
+    empty = len(pickle.dumps(problem))
+    F, G = problem.evaluate(subsets(problem, 50))
+    assert len(pickle.dumps(problem)) == empty
+    again = pickle.loads(pickle.dumps(problem))
+    np.testing.assert_array_equal(again.evaluate(subsets(problem, 50))[0], F)
+    np.testing.assert_array_equal(again.evaluate(subsets(problem, 50))[1], G)
+    assert copy.deepcopy(problem) is problem
+    runner = pickle.loads(pickle.dumps(ThreadRunner(2)))
+    assert runner.n_threads == 2
+
+
+def test_history_and_ask_and_tell_work():
+    result = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=10), ("n_gen", 3), seed=1, save_history=True)
+    assert len(result.history) == 3
+    algorithm = nsga2_v1(pop_size=10)
+    algorithm.setup(MeshProblem("roof:5"), termination=("n_gen", 3), seed=1)
+    while algorithm.has_next():
+        offspring = algorithm.ask()
+        algorithm.evaluator.eval(algorithm.problem, offspring)
+        algorithm.tell(infills=offspring)
+    np.testing.assert_array_equal(algorithm.result().F, result.F)
+
+
+def test_the_five_lines_of_the_readme():
+    problem = MeshProblem("roof:9")
+    result = minimize(
+        problem,
+        NSGA2(
+            pop_size=30,
+            sampling=RandomSubset(),
+            crossover=OAX(prob=0.8),
+            mutation=NeighbourShift(),
+            repair=PinnedCorners(),
+        ),
+        ("n_gen", 10),
+        seed=1,
+    )
+    assert result.X.dtype == bool
+    assert (result.X[:, problem.pinned]).all()
+    assert problem.mesh(result.X[0]).faces.shape[1] == 3
+    assert result.opt.get("max_error").shape == (len(result.F),)
+
+
+# ------------------------------------------------------------------------------- the true front, by enumeration
+
+
+def bumpy(side, seed):
+    """A small grid of random heights: all subsets can be listed."""
+    return grid_source(np.random.default_rng(seed).integers(0, 100, (side, side)).astype(float), 1.0, 1.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_nsga2_finds_the_true_front_that_enumeration_gives(seed):
+    """12 free vertices, 4096 subsets; 4000 evaluations of NSGA-II with mutation find all of the front."""
+    problem = MeshProblem(bumpy(4, seed), up="z")
+    free = np.flatnonzero(~problem.pinned)
+    assert len(free) == 12
+    X = np.tile(problem.pinned, (2 ** len(free), 1))
+    X[:, free] = list(itertools.product([False, True], repeat=len(free)))
+    F = problem.evaluate(X)
+    least = {t: F[F[:, 1] == t, 0].min() for t in np.unique(F[:, 1])}
+    true = {(e, t) for t, e in least.items() if all(e < least[u] for u in least if u < t)}
+    result = minimize(
+        MeshProblem(bumpy(4, seed), up="z"),
+        NSGA2(
+            pop_size=100,
+            sampling=RandomSubset(),
+            crossover=OAX(prob=0.8),
+            mutation=BitflipMutation(prob_var=1 / 16),
+            repair=PinnedCorners(),
+        ),
+        ("n_gen", 60),
+        seed=seed,
+    )
+    found = {(e, t) for e, t in np.unique(result.F, axis=0)}
+    assert found == true
+    hv = HV(ref_point=F.max(axis=0) * 1.1)
+    assert hv(result.F) == pytest.approx(hv(np.array(sorted(true))))
