@@ -11,6 +11,7 @@ exist.
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
 import re
@@ -31,6 +32,10 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+# trimesh logs what it cannot parse; without a handler Python would print that to stderr. Users' own handlers
+# still get it.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 # Grids are dispatched here; of the mesh formats, these three are read here and the rest by trimesh.
 GRID_SUFFIXES = (".asc", ".npy", ".npz")
@@ -894,6 +899,8 @@ def _read_with_trimesh(path: Path, name: str) -> SourceMesh:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
+        # older NumPy only warns when a number cannot be read
+        warnings.filterwarnings("error", message="string or file could not be read")
         try:
             loaded = trimesh.load(str(path), process=False)
         except (OSError, MemoryError):
@@ -1123,10 +1130,12 @@ def _read_npy(stream: IO[bytes], size: int, name: str) -> npt.NDArray[Any]:
                 f"copy or save it again"
             )
         stream.seek(0)
-        return np.lib.format.read_array(stream, allow_pickle=False)
-    except ModelError:
+        array = np.lib.format.read_array(stream, allow_pickle=False)
+        stream.read(1)  # reaching the end makes an archive compare its checksum
+        return array
+    except (ModelError, OSError, MemoryError):
         raise
-    except (ValueError, EOFError, SyntaxError, OverflowError, zipfile.BadZipFile) as error:
+    except Exception as error:  # its header is Python text and its data may be packed: anything may break
         raise ModelError(f"{name}: is not a NumPy array file ({_reason(error)}); check the suffix") from error
 
 

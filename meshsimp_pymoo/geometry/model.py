@@ -59,9 +59,9 @@ class OpenModel:
     up : (3,) float array
         Unit vector of the file's frame that points to +z here.
     rotation : (3, 3) float array
-        Upright coordinates are ``file_points @ rotation.T - origin``.
-    origin : (3,) float array
-        The local origin in the upright frame [file units].
+        Upright coordinates are ``(file_points - pivot) @ rotation.T - offset``.
+    pivot, offset : (3,) float arrays
+        What is subtracted before and after turning, so that far-off coordinates lose nothing [file units].
     xy : (N, 2) float array
         ``points[:, :2] / unit``, rounded to multiples of 2**-52: the coordinates all predicates work on.
     unit : float
@@ -79,7 +79,8 @@ class OpenModel:
     attributes: dict[str, npt.NDArray[Any]]
     up: FloatArray
     rotation: FloatArray
-    origin: FloatArray
+    pivot: FloatArray
+    offset: FloatArray
     xy: FloatArray
     unit: float
     facts: Any = field(default=None, repr=False)
@@ -93,6 +94,11 @@ class OpenModel:
     def diagonal(self) -> float:
         """Diagonal of the bounding box in space [file units]."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def origin(self) -> FloatArray:
+        """The local origin in the upright frame [file units]."""
+        return self.pivot @ self.rotation.T + self.offset
 
     @cached_property
     def hash(self) -> str:
@@ -143,7 +149,7 @@ class OpenModel:
 
     def to_local(self, points: npt.ArrayLike) -> FloatArray:
         """Turn points (M, 3) of the file's frame into this model's upright local frame [file units]."""
-        return np.asarray(points, float) @ self.rotation.T - self.origin
+        return (np.asarray(points, float) - self.pivot) @ self.rotation.T - self.offset
 
     def __len__(self) -> int:
         return self.n_vertices
@@ -220,12 +226,13 @@ def build_model(source: SourceMesh, *, up: str | npt.ArrayLike = "auto") -> Open
         )
     direction = np.asarray(up_direction(source, up), float)
     rotation = np.asarray(upright_rotation(direction), float)
-    upright = source.points @ rotation.T
+    pivot = source.points[used].min(axis=0)
+    upright = (source.points - pivot) @ rotation.T
     faces, facts = check_open_surface(source, upright)
     rows = np.flatnonzero(used)
     upright = upright[rows]
-    origin = upright.min(axis=0)
-    points = upright - origin
+    offset = upright.min(axis=0)
+    points = upright - offset
     unit, xy = _unit_square(points)
     order = vector_order(xy, points[:, 2])
     rows = rows[order]
@@ -237,12 +244,13 @@ def build_model(source: SourceMesh, *, up: str | npt.ArrayLike = "auto") -> Open
         points=np.ascontiguousarray(points[order]),
         faces=np.ascontiguousarray(place[faces]),
         corners=find_corners(xy),
-        source_index=rows,
+        source_index=source.rows[rows],
         file_points=source.points[rows],
         attributes=_take(source.attributes, rows),
         up=direction,
         rotation=rotation,
-        origin=origin,
+        pivot=pivot,
+        offset=offset,
         xy=xy,
         unit=unit,
         facts=facts,
