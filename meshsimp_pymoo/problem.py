@@ -28,6 +28,7 @@ from meshsimp_pymoo.geometry.error import (
 )
 from meshsimp_pymoo.geometry.load import ModelError, SourceMesh
 from meshsimp_pymoo.geometry.model import OpenModel, load_model
+from meshsimp_pymoo.geometry.orient import Up
 
 BoolArray = npt.NDArray[np.bool_]
 FloatArray = npt.NDArray[np.float64]
@@ -75,7 +76,8 @@ class MeshProblem(ElementwiseProblem):
     footprint : {"model", "hull"}
         Emit only the triangles whose centroid lies inside the original mesh's projection, or all of them (the paper).
     outside : {"nearest", "ignore"}
-        What a vertex costs that no triangle covers: its distance to the nearest point of the mesh, or nothing (the paper).
+        What a vertex costs that no triangle covers: its distance to the nearest point of the mesh, or nothing (the
+        paper).
     up : "auto", an axis such as "z" or "-x", or a vector
         Direction of the height.
     patch : "front", optional
@@ -85,8 +87,8 @@ class MeshProblem(ElementwiseProblem):
     nodata : float, optional
         Height that means "no sample" in a height grid.
     pin : "corners", "hull", file rows, positions, or a list of these
-        Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole numbers for
-        rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's frame.
+        Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole numbers
+        for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's frame.
     max_triangles : int, optional
         Largest number of triangles, as a pymoo constraint.
     max_error : float, optional
@@ -126,7 +128,7 @@ class MeshProblem(ElementwiseProblem):
         *,
         footprint: str = "model",
         outside: str = "nearest",
-        up: str | npt.ArrayLike = "auto",
+        up: Up = "auto",
         patch: str | None = None,
         spacing: tuple[float, float] | None = None,
         nodata: float | None = None,
@@ -203,9 +205,7 @@ class MeshProblem(ElementwiseProblem):
         return np.array([found[key] for key in keys])
 
     def _kernel(self, X: BoolArray, n_threads: int) -> FloatArray:
-        return evaluate_subsets(
-            self.model, X, footprint=self.footprint, outside=self.outside, n_threads=n_threads
-        )
+        return evaluate_subsets(self.model, X, footprint=self.footprint, outside=self.outside, n_threads=n_threads)
 
     def outcome(self, row: FloatArray) -> dict[str, Any]:
         """Turn one row of :meth:`evaluate_subsets` into pymoo's ``out``."""
@@ -280,7 +280,7 @@ class MeshProblem(ElementwiseProblem):
 def open_model(
     model: str | Path | trimesh.Trimesh | SourceMesh | OpenModel,
     *,
-    up: str | npt.ArrayLike = "auto",
+    up: Up = "auto",
     patch: str | None = None,
     spacing: tuple[float, float] | None = None,
     nodata: float | None = None,
@@ -335,8 +335,8 @@ def _pin_parts(pin: Any) -> list[Any]:
             positions = np.atleast_2d(np.asarray(item))
             if positions.ndim != 2 or positions.shape[1] not in (2, 3):
                 raise ModelError(
-                    f"pin holds an array of shape {np.shape(item)}; positions have shape (K, 2) or (K, 3), file rows are single "
-                    "whole numbers"
+                    f"pin holds an array of shape {np.shape(item)}; positions have shape (K, 2) or (K, 3), "
+                    "file rows are single whole numbers"
                 )
             parts.append(positions.astype(float))
     if rows:
@@ -346,14 +346,16 @@ def _pin_parts(pin: Any) -> list[Any]:
 
 def _rows_of_file(model: OpenModel, rows: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
     if not np.issubdtype(rows.dtype, np.integer):
-        raise ModelError(f"pin holds {rows[0]!r}, which is no row of the file; give whole numbers, or positions as [x, y, z]")
+        raise ModelError(
+            f"pin holds {rows[0]!r}, which is no row of the file; give whole numbers, or positions as [x, y, z]"
+        )
     order = np.argsort(model.source_index, kind="stable")
     place = np.searchsorted(model.source_index[order], rows)
     found = place < model.n_vertices
     found[found] = model.source_index[order[place[found]]] == rows[found]
     if not found.all():
         raise ModelError(
-            f"pin: row {int(rows[~found][0])} of {model.name} is not among the {model.n_vertices} vertices of the model; "
+            f"pin: row {int(rows[~found][0])} of {model.name} is not among the model's {model.n_vertices} vertices; "
             "rows count from 0, and vertices that no face uses are left out"
         )
     return order[place]
@@ -382,6 +384,6 @@ def _require_bool(X: Any) -> None:
     if kind != np.bool_:
         raise TypeError(
             f"chromosomes are bool vectors, one entry a vertex, but these are {kind}; pass sampling=RandomSubset(), "
-            "crossover=SubsetUniformCrossover() or OAX(), mutation=NeighbourShift() and repair=PinnedCorners() to the algorithm, "
-            "since pymoo's defaults make real numbers"
+            "crossover=SubsetUniformCrossover() or OAX(), mutation=NeighbourShift() and repair=PinnedCorners() "
+            "to the algorithm, since pymoo's defaults make real numbers"
         )

@@ -14,7 +14,7 @@ from pymoo.operators.mutation.bitflip import BitflipMutation
 from pymoo.optimize import minimize
 from pymoo.parallelization import DaskParallelization, JoblibParallelization, StarmapParallelization
 
-from meshsimp_pymoo import MeshProblem, NeighbourShift, OAX, PinnedCorners, RandomSubset
+from meshsimp_pymoo import OAX, MeshProblem, NeighbourShift, PinnedCorners, RandomSubset
 from meshsimp_pymoo.algorithms import nsga2_v1, nsga2_v2
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.geometry import error
@@ -101,9 +101,7 @@ def test_constraints_bound_triangles_and_error():
     out = problem.evaluate(subsets(problem), return_as_dictionary=True)
     np.testing.assert_allclose(out["G"][:, 0], out["F"][:, 1] - 120)
     np.testing.assert_allclose(out["G"][:, 1], out["F"][:, 0] - 40.0)
-    result = minimize(
-        MeshProblem("face:300", max_triangles=120), nsga2_v1(pop_size=20), ("n_gen", 12), seed=1
-    )
+    result = minimize(MeshProblem("face:300", max_triangles=120), nsga2_v1(pop_size=20), ("n_gen", 12), seed=1)
     assert (result.F[:, 1] <= 120).all()
 
 
@@ -139,7 +137,9 @@ def test_pinned_vertices_by_name_row_and_position():
     flat = MeshProblem(source, pin=source.points[[7, 100], :2], up="z")
     np.testing.assert_array_equal(flat.pinned, by_row.pinned)
     mixed = MeshProblem(source, pin=["hull", 7, list(source.points[100])])
-    np.testing.assert_array_equal(np.flatnonzero(mixed.pinned & ~by_row.pinned), np.setdiff1d(base.model.hull, np.flatnonzero(by_row.pinned)))
+    np.testing.assert_array_equal(
+        np.flatnonzero(mixed.pinned & ~by_row.pinned), np.setdiff1d(base.model.hull, np.flatnonzero(by_row.pinned))
+    )
     assert 7 in mixed.model.source_index[mixed.pinned]
     # Pinned vertices are in every mesh.
     mesh = by_row.mesh(np.zeros(by_row.n_var, bool))
@@ -226,7 +226,9 @@ def test_joblib_s_processes_give_the_same_result():
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of distributed's own making, while its cluster comes and goes
 def test_dask_s_workers_give_the_same_result():
-    distributed = pytest.importorskip("distributed", reason="pymoo's DaskParallelization needs dask[distributed], not installed")
+    distributed = pytest.importorskip(
+        "distributed", reason="pymoo's DaskParallelization needs dask[distributed], not installed"
+    )
     base = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,

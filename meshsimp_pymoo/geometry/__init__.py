@@ -1,0 +1,1 @@
+"""Meshes, triangulations and errors: arrays in, arrays out, no optimisation."""

@@ -3,15 +3,16 @@
 The error of a mesh is the sum of d_p over all N original vertices p (Campomanes-Alvarez et al. 2013, Eqs. 2-4):
 
 * p covered by an emitted triangle: d_p = |z_p - z~_p|, with z~ linear on that triangle;
-* p not covered: its distance in space to the point of the mesh that is nearest to it in the plane (``outside="nearest"``),
-  or 0 (``outside="ignore"``, the paper's reading).
+* p not covered: its distance in space to the point of the mesh that is nearest to it in the plane
+  (``outside="nearest"``), or 0 (``outside="ignore"``, the paper's reading).
 
-One compiled call does it for one subset or for many: gather, triangulate, emit (slivers, footprint), measure. It allocates
-nothing of the order of N; all it needs is in a :class:`Workspace`, one for each thread.
+One compiled call does it for one subset or for many: gather, triangulate, emit (slivers, footprint), measure. It
+allocates nothing of the order of N; all it needs is in a :class:`Workspace`, one for each thread.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -114,7 +115,7 @@ _local = threading.local()
 
 
 def _workspace(n_vertices: int) -> Workspace:
-    """This thread's workspace, made anew when the model's size changes."""
+    """Return this thread's workspace, made anew when the model's size changes."""
     kept = getattr(_local, "workspace", None)
     if kept is None or kept[0] != n_vertices:
         kept = (n_vertices, Workspace(n_vertices))
@@ -154,7 +155,7 @@ def _gather(
 
 @njit(cache=True, nogil=True)
 def _is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bool:
-    """Whether a triangle's height over its longest edge is below ``min_height``; the same answer for all its rotations."""
+    """Whether a triangle is lower than ``min_height`` over its longest edge; the same for all its rotations."""
     a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
     while a > b or a > c:
         a, b, c = b, c, a
@@ -196,7 +197,7 @@ def _emit(
     emitted: np.ndarray,
     stack: np.ndarray,
 ) -> int:
-    """Mark the triangles of the mesh: no ghosts, no slivers at the hull, none outside the footprint. Return their number."""
+    """Mark the mesh's triangles: no ghosts, no slivers at the hull, none outside the footprint; return their number."""
     for t in range(0, end, RECORD):
         emitted[t // RECORD] = 0 if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX else 1
     for ghost in range(0, end, RECORD):
@@ -234,7 +235,7 @@ def _emit(
 
 @njit(cache=True, nogil=True)
 def _outline(mesh: np.ndarray, end: int, emitted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Halfedges between an emitted triangle and one that is not, as (start, end, third) sites, and their order of choice.
+    """List halfedges between an emitted triangle and another, as (start, end, third) sites, with their rank.
 
     The order is that of the written mesh: triangle by triangle (least vertex first), edge by edge.
     """
@@ -476,8 +477,8 @@ def evaluate_subsets(
     Returns
     -------
     (P, 6) float array
-        Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of squared d_p), MAXIMUM, UNCOVERED. A subset that emits no triangle
-        has error, squares and maximum inf.
+        Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of squared d_p), MAXIMUM, UNCOVERED. A subset that emits no
+        triangle has error, squares and maximum inf.
     """
     use_footprint, nearest = _rules(footprint, outside)
     rows = np.ascontiguousarray(np.atleast_2d(kept), np.bool_)
@@ -497,7 +498,7 @@ def evaluate_subsets(
         return table
     # Several parts a thread, since subsets differ in size.
     cuts = np.linspace(0, len(rows), min(4 * n_threads, len(rows)) + 1).astype(int)
-    list(_executor(n_threads).map(evaluate, [slice(a, b) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]))
+    list(_executor(n_threads).map(evaluate, [slice(a, b) for a, b in itertools.pairwise(cuts)]))
     return table
 
 
@@ -512,7 +513,7 @@ def _executor(n_threads: int) -> ThreadPoolExecutor:
 
 
 def _forget_threads() -> None:
-    """A forked child has none of its parent's threads."""
+    """Forget the pools after a fork: the child has none of its parent's threads."""
     _executors.clear()
 
 
@@ -520,9 +521,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_forget_threads)
 
 
-def simplify(
-    model: OpenModel, kept: np.ndarray, *, footprint: str = "model", outside: str = "nearest"
-) -> Simplified:
+def simplify(model: OpenModel, kept: np.ndarray, *, footprint: str = "model", outside: str = "nearest") -> Simplified:
     """Triangulate the kept vertices and measure the result: the phenotype of one chromosome.
 
     Parameters
@@ -555,7 +554,9 @@ def simplify(
     use_footprint, nearest = _rules(footprint, outside)
     row = np.array(kept, np.bool_, order="C")
     if row.shape != (model.n_vertices,):
-        raise ValueError(f"a subset of {model.name} has shape ({model.n_vertices},), one entry a vertex, not {row.shape}")
+        raise ValueError(
+            f"a subset of {model.name} has shape ({model.n_vertices},), one entry a vertex, not {row.shape}"
+        )
     workspace = _workspace(model.n_vertices)
     numbers = np.empty(6)
     deviation = np.zeros(model.n_vertices)
@@ -661,7 +662,9 @@ def mesh_deviation(
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise ValueError(f"faces index rows {faces.min()} to {faces.max()} of {len(vertices)} vertices")
     if not np.isfinite(vertices).all():
-        raise ValueError(f"{int((~np.isfinite(vertices)).any(axis=1).sum())} of {len(vertices)} vertices are not finite")
+        raise ValueError(
+            f"{int((~np.isfinite(vertices)).any(axis=1).sum())} of {len(vertices)} vertices are not finite"
+        )
     local = model.to_local(vertices) if frame == "file" else vertices
     xy = np.ascontiguousarray(local[:, :2] / model.unit).ravel()
     height = np.ascontiguousarray(local[:, 2])
@@ -674,7 +677,8 @@ def mesh_deviation(
     return deviation, covered, len(np.unique(faces))
 
 
-# Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are degenerate.
+# Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are
+# degenerate.
 SOLID_AREA = 1e-14
 
 

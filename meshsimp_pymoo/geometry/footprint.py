@@ -1,8 +1,8 @@
-"""Where the original mesh is: is a point of the plane inside its projection?
+"""Where the original mesh is: whether a point of the plane lies inside its projection.
 
-``footprint="model"`` asks this for the centroid of every triangle, thousands of times an evaluation. So the plane is cut
-once into square cells: those that no outline edge crosses are inside or outside as a whole; only in the others are the few
-faces that touch the cell asked.
+``footprint="model"`` asks this for the centroid of every triangle, thousands of times an evaluation. So the plane is
+cut once into square cells: those that no outline edge crosses are inside or outside as a whole; only in the others are
+the few faces that touch the cell asked.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ class Footprint(NamedTuple):
 def _left_of(xy: np.ndarray, a: int, b: int, x3: float, y3: float) -> float:
     """Which side of the line from a to b a third of (x3, y3) lies on: positive on the left, 0 on the line.
 
-    Swapping a and b only swaps the sign. Three times the point is asked for, since a centroid on a grid is exact only so.
+    Swapping a and b only swaps the sign. Three times the point is asked for, since a centroid on a grid is exact only
+    so.
     """
     if a < b:
         return (3.0 * xy[2 * a] - x3) * (3.0 * xy[2 * b + 1] - y3) - (3.0 * xy[2 * a + 1] - y3) * (3.0 * xy[2 * b] - x3)
@@ -81,7 +82,7 @@ def inside(
     x3: float,
     y3: float,
 ) -> bool:
-    """Whether a third of (x3, y3), in the unit square, lies in the closed projection; ``xy`` are the model's coordinates."""
+    """Whether a third of (x3, y3), in the unit square, lies in the closed projection; ``xy``: the model's."""
     scale = side / 3.0
     cell = min(int(y3 * scale), side - 1) * side + min(int(x3 * scale), side - 1)
     kind = state[cell]
@@ -153,7 +154,7 @@ def _apart(xy: np.ndarray, a: int, b: int, c: int, x: float, y: float, size: flo
 def _face_cells(
     xy: np.ndarray, faces: np.ndarray, side: int, state: np.ndarray, start: np.ndarray, items: np.ndarray, fill: bool
 ) -> None:
-    """Count (then list) the faces of each MIXED cell, by bounding box; set the cells whose centre a face holds INSIDE."""
+    """Count (then list) the faces of each MIXED cell; set the cells whose centre a face holds INSIDE."""
     for f in range(len(faces)):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         low_x = min(xy[2 * a], xy[2 * b], xy[2 * c])
@@ -198,7 +199,8 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     if convex:
         return Footprint(0, np.zeros(0, np.uint8), none, none, faces)
     flat = np.ascontiguousarray(xy, float).ravel()
-    # Two cells a face: fine enough that few cells are mixed and each of those has few faces, and still small beside the model.
+    # Two cells a face: fine enough that few cells are mixed and each of those has few faces, and still small beside the
+    # model.
     side = int(np.clip(np.sqrt(2 * len(faces)), 8, 8192))
     state = np.zeros(side * side, np.uint8)
     _mark_outline(flat, np.ascontiguousarray(outline, np.int64), side, state)

@@ -261,8 +261,7 @@ def grid_source(
     points = np.column_stack([east, north, z.flat[rows]])
     if len(faces) == 0:
         raise ModelError(
-            f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; "
-            f"check nodata ({nodata})"
+            f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
     return build_source(points, faces, {}, name, rows=rows, up="z")
 
@@ -307,16 +306,13 @@ def build_source(
         )
     if np.abs(xyz).max() > COORDINATE_LIMIT:
         raise ModelError(
-            f"{name}: coordinates reach {np.abs(xyz).max():g}; "
-            f"rescale the model to below {COORDINATE_LIMIT:g}"
+            f"{name}: coordinates reach {np.abs(xyz).max():g}; rescale the model to below {COORDINATE_LIMIT:g}"
         )
     triangles = np.asarray(faces)
     if triangles.size == 0:
         raise ModelError(f"{name}: has {count} vertices but no faces; triangulate the points first")
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
-        raise ModelError(
-            f"{name}: faces are {triangles.dtype} of the shape {triangles.shape}; give integers (F, 3)"
-        )
+        raise ModelError(f"{name}: faces are {triangles.dtype} of the shape {triangles.shape}; give integers (F, 3)")
     wrong = ((triangles < 0) | (triangles >= count)).any(axis=1)
     if wrong.any():
         first = int(np.argmax(wrong))
@@ -357,9 +353,7 @@ def _check_file(path: Path, name: str) -> None:
         if path.stat().st_size == 0:
             raise ModelError(f"{name}: is empty (0 bytes); export it again")
     except OSError as error:
-        raise ModelError(
-            f"{name}: cannot be read ({_reason(error)}); check the path and its permissions"
-        ) from error
+        raise ModelError(f"{name}: cannot be read ({_reason(error)}); check the path and its permissions") from error
 
 
 def _guarded(reader: Any, path: Path, name: str, *args: Any) -> SourceMesh:
@@ -369,9 +363,7 @@ def _guarded(reader: Any, path: Path, name: str, *args: Any) -> SourceMesh:
     except ModelError:
         raise
     except OSError as error:
-        raise ModelError(
-            f"{name}: cannot be read ({_reason(error)}); check the path and its permissions"
-        ) from error
+        raise ModelError(f"{name}: cannot be read ({_reason(error)}); check the path and its permissions") from error
     except MemoryError as error:
         raise ModelError(f"{name}: does not fit into memory; cut it into tiles first") from error
 
@@ -403,9 +395,7 @@ def _numbers(text: str, name: str) -> FloatArray:
         try:
             float(token)
         except ValueError:
-            raise ModelError(
-                f"{name}: {token[:40]!r} stands where a number should; the file is damaged"
-            ) from None
+            raise ModelError(f"{name}: {token[:40]!r} stands where a number should; the file is damaged") from None
     return np.array(text.split(), dtype=np.float64)  # spellings that only Python knows, such as 1_000
 
 
@@ -413,9 +403,7 @@ def _whole(values: FloatArray, name: str, what: str) -> IntArray:
     """Check that numbers read from text are whole and small enough to be exact."""
     good = (np.abs(values) < 2.0**53) & (np.floor(values) == values)
     if not good.all():
-        raise ModelError(
-            f"{name}: {what} {values[np.argmin(good)]:g} is not a whole number; the file is damaged"
-        )
+        raise ModelError(f"{name}: {what} {values[np.argmin(good)]:g} is not a whole number; the file is damaged")
     return values.astype(np.int64)
 
 
@@ -477,17 +465,13 @@ def _read_ply(path: Path, name: str) -> SourceMesh:
     elements, order, start = _ply_header(data, name)
     named = {element.name: element for element in elements}
     if "vertex" not in named:
-        raise ModelError(
-            f"{name}: declares no element 'vertex' (but {sorted(named)}); export it as a triangle mesh"
-        )
+        raise ModelError(f"{name}: declares no element 'vertex' (but {sorted(named)}); export it as a triangle mesh")
     last = max(i for i, element in enumerate(elements) if element.name in ("vertex", "face"))
     columns = (_ply_ascii if order == "" else _ply_binary)(data, start, elements[: last + 1], name)
     vertex = columns["vertex"]
     scalars = {key for key, value in vertex.items() if isinstance(value, np.ndarray) and value.ndim == 1}
     if missing := sorted(set("xyz") - scalars):
-        raise ModelError(
-            f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again"
-        )
+        raise ModelError(f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again")
     points = np.column_stack([vertex[axis].astype(np.float64) for axis in "xyz"])
     faces = _ply_faces(columns.get("face", {}), name)
     return build_source(points, faces, _ply_attributes(vertex, name), name)
@@ -503,9 +487,7 @@ def _ply_header(data: bytes, name: str) -> tuple[list[_PlyElement], str, int]:
     newline = rb"\r\n" if b"\r\n" in data[:8] else rb"[\r\n]"
     end = re.compile(rb"(?<=[\r\n])end_header[ \t]*(?:" + newline + rb"|\Z)").search(data, 0, HEADER_LIMIT)
     if end is None:
-        raise ModelError(
-            f"{name}: its header has no line 'end_header'; the file is truncated, export it again"
-        )
+        raise ModelError(f"{name}: its header has no line 'end_header'; the file is truncated, export it again")
     order: str | None = None
     elements: list[_PlyElement] = []
     for line in data[: end.start()].decode("utf-8", errors="replace").splitlines()[1:]:
@@ -530,9 +512,7 @@ def _ply_header(data: bytes, name: str) -> tuple[list[_PlyElement], str, int]:
             else:
                 raise ValueError
         except (KeyError, IndexError, ValueError):
-            raise ModelError(
-                f"{name}: cannot read the header line {line[:80]!r}; export the file again"
-            ) from None
+            raise ModelError(f"{name}: cannot read the header line {line[:80]!r}; export the file again") from None
     if order is None:
         raise ModelError(f"{name}: its header has no line 'format'; export the file again")
     if len({element.name for element in elements}) < len(elements):
@@ -717,9 +697,7 @@ def _as_declared(values: FloatArray, item: _PlyProperty, name: str) -> npt.NDArr
 
 
 @njit(cache=True)
-def _scan_numbers(
-    numbers: np.ndarray, at: int, n_rows: int, is_list: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, int]:
+def _scan_numbers(numbers: np.ndarray, at: int, n_rows: int, is_list: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return where each property of each row starts, its number of values, and the end (-1: too short)."""
     n = len(is_list)
     starts = np.zeros((n_rows, n), np.int64)
@@ -744,9 +722,7 @@ def _ply_faces(columns: dict[str, Any], name: str) -> IntArray:
     key = (usual or (lists if len(lists) == 1 else [""]))[0]
     if not key:
         if columns and len(next(iter(columns.values()), ())) and not lists:
-            raise ModelError(
-                f"{name}: its faces have no list of vertices (but {sorted(columns)}); export it again"
-            )
+            raise ModelError(f"{name}: its faces have no list of vertices (but {sorted(columns)}); export it again")
         if len(lists) > 1:
             raise ModelError(
                 f"{name}: none of the face lists {sorted(lists)} is called vertex_indices; export it again"
@@ -840,9 +816,7 @@ def _read_off(path: Path, name: str) -> SourceMesh:
     keyword = re.match(r"(ST)?(C)?(N)?OFF\b\s*", lines[0]) if lines else None
     if keyword is None:
         begin = lines[0][:24] if lines else ""
-        raise ModelError(
-            f"{name}: is not an OFF file (it begins with {begin!r}, not with 'OFF'); check the suffix"
-        )
+        raise ModelError(f"{name}: is not an OFF file (it begins with {begin!r}, not with 'OFF'); check the suffix")
     rest = lines[0][keyword.end() :]
     if "BINARY" in rest.upper():
         raise ModelError(f"{name}: is a binary OFF, which is not read; save it as text or as PLY")
@@ -907,8 +881,7 @@ def _read_with_trimesh(path: Path, name: str) -> SourceMesh:
             raise
         except Exception as error:  # a damaged file may break the reader anywhere
             raise ModelError(
-                f"{name}: cannot be read as {suffix} ({type(error).__name__}: {_reason(error)}); "
-                "export the file again"
+                f"{name}: cannot be read as {suffix} ({type(error).__name__}: {_reason(error)}); export the file again"
             ) from error
         pieces = _scene_pieces(loaded)
     if not pieces:
@@ -980,10 +953,7 @@ def _concatenated(
         if len(shapes) == 1:
             attributes[key] = np.concatenate([part for part in parts if part is not None])
         else:
-            _warn(
-                f"{name}: only some of its {len(pieces)} meshes have the attribute {key!r}, which stays "
-                "behind"
-            )
+            _warn(f"{name}: only some of its {len(pieces)} meshes have the attribute {key!r}, which stays behind")
     faces = np.concatenate([piece[1] + offset for piece, offset in zip(pieces, offsets, strict=True)])
     return np.concatenate([piece[0] for piece in pieces]), faces, attributes
 
@@ -1022,9 +992,7 @@ def _check_stl(path: Path, name: str) -> None:
         text = head + stream.read()
     lower = text.lower()
     if b"endsolid" not in lower[-256:]:
-        raise ModelError(
-            f"{name}: its text does not end with 'endsolid'; the file is truncated, export it again"
-        )
+        raise ModelError(f"{name}: its text does not end with 'endsolid'; the file is truncated, export it again")
     if lower.count(b"endloop") * 3 != len(re.findall(rb"\bvertex\s", lower)):
         raise ModelError(f"{name}: not every facet has three vertices; the file is damaged, export it again")
 
@@ -1036,14 +1004,11 @@ def _check_gltf(path: Path, name: str, suffix: str) -> None:
         if suffix == ".glb":
             head = stream.read(20)
             if len(head) < 20 or head[:4] != b"glTF":
-                raise ModelError(
-                    f"{name}: is not a GLB file (it begins with {_glimpse(head)}); check the suffix"
-                )
+                raise ModelError(f"{name}: is not a GLB file (it begins with {_glimpse(head)}); check the suffix")
             length, chunk = struct.unpack("<8xII4x", head)
             if length > size or chunk > size - 20:
                 raise ModelError(
-                    f"{name}: truncated: its header declares {length} bytes, but the file has {size}; "
-                    "copy it again"
+                    f"{name}: truncated: its header declares {length} bytes, but the file has {size}; copy it again"
                 )
             text = stream.read(chunk)
         else:
@@ -1054,13 +1019,9 @@ def _check_gltf(path: Path, name: str, suffix: str) -> None:
         # an accessor without a buffer view is all zeros: a few bytes that could ask for any amount of memory
         counts = [int(item.get("count", 0)) for item in accessors if "bufferView" not in item]
     except (ValueError, AttributeError, TypeError) as error:
-        raise ModelError(
-            f"{name}: its JSON part cannot be read ({_reason(error)}); export the file again"
-        ) from error
+        raise ModelError(f"{name}: its JSON part cannot be read ({_reason(error)}); export the file again") from error
     if max(counts, default=0) > size:
-        raise ModelError(
-            f"{name}: declares {max(counts)} empty values in a file of {size} bytes; export it again"
-        )
+        raise ModelError(f"{name}: declares {max(counts)} empty values in a file of {size} bytes; export it again")
 
 
 # ---------------------------------------------------------------------------------------------- grids
@@ -1092,9 +1053,7 @@ def _read_grid(
     else:
         flat = [key for key, array in arrays.items() if array.ndim == 2]
         if len(flat) != 1:
-            raise ModelError(
-                f"{name}: has no array 'elevation' and {len(flat)} other 2-D arrays {flat}; name one so"
-            )
+            raise ModelError(f"{name}: has no array 'elevation' and {len(flat)} other 2-D arrays {flat}; name one so")
         height = arrays[flat[0]]
     if steps is None:
         dx = _scalar(arrays, "dx", 1.0, name)
@@ -1106,9 +1065,7 @@ def _scalar(arrays: dict[str, npt.NDArray[Any]], key: str, default: float, name:
     if key not in arrays:
         return default
     if arrays[key].size != 1 or arrays[key].dtype.kind not in "iuf":
-        raise ModelError(
-            f"{name}: {key!r} is {arrays[key].dtype} of the shape {arrays[key].shape}; give one number"
-        )
+        raise ModelError(f"{name}: {key!r} is {arrays[key].dtype} of the shape {arrays[key].shape}; give one number")
     return float(arrays[key].reshape(()))
 
 
@@ -1116,9 +1073,7 @@ def _read_npy(stream: IO[bytes], size: int, name: str) -> npt.NDArray[Any]:
     """Read one .npy array after comparing the shape it declares with the bytes there are."""
     try:
         version = np.lib.format.read_magic(stream)
-        read_header = (
-            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        )
+        read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = read_header(stream)
         if dtype.hasobject:
             raise ModelError(f"{name}: holds Python objects, which are never unpickled; save numbers")
@@ -1149,17 +1104,14 @@ def _read_npz(path: Path, name: str) -> dict[str, npt.NDArray[Any]]:
                 label = f"{name}: {info.filename}"
                 if info.file_size > DEFLATE_LIMIT * max(info.compress_size, 1):
                     raise ModelError(
-                        f"{label} declares {info.file_size} bytes packed into {info.compress_size}; "
-                        "save it again"
+                        f"{label} declares {info.file_size} bytes packed into {info.compress_size}; save it again"
                     )
                 with archive.open(info) as stream:
                     arrays[info.filename[:-4]] = _read_npy(stream, info.file_size, label)
     except ModelError:
         raise
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
-        raise ModelError(
-            f"{name}: is not a complete .npz file ({_reason(error)}); copy or save it again"
-        ) from error
+        raise ModelError(f"{name}: is not a complete .npz file ({_reason(error)}); copy or save it again") from error
     if not arrays:
         raise ModelError(f"{name}: holds no arrays; save the heights as 'elevation'")
     return arrays

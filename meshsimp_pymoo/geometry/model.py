@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 from meshsimp_pymoo.geometry.error import SLIVER_HEIGHT
 from meshsimp_pymoo.geometry.footprint import Footprint, make_footprint
 from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, from_trimesh, read_source
-from meshsimp_pymoo.geometry.orient import check_open_surface, front_patch, up_direction, upright_rotation
+from meshsimp_pymoo.geometry.orient import Up, check_open_surface, front_patch, up_direction, upright_rotation
 from meshsimp_pymoo.geometry.predicates import exact_ranges
 
 FloatArray = npt.NDArray[np.float64]
@@ -32,12 +32,12 @@ HILBERT_BITS = 26
 class OpenModel:
     """An open mesh that is nearly a height field z = f(x, y), in vector order.
 
-    The vertices are stored along a Hilbert curve over (x, y), so that a neighbour on the vector is a neighbour in space, a
-    contiguous segment is a patch, and triangulating needs no sorting. The order is a function of the positions alone:
-    listing the same vertices otherwise in the file gives the same model but for ``source_index``.
+    The vertices are stored along a Hilbert curve over (x, y), so that a neighbour on the vector is a neighbour in
+    space, a contiguous segment is a patch, and triangulating needs no sorting. The order is a function of the positions
+    alone: listing the same vertices otherwise in the file gives the same model but for ``source_index``.
 
-    Vertices that share one (x, y) stay apart: each has a place in the chromosome and a share in the error. Where several
-    of them are kept, the first in vector order (the lowest) carries the surface.
+    Vertices that share one (x, y) stay apart: each has a place in the chromosome and a share in the error. Where
+    several of them are kept, the first in vector order (the lowest) carries the surface.
 
     Attributes
     ----------
@@ -48,8 +48,8 @@ class OpenModel:
     faces : (T, 3) int32 array
         Triangles of the original mesh, counter-clockwise from above, as rows of ``points``.
     corners : (4,) int array
-        The vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending; fewer where
-        one vertex is extreme in several directions.
+        The vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending; fewer
+        where one vertex is extreme in several directions.
     source_index : (N,) int array
         Row of each vertex in the file.
     file_points : (N, 3) float array
@@ -165,7 +165,7 @@ class OpenModel:
 def load_model(
     model: str | Path | SourceMesh | OpenModel | Any,
     *,
-    up: str | npt.ArrayLike = "auto",
+    up: Up = "auto",
     patch: str | None = None,
     spacing: tuple[float, float] | None = None,
     nodata: float | None = None,
@@ -204,7 +204,8 @@ def load_model(
         source = from_trimesh(model)
     else:
         raise TypeError(
-            f"a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, not {type(model).__name__}"
+            "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
+            f"not {type(model).__name__}"
         )
     if patch not in (None, "front"):
         raise ModelError(f'patch={patch!r} is unknown; use patch="front" or leave it out')
@@ -213,7 +214,7 @@ def load_model(
     return build_model(source, up=up)
 
 
-def build_model(source: SourceMesh, *, up: str | npt.ArrayLike = "auto") -> OpenModel:
+def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
     """Turn a source mesh upright, check that it is an open height field and put it in vector order."""
     used = np.zeros(len(source.points), bool)
     used[source.faces] = True
@@ -224,8 +225,8 @@ def build_model(source: SourceMesh, *, up: str | npt.ArrayLike = "auto") -> Open
             ModelWarning,
             stacklevel=3,
         )
-    direction = np.asarray(up_direction(source, up), float)
-    rotation = np.asarray(upright_rotation(direction), float)
+    direction = up_direction(source, up)
+    rotation = upright_rotation(direction)
     pivot = source.points[used].min(axis=0)
     upright = (source.points - pivot) @ rotation.T
     faces, facts = check_open_surface(source, upright)
@@ -327,8 +328,8 @@ def _hilbert_keys(xy: np.ndarray) -> np.ndarray:
 def find_corners(xy: FloatArray) -> IntArray:
     """Return the vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending.
 
-    Of equally extreme vertices the one furthest clockwise counts, so that the four corners of a diamond are found too. If
-    they all lie on one line, the vertex farthest from that line joins them: corners always span a triangle.
+    Of equally extreme vertices the one furthest clockwise counts, so that the four corners of a diamond are found too.
+    If they all lie on one line, the vertex farthest from that line joins them: corners always span a triangle.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The point of a mesh's outline that is nearest in the plane: exact, through a grid of cells over the outline's segments."""
+"""The point of a mesh's outline nearest in the plane: exact, through a grid of cells over its segments."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ def nearest_segment(
 ) -> tuple[int, float, float]:
     """Return the segment nearest to (x, y), the parameter of its nearest point and the squared distance.
 
-    Of segments at the same distance the one with the least ``key`` is returned, whatever the order of search. ``guess`` is
-    any segment (a near one spares work).
+    Of segments at the same distance the one with the least ``key`` is returned, whatever the order of search. ``guess``
+    is any segment (a near one spares work).
     """
     best = guess
     best_d, best_t = _to_segment(xy, ends[guess, 0], ends[guess, 1], x, y)

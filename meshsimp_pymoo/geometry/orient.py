@@ -258,15 +258,11 @@ class SurfaceFacts:
             )
         if self.fold_share > FOLD_SHARE:
             rewind = (
-                f"neighbouring faces disagree in winding on {self.inconsistent_edges} edges, so orient them "
-                "alike, or "
+                f"neighbouring faces disagree in winding on {self.inconsistent_edges} edges, so orient them alike, or "
                 if self.inconsistent_edges
                 else "choose another viewing side with --up, or "
             )
-            return (
-                f"{self.name}: {self._folded}, more than {FOLD_SHARE:.0%}, so it is no height field; "
-                f"{rewind}{cut}"
-            )
+            return f"{self.name}: {self._folded}, more than {FOLD_SHARE:.0%}, so it is no height field; {rewind}{cut}"
         return None
 
     @property
@@ -476,8 +472,7 @@ def _given_direction(up: Up) -> FloatArray:
         vector = np.empty(0)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise ModelError(
-            f"up={up!r} is no direction; "
-            "give 'auto', an axis (x, y, z, -x, -y, -z) or a vector such as 0,0.5,1"
+            f"up={up!r} is no direction; give 'auto', an axis (x, y, z, -x, -y, -z) or a vector such as 0,0.5,1"
         )
     longest = np.abs(vector).max()
     if longest <= 1 and abs(vector @ vector - 1) <= 4 * np.finfo(float).eps:

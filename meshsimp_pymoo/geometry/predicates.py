@@ -25,7 +25,8 @@ from numba.extending import intrinsic
 # Shewchuk's bounds, section 4; the differences are exact here, so they hold with room to spare.
 ORIENT_BOUND = 3.3306690738754716e-16
 CIRCLE_BOUND = 1.1102230246251577e-15
-# |det| is at most S**2 / 3 with S the sum of the three squared distances, so this multiple of S**2 bounds the error too.
+# |det| is at most S**2 / 3 with S the sum of the three squared distances, so this multiple of S**2 bounds the error
+# too.
 COARSE_CIRCLE_BOUND = CIRCLE_BOUND / 3 * 1.01
 
 
@@ -81,9 +82,7 @@ def _add_double(expansion: np.ndarray, n: int, b: float) -> int:
 
 
 @njit(cache=True, nogil=True)
-def circle_sign_exact(
-    adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy: float
-) -> int:
+def circle_sign_exact(adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy: float) -> int:
     """Return the sign of the incircle determinant of exact differences, by expansions without error."""
     minor = np.empty(4)
     lift = np.empty(4)
@@ -179,7 +178,8 @@ def _circle_sign_slow(
         return 1
     if det < -bound:
         return -1
-    # The corners of an upright rectangle, the commonest tie of all: two differences vanish, the third point is their sum.
+    # The corners of an upright rectangle, the commonest tie of all: two differences vanish, the third point is their
+    # sum.
     if (adx == 0.0 and bdy == 0.0 and cdx == bdx and cdy == ady) or (
         ady == 0.0 and bdx == 0.0 and cdx == adx and cdy == bdy
     ):
@@ -196,9 +196,7 @@ def _circle_sign_slow(
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def circle_sign(
-    adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy: float, exact_lift: float
-) -> int:
+def circle_sign(adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy: float, exact_lift: float) -> int:
     """Return +1 if p lies inside the circle through a, b, c (counter-clockwise), -1 outside, 0 on it; always exact.
 
     Parameters

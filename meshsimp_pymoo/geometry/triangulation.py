@@ -1,21 +1,24 @@
 """The Delaunay triangulation of a subset of the vertices: one function of the subset alone.
 
 Points are inserted one by one in the order given, normally vector order (a Hilbert curve), so that each is found by a
-short walk [1]_ from its predecessor and made Delaunay by Lawson's edge flips [2]_. The outside of the hull is covered by
-ghost triangles that share a vertex at infinity, so a hull of any shape needs no special case.
+short walk [1]_ from its predecessor and made Delaunay by Lawson's edge flips [2]_. The outside of the hull is covered
+by ghost triangles that share a vertex at infinity, so a hull of any shape needs no special case.
 
 Four cocircular points leave the diagonal open. Here the lifted coordinate x**2 + y**2 of the point with index i is
 raised by an infinitesimal that grows with i (simulation of simplicity [3]_): of four cocircular points the one with the
-largest index is cut off by the diagonal. All predicates are exact, so the result does not depend on the order of insertion.
+largest index is cut off by the diagonal. All predicates are exact, so the result does not depend on the order of
+insertion.
 
-Data structure: a triangle is a record of eight integers in ``mesh``, and its name t is the index of the first: the vertices
-``mesh[t], mesh[t + 1], mesh[t + 2]`` counter-clockwise, one unused, and the twins ``mesh[t + 4], mesh[t + 5], mesh[t + 6]`` of
-the halfedges t, t + 1, t + 2, where halfedge t + i leads from vertex i to the next. So ``mesh[h + 4]`` is the twin of halfedge
-h, ``h & TRIANGLE`` its triangle, and every halfedge has a twin. The vertex at infinity is ``INFINITE``.
+Data structure: a triangle is a record of eight integers in ``mesh``, and its name t is the index of the first: the
+vertices ``mesh[t], mesh[t + 1], mesh[t + 2]`` counter-clockwise, one unused, and the twins ``mesh[t + 4], mesh[t + 5],
+mesh[t + 6]`` of the halfedges t, t + 1, t + 2, where halfedge t + i leads from vertex i to the next. So ``mesh[h + 4]``
+is the twin of halfedge h, ``h & TRIANGLE`` its triangle, and every halfedge has a twin. The vertex at infinity is
+``INFINITE``.
 
 References
 ----------
-.. [1] O. Devillers, S. Pion, M. Teillaud, "Walking in a triangulation", Int. J. Foundations of Computer Science 13, 2002.
+.. [1] O. Devillers, S. Pion, M. Teillaud, "Walking in a triangulation", Int. J. Foundations of Computer Science 13,
+       2002.
 .. [2] C. L. Lawson, "Software for C1 surface interpolation", Mathematical Software III, 1977.
 .. [3] H. Edelsbrunner, E. P. Muecke, "Simulation of simplicity", ACM Transactions on Graphics 9, 1990.
 """
@@ -63,7 +66,8 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
         ab = ax * by - ay * bx
         bc = bx * cy - by * cx
         ca = cx * ay - cy * ax
-        # Cross the edge that (x, y) is farthest behind, by area; chosen without branches, which a processor cannot foresee.
+        # Cross the edge that (x, y) is farthest behind, by area; chosen without branches, which a processor cannot
+        # foresee.
         least = ab
         h = t
         h = t + 1 if bc < least else h
@@ -198,7 +202,8 @@ def triangulate(
     Parameters
     ----------
     xy : (2 n,) float array
-        Coordinates x0, y0, x1, ... of distinct points, multiples of 2**-52 in [0, 1]; ties go by position in this array.
+        Coordinates x0, y0, x1, ... of distinct points, multiples of 2**-52 in [0, 1]; ties go by position in this
+        array.
     n : int
         Number of points.
     first : (m,) int array
@@ -274,8 +279,8 @@ def triangulate(
             inserted[p] = 1
             t = insert(xy, mesh, end, t, p, exact_area, exact_lift)
             end += 2 * RECORD
-    # Past a few thousand points a sparse round goes first: points that meet a rough triangulation of the whole need fewer
-    # flips than points at the ragged end of a space-filling curve (a biased order of two rounds).
+    # Past a few thousand points a sparse round goes first: points that meet a rough triangulation of the whole need
+    # fewer flips than points at the ragged end of a space-filling curve (a biased order of two rounds).
     n_rounds = 2 if natural and n >= SPARSE_ROUND_FROM else 1
     for k in range(n_rounds):
         for i in range(0, n, SPARSE_STEP if k < n_rounds - 1 else 1):

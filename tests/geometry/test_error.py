@@ -337,15 +337,13 @@ def test_the_error_of_a_written_mesh_is_that_of_its_subset(model, outside):
 def test_of_folded_triangles_the_closest_counts_and_vertices_may_lie_anywhere():
     plane = load_model(load("plane:5"))
     low = plane.file_points.min(axis=0) - [1, 1, 0]
-    high = plane.file_points.max(axis=0) + [1, 1, 0]
+    high = plane.file_points.max(axis=0) + np.array([1, 1, 0])
     sheet = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     heights = simplify(plane, np.ones(25, bool))  # the plane itself, to know its own heights
     assert heights.quality.error == 0
-    z = np.linalg.lstsq(
-        np.c_[plane.file_points[:, :2], np.ones(25)], plane.file_points[:, 2], rcond=None
-    )[0]
+    z = np.linalg.lstsq(np.c_[plane.file_points[:, :2], np.ones(25)], plane.file_points[:, 2], rcond=None)[0]
     on = np.c_[sheet, np.c_[sheet, np.ones(4)] @ z]
-    two_sheets = np.vstack([on + [0, 0, 7.0], on + [0, 0, -2.0]])
+    two_sheets = np.vstack([on + np.array([0, 0, 7.0]), on + np.array([0, 0, -2.0])])
     faces = np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])
     q = mesh_quality(plane, two_sheets, faces)
     assert q.error == pytest.approx(2.0 * 25)
@@ -401,8 +399,8 @@ def test_the_referee_agrees_on_terrain(referee, name):
 
 @pytest.mark.parametrize(
     "name",
-    ["m1_laurana", "m2_demosthenes", "m3_nefertiti", "m4_skull", "m5_celticskull", "m6_igea", "t_matteo500"]
-    + ["f_humface", "f_maxplanck", "f_mask_holes", "l_laurana_front"],
+    "m1_laurana m2_demosthenes m3_nefertiti m4_skull m5_celticskull m6_igea t_matteo500 f_humface f_maxplanck "
+    "f_mask_holes l_laurana_front".split(),
 )
 def test_the_referee_agrees_on_real_scans(referee, shared_data, name):
     assert_referee_agrees(referee, load_model(shared_data / f"{name}.ply"), [0.05, 0.4])

@@ -463,8 +463,9 @@ def test_coordinates_that_are_no_numbers_are_counted_and_the_first_is_named(tmp_
 
 
 def test_words_among_the_numbers_are_named(tmp_path):
-    assert "'banana'" in refusal(write(tmp_path, "a.ply", ascii_ply().replace("0.25", "banana", 1).replace(
-        "3 0 1 4", "3 0 banana 4")))
+    assert "'banana'" in refusal(
+        write(tmp_path, "a.ply", ascii_ply().replace("0.25", "banana", 1).replace("3 0 1 4", "3 0 banana 4"))
+    )
     assert "'banana'" in refusal(write(tmp_path, "a.obj", "v 0 0 banana\nv 0 1 0\nf 1 2 3\n"))
     assert "whole number" in refusal(write(tmp_path, "b.ply", ascii_ply().replace("3 0 1 4", "3 0 1.5 4")))
 

@@ -104,7 +104,9 @@ def test_attributes_follow_their_vertices():
 def test_a_model_turned_any_way_is_the_same_model(up):
     source = load("face:300")
     base = build_model(source, up="z")
-    axis = np.eye(3)[["x", "y", "z"].index(up[-1])] * (-1 if up[0] == "-" else 1) if isinstance(up, str) else np.array(up)
+    axis = (
+        np.eye(3)[["x", "y", "z"].index(up[-1])] * (-1 if up[0] == "-" else 1) if isinstance(up, str) else np.array(up)
+    )
     turn = trimesh.geometry.align_vectors([0, 0, 1], axis / np.linalg.norm(axis))[:3, :3]
     turned = build_model(SourceMesh(source.points @ turn.T, source.faces, {}, "turned"), up=up)
     np.testing.assert_allclose(turned.up, axis / np.linalg.norm(axis), atol=1e-12)

@@ -21,9 +21,7 @@ grid_points = st.lists(
     min_size=3,
     max_size=24,
 ).map(distinct)
-free_points = st.lists(
-    st.tuples(st.integers(0, SCALE), st.integers(0, SCALE)), min_size=3, max_size=24
-).map(distinct)
+free_points = st.lists(st.tuples(st.integers(0, SCALE), st.integers(0, SCALE)), min_size=3, max_size=24).map(distinct)
 # Points 1e-15 apart, and others far away.
 huddled_points = st.lists(
     st.tuples(st.integers(-3, 3), st.integers(-3, 3)).map(lambda p: (SCALE // 2 + 4 * p[0], SCALE // 2 + 4 * p[1])),
