@@ -1,0 +1,1222 @@
+"""A triangulation that lives: insert a vertex, remove one, move one, and know the exact change of the error.
+
+Every triangle keeps the list of the original vertices it covers and the sum of their costs. Inserting a vertex replaces the
+triangles whose circle holds it by a fan (Bowyer [1]_, Watson [2]_); removing one fills its star by Delaunay ears
+(Devillers [3]_). Only the vertices of the triangles replaced are looked at, so an operation, tried or done, costs what it
+touches and not N. The triangulation of a subset is unique (see :mod:`~meshsimp_pymoo.geometry.triangulation`), hence after any
+sequence of operations triangles and error are those of :func:`~meshsimp_pymoo.geometry.error.simplify` from scratch.
+
+Where the outline is touched more has to be done: vertices that no triangle covers ("bare" ones) know the segment of the
+outline that is nearest to them; those whose segment goes look for another, and all compare with the segments that come.
+
+References
+----------
+.. [1] A. Bowyer, "Computing Dirichlet tessellations", The Computer Journal 24, 1981.
+.. [2] D. F. Watson, "Computing the n-dimensional Delaunay tessellation", The Computer Journal 24, 1981.
+.. [3] O. Devillers, "On deletion in Delaunay triangulations", Int. J. Computational Geometry & Applications 12, 2002.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from meshsimp_pymoo.geometry.error import (
+    COVER_TOLERANCE,
+    _is_sliver,
+    _rules,
+    _sum_of_three,
+)
+from meshsimp_pymoo.geometry.footprint import inside
+from meshsimp_pymoo.geometry.predicates import circle_sign, orient_sign
+from meshsimp_pymoo.geometry.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.geometry.model import OpenModel
+
+NONE = 0xFFFFFFFF
+
+# What a triangle is, as bits of ``kind``; a plain one is inside the footprint and emitted.
+EMITTED, THIN, PEELED, INSIDE, VISITED = 1, 2, 4, 8, 16
+PLAIN = EMITTED | INSIDE
+
+# Entries of ``count``.
+(
+    END,
+    N_FREE,
+    N_EMITTED,
+    N_BARE,
+    N_SEGMENTS,
+    N_FREE_SEGMENTS,
+    N_SEGMENTS_EVER,
+    N_REGION,
+    N_POOL,
+    N_TOUCHED,
+    N_DEAD,
+    N_ADDED,
+    N_SITES,
+) = range(13)
+# Entries of ``amount``.
+COVERED_ERROR, BARE_ERROR = range(2)
+
+
+class Ground(NamedTuple):
+    """What does not change: the model's arrays and the rules, as the compiled functions want them."""
+
+    xy: np.ndarray
+    z: np.ndarray
+    unit: float
+    min_height: float
+    exact_area: float
+    exact_lift: float
+    side: int
+    state: np.ndarray
+    start: np.ndarray
+    items: np.ndarray
+    faces: np.ndarray
+    nearest: bool
+
+
+class Live(NamedTuple):
+    """What changes; N vertices, at most 2 N triangles (records, see :mod:`~meshsimp_pymoo.geometry.triangulation`)."""
+
+    mesh: np.ndarray  # (16 N,) records of triangles
+    kind: np.ndarray  # (2 N,) bits of each triangle
+    head: np.ndarray  # (2 N,) first vertex in each triangle's list, -1: none
+    subtotal: np.ndarray  # (2 N,) sum of the costs in each emitted triangle
+    following: np.ndarray  # (N,) next vertex in the same list
+    place: np.ndarray  # (N,) the triangle a dropped vertex lies in; some triangle of a site
+    cost: np.ndarray  # (N,) d_p of the bare vertices
+    used: np.ndarray  # (N,) number of emitted triangles at each site
+    site: np.ndarray  # (N,) whether the vertex is in the triangulation
+    free: np.ndarray  # (2 N,) unused records
+    bare_at: np.ndarray  # (N,) where in ``bare`` a vertex stands, -1: not there
+    bare: np.ndarray  # (N,) vertices that no emitted triangle covers
+    bare_segment: np.ndarray  # (N,) the outline segment nearest to each of them
+    bare_gap: np.ndarray  # (N,) squared distance to it in the unit square
+    segment_of: np.ndarray  # (6 N,) outline segment of a halfedge, -1: none
+    segment: np.ndarray  # (6 N,) halfedge of each segment, NONE: dead
+    segment_at: np.ndarray  # (6 N,) where in ``alive`` it stands
+    alive: np.ndarray  # (6 N,) the segments that exist
+    free_segment: np.ndarray  # (6 N,) numbers to use again
+    region: np.ndarray  # (2 N,) triangles that an operation made
+    pool: np.ndarray  # (N,) vertices to be placed
+    touched: np.ndarray  # (12 N,) vertices whose triangles changed
+    dead: np.ndarray  # (6 N,) segments that went
+    added: np.ndarray  # (6 N,) segments that came
+    cavity: np.ndarray  # scratch of the size of the triangles
+    rim: np.ndarray
+    ring: np.ndarray
+    stack: np.ndarray
+    edge: np.ndarray
+    ears: np.ndarray  # (2 N, 3)
+    ear_edges: np.ndarray  # (2 N, 3)
+    count: np.ndarray
+    amount: np.ndarray
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _turn(xy: np.ndarray, a: int, b: int, c: int, exact_area: float) -> int:
+    """Sign of the area of vertices (a, b, c)."""
+    x = xy[2 * c]
+    y = xy[2 * c + 1]
+    return orient_sign(xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, exact_area)
+
+
+@njit(cache=True, nogil=True)
+def _ghost_conflict(xy: np.ndarray, a: int, b: int, q: int, exact_area: float) -> bool:
+    """Whether q lies beyond the hull edge with exterior left of a -> b, or inside that edge."""
+    sign = _turn(xy, a, b, q, exact_area)
+    if sign != 0:
+        return sign > 0
+    k = 0 if xy[2 * a] != xy[2 * b] else 1
+    low = min(xy[2 * a + k], xy[2 * b + k])
+    high = max(xy[2 * a + k], xy[2 * b + k])
+    return low < xy[2 * q + k] < high
+
+
+@njit(cache=True, nogil=True)
+def _tied_conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float) -> bool:
+    """Whether q of four cocircular points counts as inside the circle of (a, b, c): the largest index is cut off."""
+    last = max(max(a, b), max(c, q))
+    if last == q:
+        return False
+    if last == a:
+        return _turn(xy, q, b, c, exact_area) > 0
+    if last == b:
+        return _turn(xy, a, q, c, exact_area) > 0
+    return _turn(xy, a, b, q, exact_area) > 0
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float, exact_lift: float) -> bool:
+    """Whether vertex q lies inside the circle of triangle (a, b, c), any of which may be the one at infinity."""
+    if q > LAST_INDEX:
+        return False
+    if (a | b | c) > LAST_INDEX:
+        if c > LAST_INDEX:
+            return _ghost_conflict(xy, a, b, q, exact_area)
+        if a > LAST_INDEX:
+            return _ghost_conflict(xy, b, c, q, exact_area)
+        return _ghost_conflict(xy, c, a, q, exact_area)
+    x = xy[2 * q]
+    y = xy[2 * q + 1]
+    sign = circle_sign(
+        xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, xy[2 * c] - x, xy[2 * c + 1] - y, exact_lift
+    )
+    if sign != 0:
+        return sign > 0
+    return _tied_conflict(xy, a, b, c, q, exact_area)
+
+
+@njit(cache=True, nogil=True)
+def _cavity(
+    xy: np.ndarray,
+    mesh: np.ndarray,
+    t0: int,
+    p: int,
+    cavity: np.ndarray,
+    rim: np.ndarray,
+    stack: np.ndarray,
+    exact_area: float,
+    exact_lift: float,
+) -> tuple[int, int]:
+    """List the triangles in conflict with p, from t0 that holds it, and the halfedges outside their rim, in order.
+
+    Returns the numbers of both. Each rim entry is the twin (outside) of a cavity edge u -> v, counter-clockwise.
+    """
+    n_cavity = 1
+    n_rim = 0
+    cavity[0] = t0
+    stack[0] = t0 + 2
+    stack[1] = t0 + 1
+    stack[2] = t0
+    depth = 3
+    while depth > 0:
+        depth -= 1
+        h = mesh[stack[depth] + 4]
+        s = h & TRIANGLE
+        if _conflict(xy, mesh[s], mesh[s + 1], mesh[s + 2], p, exact_area, exact_lift):
+            cavity[n_cavity] = s
+            n_cavity += 1
+            k = h & 3
+            stack[depth] = s + (k + 2) % 3
+            stack[depth + 1] = s + (k + 1) % 3
+            depth += 2
+        else:
+            rim[n_rim] = h
+            n_rim += 1
+    return n_cavity, n_rim
+
+
+@njit(cache=True, nogil=True)
+def _star(mesh: np.ndarray, t: int, p: int, star: np.ndarray, rim: np.ndarray, ring: np.ndarray) -> int:
+    """List the triangles around p counter-clockwise, the halfedges outside its ring and the ring's vertices."""
+    first = t
+    m = 0
+    while True:
+        k = 0 if mesh[t] == p else (1 if mesh[t + 1] == p else 2)
+        opposite = t + (k + 1) % 3
+        star[m] = t
+        rim[m] = mesh[opposite + 4]
+        ring[m] = mesh[opposite]
+        m += 1
+        t = mesh[t + (k + 2) % 3 + 4] & TRIANGLE
+        if t == first:
+            return m
+
+
+@njit(cache=True, nogil=True)
+def _fill(
+    xy: np.ndarray,
+    ring: np.ndarray,
+    m: int,
+    edge: np.ndarray,
+    ears: np.ndarray,
+    ear_edges: np.ndarray,
+    exact_area: float,
+    exact_lift: float,
+) -> int:
+    """Triangulate the polygon ``ring`` (destroyed) by Delaunay ears; return their number, m - 2, or 0 if there is none.
+
+    Side i of the polygon has the number i, the third side of ear k the number m + k; ``ear_edges`` says which sides an ear
+    has, in the order of its vertices.
+    """
+    for i in range(m):
+        edge[i] = i
+    left = m
+    n = 0
+    i = 0
+    failures = 0
+    while left > 3:
+        before = i - 1 if i > 0 else left - 1
+        after = i + 1 if i < left - 1 else 0
+        a = ring[before]
+        b = ring[i]
+        c = ring[after]
+        good = True
+        if (a | b | c) <= LAST_INDEX:
+            good = _turn(xy, a, b, c, exact_area) > 0
+        if good:
+            for q in range(left):
+                if q != before and q != i and q != after:
+                    if _conflict(xy, a, b, c, ring[q], exact_area, exact_lift):
+                        good = False
+                        break
+        if not good:
+            failures += 1
+            if failures > left:
+                return 0
+            i = after
+            continue
+        failures = 0
+        ears[n, 0] = a
+        ears[n, 1] = b
+        ears[n, 2] = c
+        ear_edges[n, 0] = edge[before]
+        ear_edges[n, 1] = edge[i]
+        ear_edges[n, 2] = m + n
+        edge[before] = m + n
+        n += 1
+        left -= 1
+        for k in range(i, left):
+            ring[k] = ring[k + 1]
+            edge[k] = edge[k + 1]
+        i = i if i < left else 0
+    for k in range(3):
+        ears[n, k] = ring[k]
+        ear_edges[n, k] = edge[k]
+    return n + 1
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _cost_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) -> float:
+    """d_p of vertex i on the plane of triangle (a, b, c)."""  # noqa: D403
+    ax = xy[2 * a]
+    ay = xy[2 * a + 1]
+    ux = xy[2 * b] - ax
+    uy = xy[2 * b + 1] - ay
+    vx = xy[2 * c] - ax
+    vy = xy[2 * c + 1] - ay
+    dx = xy[2 * i] - ax
+    dy = xy[2 * i + 1] - ay
+    area = ux * vy - uy * vx
+    wb = dx * vy - dy * vx
+    wc = dy * ux - dx * uy
+    return abs(((area - wb - wc) * z[a] + wb * z[b] + wc * z[c]) / area - z[i])
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _side_area(xy: np.ndarray, a: int, b: int, i: int) -> float:
+    x = xy[2 * i]
+    y = xy[2 * i + 1]
+    return (xy[2 * a] - x) * (xy[2 * b + 1] - y) - (xy[2 * a + 1] - y) * (xy[2 * b] - x)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _is_inside(g: Ground, a: int, b: int, c: int) -> bool:
+    """Whether the footprint holds the centroid of (a, b, c)."""
+    if g.side == 0:
+        return True
+    xy = g.xy
+    x3 = _sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
+    y3 = _sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+    return inside(xy, g.side, g.state, g.start, g.items, g.faces, x3, y3)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _is_thin(g: Ground, a: int, b: int, c: int) -> bool:
+    xy = g.xy
+    ux = xy[2 * b] - xy[2 * a]
+    uy = xy[2 * b + 1] - xy[2 * a + 1]
+    vx = xy[2 * c] - xy[2 * a]
+    vy = xy[2 * c + 1] - xy[2 * a + 1]
+    area = ux * vy - uy * vx
+    # A generous first look; the exact rule, the same for all rotations, decides about those that are left.
+    return area * area < 16.0 * g.min_height * g.min_height * (ux * ux + uy * uy + vx * vx + vy * vy)
+
+
+# ------------------------------------------------------------------------------------------ the outline's books
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _slot(h: int) -> int:
+    return (h >> 3) * 3 + (h & 3)
+
+
+@njit(cache=True, nogil=True)
+def _set_segment(live: Live, h: int, wanted: bool) -> None:
+    """Make halfedge h an outline segment, or no longer one."""
+    count = live.count
+    s = live.segment_of[_slot(h)]
+    if wanted and s < 0:
+        if count[N_FREE_SEGMENTS] > 0:
+            count[N_FREE_SEGMENTS] -= 1
+            s = live.free_segment[count[N_FREE_SEGMENTS]]
+        else:
+            s = count[N_SEGMENTS_EVER]
+            count[N_SEGMENTS_EVER] += 1
+        live.segment_of[_slot(h)] = s
+        live.segment[s] = h
+        live.segment_at[s] = count[N_SEGMENTS]
+        live.alive[count[N_SEGMENTS]] = s
+        count[N_SEGMENTS] += 1
+        live.added[count[N_ADDED]] = s
+        count[N_ADDED] += 1
+    elif not wanted and s >= 0:
+        live.segment_of[_slot(h)] = -1
+        live.segment[s] = NONE
+        count[N_SEGMENTS] -= 1
+        moved = live.alive[count[N_SEGMENTS]]
+        live.alive[live.segment_at[s]] = moved
+        live.segment_at[moved] = live.segment_at[s]
+        live.dead[count[N_DEAD]] = s
+        count[N_DEAD] += 1
+
+
+@njit(cache=True, nogil=True)
+def _forget_bare(live: Live, i: int) -> None:
+    at = live.bare_at[i]
+    if at < 0:
+        return
+    live.count[N_BARE] -= 1
+    last = live.bare[live.count[N_BARE]]
+    live.bare[at] = last
+    live.bare_at[last] = at
+    live.bare_at[i] = -1
+    live.amount[BARE_ERROR] -= live.cost[i]
+
+
+@njit(cache=True, nogil=True)
+def _note_bare(live: Live, i: int) -> None:
+    if live.bare_at[i] >= 0:
+        return
+    live.bare_at[i] = live.count[N_BARE]
+    live.bare[live.count[N_BARE]] = i
+    live.count[N_BARE] += 1
+    live.bare_segment[i] = -1
+    live.cost[i] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def _gap(g: Ground, live: Live, s: int, i: int) -> tuple[float, float]:
+    """Squared distance in the plane from vertex i to segment s, and the parameter of the nearest point."""
+    h = live.segment[s]
+    t = h & TRIANGLE
+    a = live.mesh[h]
+    b = live.mesh[t + ((h & 3) + 1) % 3]
+    xy = g.xy
+    ax = xy[2 * a]
+    ay = xy[2 * a + 1]
+    ex = xy[2 * b] - ax
+    ey = xy[2 * b + 1] - ay
+    u = ((xy[2 * i] - ax) * ex + (xy[2 * i + 1] - ay) * ey) / (ex * ex + ey * ey)
+    u = min(max(u, 0.0), 1.0)
+    dx = ax + u * ex - xy[2 * i]
+    dy = ay + u * ey - xy[2 * i + 1]
+    return dx * dx + dy * dy, u
+
+
+@njit(cache=True, nogil=True)
+def _key(live: Live, s: int) -> int:
+    """Rank of a segment among equally near ones: that of its triangle in the written mesh, then its side."""
+    h = live.segment[s]
+    t = h & TRIANGLE
+    mesh = live.mesh
+    least = 0
+    if mesh[t + 1] < mesh[t]:
+        least = 1
+    if mesh[t + 2] < mesh[t + least]:
+        least = 2
+    a = np.int64(mesh[t + least])
+    b = np.int64(mesh[t + (least + 1) % 3])
+    return (a << 33) | (b << 2) | (((h & 3) - least + 3) % 3)
+
+
+@njit(cache=True, nogil=True)
+def _try_segment(g: Ground, live: Live, s: int, i: int) -> None:
+    """Take segment s for bare vertex i if it is nearer than the one it has."""
+    d, _ = _gap(g, live, s, i)
+    held = live.bare_segment[i]
+    if held < 0 or d < live.bare_gap[i] or (d == live.bare_gap[i] and _key(live, s) < _key(live, held)):
+        live.bare_segment[i] = s
+        live.bare_gap[i] = d
+
+
+@njit(cache=True, nogil=True)
+def _bare_cost(g: Ground, live: Live, i: int) -> float:
+    s = live.bare_segment[i]
+    if s < 0:
+        return np.inf
+    d, u = _gap(g, live, s, i)
+    h = live.segment[s]
+    t = h & TRIANGLE
+    a = live.mesh[h]
+    b = live.mesh[t + ((h & 3) + 1) % 3]
+    c = live.mesh[t + ((h & 3) + 2) % 3]
+    xy = g.xy
+    z = g.z
+    ux = xy[2 * b] - xy[2 * a]
+    uy = xy[2 * b + 1] - xy[2 * a + 1]
+    vx = xy[2 * c] - xy[2 * a]
+    vy = xy[2 * c + 1] - xy[2 * a + 1]
+    dx = xy[2 * i] - xy[2 * a]
+    dy = xy[2 * i + 1] - xy[2 * a + 1]
+    area = ux * vy - uy * vx
+    wb = (dx * vy - dy * vx) / area
+    wc = (dy * ux - dx * uy) / area
+    wa = 1.0 - wb - wc
+    if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
+        return abs(wa * z[a] + wb * z[b] + wc * z[c] - z[i])
+    if not g.nearest:
+        return 0.0
+    dz = (1.0 - u) * z[a] + u * z[b] - z[i]
+    return np.sqrt(d * g.unit * g.unit + dz * dz)
+
+
+# ------------------------------------------------------------------------------------------------ operations
+
+
+@njit(cache=True, nogil=True)
+def _collect(live: Live, t: int) -> None:
+    """Take a triangle out of the books: its vertices into the pool, its error, its segments."""
+    count = live.count
+    r = t >> 3
+    emitted = (live.kind[r] & EMITTED) != 0
+    i = live.head[r]
+    while i >= 0:
+        live.pool[count[N_POOL]] = i
+        count[N_POOL] += 1
+        if not emitted:
+            _forget_bare(live, i)
+        i = live.following[i]
+    live.head[r] = -1
+    if emitted:
+        live.amount[COVERED_ERROR] -= live.subtotal[r]
+        live.subtotal[r] = 0.0
+        count[N_EMITTED] -= 1
+        for k in range(3):
+            v = live.mesh[t + k]
+            live.used[v] -= 1
+            live.touched[count[N_TOUCHED]] = v
+            count[N_TOUCHED] += 1
+            if live.segment_of[_slot(t + k)] >= 0:
+                _set_segment(live, t + k, False)
+    live.kind[r] = 0
+
+
+@njit(cache=True, nogil=True)
+def _settle_thin(g: Ground, live: Live, seed: int) -> None:
+    """Decide for the chain of thin triangles around ``seed`` whether it is peeled: whether it reaches the outside."""
+    mesh = live.mesh
+    kind = live.kind
+    if kind[seed >> 3] & VISITED:
+        return
+    n = 1
+    live.stack[0] = seed
+    kind[seed >> 3] |= VISITED
+    reaches = False
+    k = 0
+    while k < n:
+        t = live.stack[k]
+        k += 1
+        for e in range(3):
+            s = mesh[t + 4 + e] & TRIANGLE
+            if (mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
+                reaches = True
+            elif (kind[s >> 3] & (THIN | VISITED)) == THIN:
+                kind[s >> 3] |= VISITED
+                live.stack[n] = s
+                n += 1
+    for k in range(n):
+        t = live.stack[k]
+        bits = kind[t >> 3] & ~VISITED
+        if ((bits & PEELED) != 0) != reaches:
+            in_region = False
+            for q in range(live.count[N_REGION]):
+                in_region = in_region or live.region[q] == t
+            if not in_region:
+                _collect(live, t)
+                live.region[live.count[N_REGION]] = t
+                live.count[N_REGION] += 1
+            bits = (bits | PEELED) if reaches else (bits & ~PEELED)
+        kind[t >> 3] = bits
+    # Only now may the emitted bit follow: _collect has read it.
+    for k in range(n):
+        t = live.stack[k]
+        bits = kind[t >> 3]
+        kind[t >> 3] = (bits | EMITTED) if (bits & (INSIDE | PEELED)) == INSIDE else (bits & ~EMITTED)
+
+
+@njit(cache=True, nogil=True)
+def _settle(g: Ground, live: Live) -> None:
+    """Enter the triangles of the region into the books and place the pooled vertices."""
+    xy = g.xy
+    z = g.z
+    mesh = live.mesh
+    kind = live.kind
+    count = live.count
+    any_thin = False
+    for q in range(count[N_REGION]):
+        t = live.region[q]
+        a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
+        if (a | b | c) > LAST_INDEX:
+            kind[t >> 3] = 0
+            continue
+        bits = PLAIN if _is_inside(g, a, b, c) else 0
+        if _is_thin(g, a, b, c) and _is_sliver(xy, mesh, t, g.min_height):
+            bits |= THIN
+        kind[t >> 3] = bits
+    for q in range(count[N_REGION]):
+        t = live.region[q]
+        any_thin = any_thin or (kind[t >> 3] & THIN) != 0
+        for k in range(3):
+            any_thin = any_thin or (kind[mesh[t + 4 + k] >> 3] & THIN) != 0
+    if any_thin:
+        n_first = count[N_REGION]
+        for q in range(n_first):
+            t = live.region[q]
+            if kind[t >> 3] & THIN:
+                _settle_thin(g, live, t)
+            for k in range(3):
+                s = mesh[t + 4 + k] & TRIANGLE
+                if kind[s >> 3] & THIN:
+                    _settle_thin(g, live, s)
+    for q in range(count[N_REGION]):
+        t = live.region[q]
+        live.head[t >> 3] = -1
+        live.subtotal[t >> 3] = 0.0
+        emitted = (kind[t >> 3] & EMITTED) != 0
+        for k in range(3):
+            v = mesh[t + k]
+            if v <= LAST_INDEX:
+                live.place[v] = t
+                if emitted:
+                    live.used[v] += 1
+                    live.touched[count[N_TOUCHED]] = v
+                    count[N_TOUCHED] += 1
+        if emitted:
+            count[N_EMITTED] += 1
+    for q in range(count[N_REGION]):
+        t = live.region[q]
+        mine = (kind[t >> 3] & EMITTED) != 0
+        for k in range(3):
+            h = mesh[t + 4 + k]
+            theirs = (kind[h >> 3] & EMITTED) != 0
+            _set_segment(live, t + k, mine and not theirs)
+            _set_segment(live, h, theirs and not mine)
+    # The pooled vertices, each to the triangle that holds it (exactly), else to a ghost that it sees.
+    t = live.region[0] if count[N_REGION] > 0 else 0
+    for n in range(count[N_POOL]):
+        i = live.pool[n]
+        found = False
+        for q in range(-1, count[N_REGION]):
+            s = t if q < 0 else live.region[q]
+            a, b, c = mesh[s], mesh[s + 1], mesh[s + 2]
+            if (a | b | c) > LAST_INDEX:
+                continue
+            if (
+                _turn(xy, a, b, i, g.exact_area) >= 0
+                and _turn(xy, b, c, i, g.exact_area) >= 0
+                and _turn(xy, c, a, i, g.exact_area) >= 0
+            ):
+                t = s
+                found = True
+                break
+        if not found:
+            t = locate(xy, mesh, t, xy[2 * i], xy[2 * i + 1], g.exact_area)
+        r = t >> 3
+        live.place[i] = t
+        live.following[i] = live.head[r]
+        live.head[r] = i
+        if kind[r] & EMITTED:
+            d = _cost_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            live.subtotal[r] += d
+            live.amount[COVERED_ERROR] += d
+        else:
+            _note_bare(live, i)
+    for n in range(count[N_TOUCHED]):
+        v = live.touched[n]
+        if live.site[v]:
+            if live.used[v] == 0:
+                _note_bare(live, v)
+            else:
+                _forget_bare(live, v)
+    _settle_bare(g, live)
+    for n in range(count[N_DEAD]):
+        live.free_segment[count[N_FREE_SEGMENTS]] = live.dead[n]
+        count[N_FREE_SEGMENTS] += 1
+    count[N_DEAD] = 0
+    count[N_ADDED] = 0
+    count[N_REGION] = 0
+    count[N_POOL] = 0
+    count[N_TOUCHED] = 0
+
+
+@njit(cache=True, nogil=True)
+def _settle_bare(g: Ground, live: Live) -> None:
+    """Give the bare vertices their nearest segment again, where segments came, went or a vertex is new."""
+    count = live.count
+    for n in range(count[N_BARE]):
+        i = live.bare[n]
+        s = live.bare_segment[i]
+        if s < 0 or live.segment[s] == NONE:
+            live.bare_segment[i] = -1
+            for q in range(count[N_SEGMENTS]):
+                _try_segment(g, live, live.alive[q], i)
+        else:
+            for q in range(count[N_ADDED]):
+                if live.segment[live.added[q]] != NONE:
+                    _try_segment(g, live, live.added[q], i)
+        if live.bare_segment[i] != s or s < 0:
+            d = _bare_cost(g, live, i)
+            live.amount[BARE_ERROR] += d - live.cost[i]
+            live.cost[i] = d
+
+
+@njit(cache=True, nogil=True)
+def _new_record(live: Live) -> int:
+    count = live.count
+    if count[N_FREE] > 0:
+        count[N_FREE] -= 1
+        return live.free[count[N_FREE]]
+    t = count[END]
+    count[END] += RECORD
+    return t
+
+
+@njit(cache=True, nogil=True)
+def insert(g: Ground, live: Live, p: int) -> None:
+    """Insert vertex p, which is no site; its position must be free."""
+    mesh = live.mesh
+    count = live.count
+    t0 = live.place[p]
+    n_cavity, n_rim = _cavity(g.xy, mesh, t0, p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift)
+    for k in range(n_cavity):
+        _collect(live, live.cavity[k])
+    # p itself leaves the pool: it is a site now.
+    n = 0
+    for q in range(count[N_POOL]):
+        if live.pool[q] != p:
+            live.pool[n] = live.pool[q]
+            n += 1
+    count[N_POOL] = n
+    _forget_bare(live, p)
+    live.site[p] = 1
+    live.used[p] = 0
+    count[N_SITES] += 1
+    live.touched[count[N_TOUCHED]] = p
+    count[N_TOUCHED] += 1
+    for k in range(n_rim):
+        live.region[k] = live.cavity[k] if k < n_cavity else _new_record(live)
+    count[N_REGION] = n_rim
+    # The rim's vertices are read before any record is written over.
+    for k in range(n_rim):
+        h = live.rim[k]
+        live.ring[k] = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
+    for k in range(n_rim):
+        t = live.region[k]
+        after = live.region[k + 1 if k + 1 < n_rim else 0]
+        mesh[t] = live.ring[k]
+        mesh[t + 1] = live.ring[k + 1 if k + 1 < n_rim else 0]
+        mesh[t + 2] = p
+        h = live.rim[k]
+        mesh[t + 4] = h
+        mesh[h + 4] = t
+        mesh[t + 5] = after + 2
+        mesh[after + 6] = t + 1
+    _settle(g, live)
+
+
+@njit(cache=True, nogil=True)
+def remove(g: Ground, live: Live, p: int) -> bool:
+    """Remove site p; return False, with nothing changed, if the others would span no triangle."""
+    mesh = live.mesh
+    count = live.count
+    m = _star(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
+    n_ears = _fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
+    if n_ears == 0 or count[N_SITES] <= 3:
+        return False
+    for k in range(m):
+        _collect(live, live.cavity[k])
+    live.pool[count[N_POOL]] = p
+    count[N_POOL] += 1
+    _forget_bare(live, p)
+    live.site[p] = 0
+    count[N_SITES] -= 1
+    for k in range(n_ears):
+        live.region[k] = live.cavity[k]
+    count[N_REGION] = n_ears
+    for k in range(n_ears, m):
+        live.free[count[N_FREE]] = live.cavity[k]
+        count[N_FREE] += 1
+        t = live.cavity[k]
+        # An unused record is a ghost to whoever scans the records.
+        mesh[t] = INFINITE
+        mesh[t + 1] = INFINITE
+        mesh[t + 2] = INFINITE
+    for k in range(n_ears):
+        t = live.region[k]
+        for e in range(3):
+            mesh[t + e] = live.ears[k, e]
+            side = live.ear_edges[k, e]
+            if side < m:
+                h = live.rim[side]
+                mesh[t + e + 4] = h
+                mesh[h + 4] = t + e
+            elif side < m + k:
+                h = live.region[side - m] + 2
+                mesh[t + e + 4] = h
+                mesh[h + 4] = t + e
+    _settle(g, live)
+    return True
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _total(live: Live) -> float:
+    return live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
+
+
+@njit(cache=True, nogil=True)
+def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
+    """Return the change of error and of the number of triangles if site p were removed; inf where it cannot be."""
+    xy = g.xy
+    z = g.z
+    mesh = live.mesh
+    m = _star(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
+    plain = True
+    for k in range(m):
+        t = live.cavity[k]
+        plain = plain and live.kind[t >> 3] == PLAIN
+        if live.count[N_BARE] > 0:
+            for e in range(3):
+                plain = plain and live.segment_of[_slot(t + e)] < 0
+    n = 0
+    if plain:
+        n = _fill(xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
+        plain = n > 0
+        for k in range(n):
+            a, b, c = live.ears[k, 0], live.ears[k, 1], live.ears[k, 2]
+            plain = plain and _is_inside(g, a, b, c) and not _is_thin(g, a, b, c)
+    if not plain:
+        return _done_and_undone(g, live, p)
+    change = 0.0
+    ears = live.ears
+    best = 0
+    for k in range(-1, m):
+        # The vertices of the star's triangles, and p itself.
+        i = np.int64(p)
+        if k >= 0:
+            r = live.cavity[k] >> 3
+            change -= live.subtotal[r]
+            i = np.int64(live.head[r])
+        while i >= 0:
+            for q in range(-1, n):
+                e = best if q < 0 else q
+                if (
+                    _side_area(xy, ears[e, 0], ears[e, 1], i) >= 0.0
+                    and _side_area(xy, ears[e, 1], ears[e, 2], i) >= 0.0
+                    and _side_area(xy, ears[e, 2], ears[e, 0], i) >= 0.0
+                ):
+                    best = e
+                    break
+                if q == n - 1:
+                    best = _nearest_ear(xy, ears, n, i)
+            change += _cost_in(xy, z, ears[best, 0], ears[best, 1], ears[best, 2], i)
+            i = np.int64(live.following[i]) if k >= 0 else np.int64(-1)
+    return change, -2
+
+
+@njit(cache=True, nogil=True)
+def _nearest_ear(xy: np.ndarray, ears: np.ndarray, n: int, i: int) -> int:
+    """The triangle that vertex i lies least outside of: for vertices on an edge, where rounding decides."""
+    best = 0
+    least = -np.inf
+    for e in range(n):
+        a, b, c = ears[e, 0], ears[e, 1], ears[e, 2]
+        out = min(_side_area(xy, a, b, i), min(_side_area(xy, b, c, i), _side_area(xy, c, a, i)))
+        if out > least:
+            least = out
+            best = e
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _done_and_undone(g: Ground, live: Live, p: int) -> tuple[float, int]:
+    before = _total(live)
+    n = live.count[N_EMITTED]
+    if live.site[p]:
+        if not remove(g, live, p):
+            return np.inf, 0
+        change = _total(live) - before
+        n = live.count[N_EMITTED] - n
+        insert(g, live, p)
+    else:
+        insert(g, live, p)
+        change = _total(live) - before
+        n = live.count[N_EMITTED] - n
+        remove(g, live, p)
+    return change, n
+
+
+@njit(cache=True, nogil=True)
+def try_insert(g: Ground, live: Live, p: int) -> tuple[float, int]:
+    """Return the change of error and of the number of triangles if vertex p, no site, were inserted."""
+    xy = g.xy
+    z = g.z
+    mesh = live.mesh
+    n_cavity, n_rim = _cavity(
+        xy, mesh, live.place[p], p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift
+    )
+    plain = True
+    for k in range(n_cavity):
+        t = live.cavity[k]
+        plain = plain and live.kind[t >> 3] == PLAIN
+        if live.count[N_BARE] > 0:
+            for e in range(3):
+                plain = plain and live.segment_of[_slot(t + e)] < 0
+    if plain:
+        for k in range(n_rim):
+            h = live.rim[k]
+            a = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
+            b = mesh[h]
+            live.ring[k] = a
+            plain = plain and _is_inside(g, a, b, p) and not _is_thin(g, a, b, p)
+    if not plain:
+        return _done_and_undone(g, live, p)
+    change = 0.0
+    best = 0
+    for k in range(n_cavity):
+        r = live.cavity[k] >> 3
+        change -= live.subtotal[r]
+        i = np.int64(live.head[r])
+        while i >= 0:
+            if i != p:
+                # The fan's triangle whose two spokes have i between them; within half a turn there is just one.
+                for q in range(-1, n_rim):
+                    e = best if q < 0 else q
+                    a = live.ring[e]
+                    b = live.ring[e + 1 if e + 1 < n_rim else 0]
+                    if (
+                        _side_area(xy, p, a, i) >= 0.0
+                        and _side_area(xy, b, p, i) >= 0.0
+                        and _side_area(xy, a, b, i) >= -1e-15
+                    ):
+                        best = e
+                        break
+                    if q == n_rim - 1:
+                        best = _nearest_spoke(xy, live.ring, n_rim, p, i)
+                a = live.ring[best]
+                b = live.ring[best + 1 if best + 1 < n_rim else 0]
+                change += _cost_in(xy, z, a, b, p, i)
+            i = np.int64(live.following[i])
+    return change, n_rim - n_cavity
+
+
+@njit(cache=True, nogil=True)
+def _nearest_spoke(xy: np.ndarray, ring: np.ndarray, n: int, p: int, i: int) -> int:
+    best = 0
+    least = -np.inf
+    for e in range(n):
+        a = ring[e]
+        b = ring[e + 1 if e + 1 < n else 0]
+        out = min(_side_area(xy, a, b, i), min(_side_area(xy, p, a, i), _side_area(xy, b, p, i)))
+        if out > least:
+            least = out
+            best = e
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _build(
+    g: Ground, live: Live, sites: np.ndarray, site_xy: np.ndarray, first: np.ndarray, inserted: np.ndarray
+) -> bool:
+    """Triangulate the sites from scratch and enter everything into the books."""
+    mesh = live.mesh
+    count = live.count
+    end = triangulate(
+        site_xy, len(sites), first, np.empty(0, np.int64), inserted, mesh, g.exact_area, g.exact_lift
+    )
+    if end == 0:
+        return False
+    count[:] = 0
+    live.amount[:] = 0.0
+    count[END] = end
+    count[N_SITES] = len(sites)
+    for t in range(0, end, RECORD):
+        for k in range(3):
+            if mesh[t + k] <= LAST_INDEX:
+                mesh[t + k] = sites[mesh[t + k]]
+        live.region[t >> 3] = t
+    for i in range(len(g.z)):
+        live.site[i] = 0
+        live.used[i] = 0
+        live.bare_at[i] = -1
+    for k in range(len(sites)):
+        live.site[sites[k]] = 1
+    count[N_REGION] = end >> 3
+    for s in range(len(live.segment_of)):
+        live.segment_of[s] = -1
+    live.kind[:] = 0
+    # All triangles are the region; the vertices are placed by walking along the curve, faster than by looking at all.
+    _settle(g, live)
+    t = 0
+    for i in range(len(g.z)):
+        if live.site[i]:
+            t = live.place[i]
+            continue
+        t = locate(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
+        r = t >> 3
+        live.place[i] = t
+        live.following[i] = live.head[r]
+        live.head[r] = i
+        if live.kind[r] & EMITTED:
+            d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            live.subtotal[r] += d
+            live.amount[COVERED_ERROR] += d
+        else:
+            _note_bare(live, i)
+    for k in range(len(sites)):
+        if live.used[sites[k]] == 0:
+            _note_bare(live, sites[k])
+    _settle_bare(g, live)
+    return True
+
+
+class LiveTriangulation:
+    """The triangulation of a subset that can be changed vertex by vertex, with its error always at hand.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    kept : (N,) bool array
+        The subset to begin with; it must span a triangle.
+    footprint, outside : str
+        As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
+
+    Raises
+    ------
+    ValueError
+        If ``kept`` has the wrong shape or spans no triangle.
+
+    Examples
+    --------
+    >>> from meshsimp_pymoo.datasets import load
+    >>> from meshsimp_pymoo.geometry.model import load_model
+    >>> roof = load_model(load("roof:3"))
+    >>> live = LiveTriangulation(roof, np.isin(np.arange(9), roof.corners))
+    >>> live.error, live.triangles
+    (3.0, 2)
+    >>> ridge = np.flatnonzero(roof.points[:, 2] == 1.0)
+    >>> live.try_insert(ridge[1])          # the middle of the ridge alone halves the error of the others
+    (-1.0, 2)
+    """
+
+    def __init__(
+        self, model: OpenModel, kept: np.ndarray, *, footprint: str = "model", outside: str = "nearest"
+    ) -> None:
+        kept = np.asarray(kept)
+        if kept.shape != (model.n_vertices,) or kept.dtype != np.bool_:
+            raise ValueError(
+                f"a subset of {model.name} is a bool array of shape ({model.n_vertices},), "
+                f"not {kept.dtype} of shape {kept.shape}"
+            )
+        self.model = model
+        self.ground = make_ground(model, footprint=footprint, outside=outside)
+        self.live = make_live(model.n_vertices)
+        self._kept = kept.copy()
+        # Of several vertices at one position the first kept one is the site; `_group` numbers the positions.
+        self._has_twins = bool(model.kernel_arguments[3])
+        xy = model.xy
+        self._group = np.cumsum(np.r_[True, (xy[1:] != xy[:-1]).any(axis=1)]) - 1 if self._has_twins else None
+        build(self.ground, self.live, model, self._sites())
+
+    def _sites(self) -> np.ndarray:
+        rows = np.flatnonzero(self._kept)
+        if self._group is not None:
+            _, first = np.unique(self._group[rows], return_index=True)
+            rows = rows[first]
+        return rows
+
+    @property
+    def kept(self) -> np.ndarray:
+        """The subset, as a new bool array (N,)."""
+        return self._kept.copy()
+
+    @property
+    def error(self) -> float:
+        """The sum of d_p over all N vertices [model units]."""
+        return float(self.live.amount.sum()) if self.triangles else np.inf
+
+    @property
+    def triangles(self) -> int:
+        """The number of emitted triangles."""
+        return int(self.live.count[N_EMITTED])
+
+    @property
+    def faces(self) -> np.ndarray:
+        """The emitted triangles (M, 3) as rows of ``model.points``, the least row first, sorted."""
+        end = int(self.live.count[END])
+        records = self.live.mesh[:end].reshape(-1, RECORD)[:, :3].astype(np.int64)
+        records = records[(self.live.kind[: end // RECORD] & EMITTED) != 0]
+        turn = records.argmin(axis=1)
+        faces = np.stack([records[np.arange(len(records)), (turn + k) % 3] for k in range(3)], axis=1)
+        return faces[np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))]
+
+    def insert(self, vertex: int) -> float:
+        """Keep a vertex that is not kept; return the change of the error."""
+        v = self._index(vertex, kept=False)
+        before = self.error
+        held = self._site_at(v)
+        self._kept[v] = True
+        if held is None:
+            insert(self.ground, self.live, v)
+        elif v < held:
+            self._replace(held, v)
+        return self.error - before
+
+    def remove(self, vertex: int) -> float:
+        """Drop a kept vertex; return the change of the error."""
+        v = self._index(vertex, kept=True)
+        before = self.error
+        if self.live.site[v]:
+            self._kept[v] = False
+            heir = self._site_at(v, kept=True)
+            if heir is not None:
+                self._replace(v, heir)
+            elif not remove(self.ground, self.live, v):
+                self._kept[v] = True
+                raise ValueError(f"without vertex {v} the kept vertices of {self.model.name} span no triangle")
+        self._kept[v] = False
+        return self.error - before
+
+    def move(self, vertex: int, to: int) -> float:
+        """Drop one vertex and keep another instead; return the change of the error."""
+        self._index(to, kept=False)
+        change = self.remove(vertex)
+        return change + self.insert(to)
+
+    def try_insert(self, vertex: int) -> tuple[float, int]:
+        """Return the change of the error and of the number of triangles if the vertex were kept."""
+        v = self._index(vertex, kept=False)
+        if self._site_at(v) is not None:
+            return self._tried(lambda: self.insert(v), lambda: self.remove(v))
+        change, triangles = try_insert(self.ground, self.live, v)
+        return float(change), int(triangles)
+
+    def try_remove(self, vertex: int) -> tuple[float, int]:
+        """Return the change of the error and of the number of triangles if the vertex were dropped (inf: it cannot)."""
+        v = self._index(vertex, kept=True)
+        if self._has_twins:
+            return self._tried(lambda: self.remove(v), lambda: self.insert(v))
+        change, triangles = try_remove(self.ground, self.live, v)
+        return float(change), int(triangles)
+
+    def try_move(self, vertex: int, to: int) -> tuple[float, int]:
+        """Return the change of the error and of the number of triangles if one vertex were dropped for another."""
+        return self._tried(lambda: self.move(vertex, to), lambda: self.move(to, vertex))
+
+    def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
+        before, triangles = self.error, self.triangles
+        do()
+        result = self.error - before, self.triangles - triangles
+        undo()
+        return result
+
+    def _replace(self, old: int, new: int) -> None:
+        if not remove(self.ground, self.live, old):
+            # With three sites left the triangulation is built anew.
+            build(self.ground, self.live, self.model, self._sites())
+            return
+        insert(self.ground, self.live, new)
+
+    def _site_at(self, v: int, *, kept: bool = False) -> int | None:
+        """The site (or with ``kept`` the first kept vertex) at the position of v, if there is one."""
+        if self._group is None:
+            return None
+        low, high = np.searchsorted(self._group, [self._group[v], self._group[v] + 1])
+        rows = np.arange(low, high)
+        rows = rows[self._kept[rows] if kept else self.live.site[rows] == 1]
+        return int(rows[0]) if len(rows) else None
+
+    def _index(self, vertex: int, *, kept: bool) -> int:
+        v = int(vertex)
+        if not 0 <= v < self.model.n_vertices:
+            raise ValueError(f"vertex {v} is none of the {self.model.n_vertices} of {self.model.name}")
+        if self._kept[v] != kept:
+            raise ValueError(f"vertex {v} of {self.model.name} is {'not kept' if kept else 'kept already'}")
+        return v
+
+
+def make_ground(model: OpenModel, *, footprint: str = "model", outside: str = "nearest") -> Ground:
+    """Return the arrays and rules of a model for the compiled functions of this module."""
+    use_footprint, nearest = _rules(footprint, outside)
+    xy, z, _, _, unit, min_height, exact_area, exact_lift, side, state, start, items, faces = model.kernel_arguments
+    return Ground(
+        xy,
+        z,
+        unit,
+        min_height,
+        exact_area,
+        exact_lift,
+        side if use_footprint else 0,
+        state,
+        start,
+        items,
+        faces,
+        nearest,
+    )
+
+
+def make_live(n_vertices: int) -> Live:
+    """Return empty books for a model of that size; about 500 N bytes, of which only what is used becomes resident."""
+    n = n_vertices + 4
+    return Live(
+        mesh=np.empty(16 * n, np.uint32),
+        kind=np.zeros(2 * n, np.uint8),
+        head=np.empty(2 * n, np.int32),
+        subtotal=np.empty(2 * n, np.float64),
+        following=np.empty(n, np.int32),
+        place=np.empty(n, np.uint32),
+        cost=np.empty(n, np.float64),
+        used=np.empty(n, np.int32),
+        site=np.empty(n, np.uint8),
+        free=np.empty(2 * n, np.uint32),
+        bare_at=np.empty(n, np.int32),
+        bare=np.empty(n, np.int32),
+        bare_segment=np.empty(n, np.int32),
+        bare_gap=np.empty(n, np.float64),
+        segment_of=np.empty(6 * n, np.int32),
+        segment=np.empty(6 * n, np.uint32),
+        segment_at=np.empty(6 * n, np.int32),
+        alive=np.empty(6 * n, np.int32),
+        free_segment=np.empty(6 * n, np.int32),
+        region=np.empty(2 * n, np.uint32),
+        pool=np.empty(n, np.int32),
+        touched=np.empty(12 * n, np.uint32),
+        dead=np.empty(6 * n, np.int32),
+        added=np.empty(6 * n, np.int32),
+        cavity=np.empty(2 * n, np.uint32),
+        rim=np.empty(2 * n, np.uint32),
+        ring=np.empty(2 * n, np.uint32),
+        stack=np.empty(2 * n + 8, np.uint32),
+        edge=np.empty(2 * n, np.int32),
+        ears=np.empty((2 * n, 3), np.uint32),
+        ear_edges=np.empty((2 * n, 3), np.int32),
+        count=np.zeros(13, np.int64),
+        amount=np.zeros(2, np.float64),
+    )
+
+
+def build(ground: Ground, live: Live, model: OpenModel, sites: np.ndarray) -> None:
+    """Fill the books with the triangulation of the sites (rows, ascending, at different positions)."""
+    sites = np.ascontiguousarray(sites, np.int64)
+    first = np.searchsorted(sites, model.corners)
+    first = np.where((first < len(sites)) & np.isin(model.corners, sites), first, -1).astype(np.int64)
+    site_xy = np.ascontiguousarray(model.xy[sites]).ravel()
+    if len(sites) < 3 or not _build(ground, live, sites, site_xy, first, np.empty(len(sites), np.uint8)):
+        raise ValueError(f"{len(sites)} kept vertices of {model.name} span no triangle; keep more, the corners first")
