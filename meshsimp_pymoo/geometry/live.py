@@ -340,6 +340,8 @@ def _is_thin(g: Ground, a: int, b: int, c: int) -> bool:
 
 
 # ------------------------------------------------------------------------------------------ the outline's books
+#
+# Each access to an array of ``live`` costs a counted reference, so what runs often takes the arrays it needs as locals.
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -401,31 +403,26 @@ def _note_bare(live: Live, i: int) -> None:
     live.cost[i] = 0.0
 
 
-@njit(cache=True, nogil=True)
-def _gap(g: Ground, live: Live, s: int, i: int) -> tuple[float, float]:
-    """Squared distance in the plane from vertex i to segment s, and the parameter of the nearest point."""
-    h = live.segment[s]
-    t = h & TRIANGLE
-    a = live.mesh[h]
-    b = live.mesh[t + ((h & 3) + 1) % 3]
-    xy = g.xy
+@njit(cache=True, nogil=True, forceinline=True)
+def _gap(xy: np.ndarray, mesh: np.ndarray, h: int, x: float, y: float) -> float:
+    """Squared distance in the plane from (x, y) to halfedge h."""
+    a = mesh[h]
+    b = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
     ax = xy[2 * a]
     ay = xy[2 * a + 1]
     ex = xy[2 * b] - ax
     ey = xy[2 * b + 1] - ay
-    u = ((xy[2 * i] - ax) * ex + (xy[2 * i + 1] - ay) * ey) / (ex * ex + ey * ey)
+    u = ((x - ax) * ex + (y - ay) * ey) / (ex * ex + ey * ey)
     u = min(max(u, 0.0), 1.0)
-    dx = ax + u * ex - xy[2 * i]
-    dy = ay + u * ey - xy[2 * i + 1]
-    return dx * dx + dy * dy, u
+    dx = ax + u * ex - x
+    dy = ay + u * ey - y
+    return dx * dx + dy * dy
 
 
 @njit(cache=True, nogil=True)
-def _key(live: Live, s: int) -> int:
-    """Rank of a segment among equally near ones: that of its triangle in the written mesh, then its side."""
-    h = live.segment[s]
+def _key(mesh: np.ndarray, h: int) -> int:
+    """Rank of segment h among equally near ones: that of its triangle in the written mesh, then its side."""
     t = h & TRIANGLE
-    mesh = live.mesh
     least = 0
     if mesh[t + 1] < mesh[t]:
         least = 1
@@ -437,28 +434,14 @@ def _key(live: Live, s: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _try_segment(g: Ground, live: Live, s: int, i: int) -> None:
-    """Take segment s for bare vertex i if it is nearer than the one it has."""
-    d, _ = _gap(g, live, s, i)
-    held = live.bare_segment[i]
-    if held < 0 or d < live.bare_gap[i] or (d == live.bare_gap[i] and _key(live, s) < _key(live, held)):
-        live.bare_segment[i] = s
-        live.bare_gap[i] = d
-
-
-@njit(cache=True, nogil=True)
-def _bare_cost(g: Ground, live: Live, i: int) -> float:
-    s = live.bare_segment[i]
-    if s < 0:
-        return np.inf
-    d, u = _gap(g, live, s, i)
-    h = live.segment[s]
+def _bare_cost(
+    xy: np.ndarray, z: np.ndarray, mesh: np.ndarray, h: int, i: int, unit: float, nearest: bool
+) -> float:
+    """d_p of a bare vertex i whose nearest segment is halfedge h."""
     t = h & TRIANGLE
-    a = live.mesh[h]
-    b = live.mesh[t + ((h & 3) + 1) % 3]
-    c = live.mesh[t + ((h & 3) + 2) % 3]
-    xy = g.xy
-    z = g.z
+    a = mesh[h]
+    b = mesh[t + ((h & 3) + 1) % 3]
+    c = mesh[t + ((h & 3) + 2) % 3]
     ux = xy[2 * b] - xy[2 * a]
     uy = xy[2 * b + 1] - xy[2 * a + 1]
     vx = xy[2 * c] - xy[2 * a]
@@ -471,41 +454,103 @@ def _bare_cost(g: Ground, live: Live, i: int) -> float:
     wa = 1.0 - wb - wc
     if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
         return abs(wa * z[a] + wb * z[b] + wc * z[c] - z[i])
-    if not g.nearest:
+    if not nearest:
         return 0.0
+    u = min(max((dx * ux + dy * uy) / (ux * ux + uy * uy), 0.0), 1.0)
+    ex = u * ux - dx
+    ey = u * uy - dy
     dz = (1.0 - u) * z[a] + u * z[b] - z[i]
-    return np.sqrt(d * g.unit * g.unit + dz * dz)
+    return np.sqrt((ex * ex + ey * ey) * unit * unit + dz * dz)
+
+
+@njit(cache=True, nogil=True)
+def _settle_bare(g: Ground, live: Live) -> None:
+    """Give the bare vertices their nearest segment again, where segments came, went or a vertex is new."""
+    xy = g.xy
+    mesh = live.mesh
+    segment = live.segment
+    bare_segment = live.bare_segment
+    bare_gap = live.bare_gap
+    added = live.added
+    alive = live.alive
+    n_added = live.count[N_ADDED]
+    n_alive = live.count[N_SEGMENTS]
+    for n in range(live.count[N_BARE]):
+        i = live.bare[n]
+        x = xy[2 * i]
+        y = xy[2 * i + 1]
+        before = bare_segment[i]
+        best = before
+        gap = bare_gap[i]
+        if best < 0 or segment[best] == NONE:
+            # Its segment went: look at all.
+            best = -1
+            gap = np.inf
+            for q in range(n_alive):
+                s = alive[q]
+                d = _gap(xy, mesh, segment[s], x, y)
+                if d < gap or (d == gap and best >= 0 and _key(mesh, segment[s]) < _key(mesh, segment[best])):
+                    best = s
+                    gap = d
+        else:
+            for q in range(n_added):
+                s = added[q]
+                if segment[s] != NONE:
+                    d = _gap(xy, mesh, segment[s], x, y)
+                    if d < gap or (d == gap and _key(mesh, segment[s]) < _key(mesh, segment[best])):
+                        best = s
+                        gap = d
+        if best != before or before < 0:
+            bare_segment[i] = best
+            bare_gap[i] = gap
+            cost = _bare_cost(xy, g.z, mesh, segment[best], i, g.unit, g.nearest) if best >= 0 else np.inf
+            live.amount[BARE_ERROR] += cost - live.cost[i]
+            live.cost[i] = cost
 
 
 # ------------------------------------------------------------------------------------------------ operations
 
 
 @njit(cache=True, nogil=True)
-def _collect(live: Live, t: int) -> None:
-    """Take a triangle out of the books: its vertices into the pool, its error, its segments."""
+def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
+    """Take triangles out of the books: their vertices into the pool, their errors, their segments."""
     count = live.count
-    r = t >> 3
-    emitted = (live.kind[r] & EMITTED) != 0
-    i = live.head[r]
-    while i >= 0:
-        live.pool[count[N_POOL]] = i
-        count[N_POOL] += 1
-        if not emitted:
-            _forget_bare(live, i)
-        i = live.following[i]
-    live.head[r] = -1
-    if emitted:
-        live.amount[COVERED_ERROR] -= live.subtotal[r]
-        live.subtotal[r] = 0.0
-        count[N_EMITTED] -= 1
-        for k in range(3):
-            v = live.mesh[t + k]
-            live.used[v] -= 1
-            live.touched[count[N_TOUCHED]] = v
-            count[N_TOUCHED] += 1
-            if live.segment_of[_slot(t + k)] >= 0:
-                _set_segment(live, t + k, False)
-    live.kind[r] = 0
+    kind = live.kind
+    head = live.head
+    following = live.following
+    pool = live.pool
+    mesh = live.mesh
+    used = live.used
+    touched = live.touched
+    segment_of = live.segment_of
+    n_pool = count[N_POOL]
+    n_touched = count[N_TOUCHED]
+    for q in range(n):
+        t = triangles[q]
+        r = t >> 3
+        emitted = (kind[r] & EMITTED) != 0
+        i = head[r]
+        while i >= 0:
+            pool[n_pool] = i
+            n_pool += 1
+            if not emitted:
+                _forget_bare(live, i)
+            i = following[i]
+        head[r] = -1
+        kind[r] = 0
+        if emitted:
+            live.amount[COVERED_ERROR] -= live.subtotal[r]
+            live.subtotal[r] = 0.0
+            count[N_EMITTED] -= 1
+            for k in range(3):
+                v = mesh[t + k]
+                used[v] -= 1
+                touched[n_touched] = v
+                n_touched += 1
+                if segment_of[_slot(t + k)] >= 0:
+                    _set_segment(live, t + k, False)
+    count[N_POOL] = n_pool
+    count[N_TOUCHED] = n_touched
 
 
 @njit(cache=True, nogil=True)
@@ -539,8 +584,8 @@ def _settle_thin(g: Ground, live: Live, seed: int) -> None:
             for q in range(live.count[N_REGION]):
                 in_region = in_region or live.region[q] == t
             if not in_region:
-                _collect(live, t)
                 live.region[live.count[N_REGION]] = t
+                _collect(live, live.region[live.count[N_REGION] :], 1)
                 live.count[N_REGION] += 1
             bits = (bits | PEELED) if reaches else (bits & ~PEELED)
         kind[t >> 3] = bits
@@ -559,9 +604,19 @@ def _settle(g: Ground, live: Live) -> None:
     mesh = live.mesh
     kind = live.kind
     count = live.count
+    region = live.region
+    head = live.head
+    subtotal = live.subtotal
+    place = live.place
+    used = live.used
+    touched = live.touched
+    segment_of = live.segment_of
+    pool = live.pool
+    following = live.following
+    amount = live.amount
     any_thin = False
     for q in range(count[N_REGION]):
-        t = live.region[q]
+        t = region[q]
         a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
         if (a | b | c) > LAST_INDEX:
             kind[t >> 3] = 0
@@ -571,14 +626,14 @@ def _settle(g: Ground, live: Live) -> None:
             bits |= THIN
         kind[t >> 3] = bits
     for q in range(count[N_REGION]):
-        t = live.region[q]
+        t = region[q]
         any_thin = any_thin or (kind[t >> 3] & THIN) != 0
         for k in range(3):
             any_thin = any_thin or (kind[mesh[t + 4 + k] >> 3] & THIN) != 0
     if any_thin:
         n_first = count[N_REGION]
         for q in range(n_first):
-            t = live.region[q]
+            t = region[q]
             if kind[t >> 3] & THIN:
                 _settle_thin(g, live, t)
             for k in range(3):
@@ -586,35 +641,37 @@ def _settle(g: Ground, live: Live) -> None:
                 if kind[s >> 3] & THIN:
                     _settle_thin(g, live, s)
     for q in range(count[N_REGION]):
-        t = live.region[q]
-        live.head[t >> 3] = -1
-        live.subtotal[t >> 3] = 0.0
+        t = region[q]
+        head[t >> 3] = -1
+        subtotal[t >> 3] = 0.0
         emitted = (kind[t >> 3] & EMITTED) != 0
         for k in range(3):
             v = mesh[t + k]
             if v <= LAST_INDEX:
-                live.place[v] = t
+                place[v] = t
                 if emitted:
-                    live.used[v] += 1
-                    live.touched[count[N_TOUCHED]] = v
+                    used[v] += 1
+                    touched[count[N_TOUCHED]] = v
                     count[N_TOUCHED] += 1
         if emitted:
             count[N_EMITTED] += 1
     for q in range(count[N_REGION]):
-        t = live.region[q]
+        t = region[q]
         mine = (kind[t >> 3] & EMITTED) != 0
         for k in range(3):
             h = mesh[t + 4 + k]
             theirs = (kind[h >> 3] & EMITTED) != 0
-            _set_segment(live, t + k, mine and not theirs)
-            _set_segment(live, h, theirs and not mine)
+            if (segment_of[_slot(t + k)] >= 0) != (mine and not theirs):
+                _set_segment(live, t + k, mine and not theirs)
+            if (segment_of[_slot(h)] >= 0) != (theirs and not mine):
+                _set_segment(live, h, theirs and not mine)
     # The pooled vertices, each to the triangle that holds it (exactly), else to a ghost that it sees.
-    t = live.region[0] if count[N_REGION] > 0 else 0
+    t = region[0] if count[N_REGION] > 0 else 0
     for n in range(count[N_POOL]):
-        i = live.pool[n]
+        i = pool[n]
         found = False
         for q in range(-1, count[N_REGION]):
-            s = t if q < 0 else live.region[q]
+            s = t if q < 0 else region[q]
             a, b, c = mesh[s], mesh[s + 1], mesh[s + 2]
             if (a | b | c) > LAST_INDEX:
                 continue
@@ -629,19 +686,19 @@ def _settle(g: Ground, live: Live) -> None:
         if not found:
             t = locate(xy, mesh, t, xy[2 * i], xy[2 * i + 1], g.exact_area)
         r = t >> 3
-        live.place[i] = t
-        live.following[i] = live.head[r]
-        live.head[r] = i
+        place[i] = t
+        following[i] = head[r]
+        head[r] = i
         if kind[r] & EMITTED:
             d = _cost_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
-            live.subtotal[r] += d
-            live.amount[COVERED_ERROR] += d
+            subtotal[r] += d
+            amount[COVERED_ERROR] += d
         else:
             _note_bare(live, i)
     for n in range(count[N_TOUCHED]):
-        v = live.touched[n]
+        v = touched[n]
         if live.site[v]:
-            if live.used[v] == 0:
+            if used[v] == 0:
                 _note_bare(live, v)
             else:
                 _forget_bare(live, v)
@@ -656,28 +713,7 @@ def _settle(g: Ground, live: Live) -> None:
     count[N_TOUCHED] = 0
 
 
-@njit(cache=True, nogil=True)
-def _settle_bare(g: Ground, live: Live) -> None:
-    """Give the bare vertices their nearest segment again, where segments came, went or a vertex is new."""
-    count = live.count
-    for n in range(count[N_BARE]):
-        i = live.bare[n]
-        s = live.bare_segment[i]
-        if s < 0 or live.segment[s] == NONE:
-            live.bare_segment[i] = -1
-            for q in range(count[N_SEGMENTS]):
-                _try_segment(g, live, live.alive[q], i)
-        else:
-            for q in range(count[N_ADDED]):
-                if live.segment[live.added[q]] != NONE:
-                    _try_segment(g, live, live.added[q], i)
-        if live.bare_segment[i] != s or s < 0:
-            d = _bare_cost(g, live, i)
-            live.amount[BARE_ERROR] += d - live.cost[i]
-            live.cost[i] = d
-
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def _new_record(live: Live) -> int:
     count = live.count
     if count[N_FREE] > 0:
@@ -695,8 +731,7 @@ def insert(g: Ground, live: Live, p: int) -> None:
     count = live.count
     t0 = live.place[p]
     n_cavity, n_rim = _cavity(g.xy, mesh, t0, p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift)
-    for k in range(n_cavity):
-        _collect(live, live.cavity[k])
+    _collect(live, live.cavity, n_cavity)
     # p itself leaves the pool: it is a site now.
     n = 0
     for q in range(count[N_POOL]):
@@ -740,8 +775,7 @@ def remove(g: Ground, live: Live, p: int) -> bool:
     n_ears = _fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
     if n_ears == 0 or count[N_SITES] <= 3:
         return False
-    for k in range(m):
-        _collect(live, live.cavity[k])
+    _collect(live, live.cavity, m)
     live.pool[count[N_POOL]] = p
     count[N_POOL] += 1
     _forget_bare(live, p)
