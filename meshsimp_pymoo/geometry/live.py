@@ -820,33 +820,41 @@ def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
     xy = g.xy
     z = g.z
     mesh = live.mesh
-    m = _star(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
+    kind = live.kind
+    head = live.head
+    subtotal = live.subtotal
+    following = live.following
+    segment_of = live.segment_of
+    cavity = live.cavity
+    ring = live.ring
+    n_bare = live.count[N_BARE]
+    m = _star(mesh, live.place[p], p, cavity, live.rim, ring)
     plain = True
     for k in range(m):
-        t = live.cavity[k]
-        plain = plain and live.kind[t >> 3] == PLAIN
-        if live.count[N_BARE] > 0:
+        t = cavity[k]
+        plain = plain and kind[t >> 3] == PLAIN
+        if n_bare > 0:
             for e in range(3):
-                plain = plain and live.segment_of[_slot(t + e)] < 0
+                plain = plain and segment_of[_slot(t + e)] < 0
+    ears = live.ears
     n = 0
     if plain:
-        n = _fill(xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
+        n = _fill(xy, ring, m, live.edge, ears, live.ear_edges, g.exact_area, g.exact_lift)
         plain = n > 0
         for k in range(n):
-            a, b, c = live.ears[k, 0], live.ears[k, 1], live.ears[k, 2]
+            a, b, c = ears[k, 0], ears[k, 1], ears[k, 2]
             plain = plain and _is_inside(g, a, b, c) and not _is_thin(g, a, b, c)
     if not plain:
         return _done_and_undone(g, live, p)
     change = 0.0
-    ears = live.ears
     best = 0
     for k in range(-1, m):
         # The vertices of the star's triangles, and p itself.
         i = np.int64(p)
         if k >= 0:
-            r = live.cavity[k] >> 3
-            change -= live.subtotal[r]
-            i = np.int64(live.head[r])
+            r = cavity[k] >> 3
+            change -= subtotal[r]
+            i = np.int64(head[r])
         while i >= 0:
             for q in range(-1, n):
                 e = best if q < 0 else q
@@ -860,7 +868,7 @@ def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
                 if q == n - 1:
                     best = _nearest_ear(xy, ears, n, i)
             change += _cost_in(xy, z, ears[best, 0], ears[best, 1], ears[best, 2], i)
-            i = np.int64(live.following[i]) if k >= 0 else np.int64(-1)
+            i = np.int64(following[i]) if k >= 0 else np.int64(-1)
     return change, -2
 
 
@@ -902,38 +910,47 @@ def try_insert(g: Ground, live: Live, p: int) -> tuple[float, int]:
     xy = g.xy
     z = g.z
     mesh = live.mesh
+    kind = live.kind
+    head = live.head
+    subtotal = live.subtotal
+    following = live.following
+    segment_of = live.segment_of
+    cavity = live.cavity
+    ring = live.ring
+    rim = live.rim
+    n_bare = live.count[N_BARE]
     n_cavity, n_rim = _cavity(
-        xy, mesh, live.place[p], p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift
+        xy, mesh, live.place[p], p, cavity, rim, live.stack, g.exact_area, g.exact_lift
     )
     plain = True
     for k in range(n_cavity):
-        t = live.cavity[k]
-        plain = plain and live.kind[t >> 3] == PLAIN
-        if live.count[N_BARE] > 0:
+        t = cavity[k]
+        plain = plain and kind[t >> 3] == PLAIN
+        if n_bare > 0:
             for e in range(3):
-                plain = plain and live.segment_of[_slot(t + e)] < 0
+                plain = plain and segment_of[_slot(t + e)] < 0
     if plain:
         for k in range(n_rim):
-            h = live.rim[k]
+            h = rim[k]
             a = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
             b = mesh[h]
-            live.ring[k] = a
+            ring[k] = a
             plain = plain and _is_inside(g, a, b, p) and not _is_thin(g, a, b, p)
     if not plain:
         return _done_and_undone(g, live, p)
     change = 0.0
     best = 0
     for k in range(n_cavity):
-        r = live.cavity[k] >> 3
-        change -= live.subtotal[r]
-        i = np.int64(live.head[r])
+        r = cavity[k] >> 3
+        change -= subtotal[r]
+        i = np.int64(head[r])
         while i >= 0:
             if i != p:
                 # The fan's triangle whose two spokes have i between them; within half a turn there is just one.
                 for q in range(-1, n_rim):
                     e = best if q < 0 else q
-                    a = live.ring[e]
-                    b = live.ring[e + 1 if e + 1 < n_rim else 0]
+                    a = ring[e]
+                    b = ring[e + 1 if e + 1 < n_rim else 0]
                     if (
                         _side_area(xy, p, a, i) >= 0.0
                         and _side_area(xy, b, p, i) >= 0.0
@@ -942,11 +959,11 @@ def try_insert(g: Ground, live: Live, p: int) -> tuple[float, int]:
                         best = e
                         break
                     if q == n_rim - 1:
-                        best = _nearest_spoke(xy, live.ring, n_rim, p, i)
-                a = live.ring[best]
-                b = live.ring[best + 1 if best + 1 < n_rim else 0]
+                        best = _nearest_spoke(xy, ring, n_rim, p, i)
+                a = ring[best]
+                b = ring[best + 1 if best + 1 < n_rim else 0]
                 change += _cost_in(xy, z, a, b, p, i)
-            i = np.int64(live.following[i])
+            i = np.int64(following[i])
     return change, n_rim - n_cavity
 
 
