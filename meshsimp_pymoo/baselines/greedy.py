@@ -3,8 +3,8 @@
 Both give nested subsets, one of every size, so that a single pass is a whole front of (error, triangles):
 
 * *thinning* removes, again and again, the vertex whose removal adds the least to the exact error [1]_;
-* *greedy insertion* starts from the pinned vertices and inserts the worst vertex of all [2]_, or the worst vertex of the
-  triangle with the largest sum of errors [3]_.
+* *greedy insertion* starts from the pinned vertices and inserts the worst vertex of all [2]_, or the worst vertex of
+  the triangle with the largest sum of errors [3]_.
 
 References
 ----------
@@ -256,7 +256,7 @@ def _thin(
     for k in range(n // 2 - 1, -1, -1):
         _sift_down(heap, at, key, k, n)
     error[0] = _total(live)
-    triangles[0] = live.count[N_EMITTED]
+    triangles[0] = live.tally[N_EMITTED]
     n_removed = 0
     around = np.empty(len(live.ring), np.int64)
     while n > 0 and key[heap[0]] < np.inf:
@@ -275,7 +275,7 @@ def _thin(
         removed[n_removed] = v
         n_removed += 1
         error[n_removed] = _total(live)
-        triangles[n_removed] = live.count[N_EMITTED]
+        triangles[n_removed] = live.tally[N_EMITTED]
         if triangles[n_removed] == 0:
             # The last mesh was the smallest one there is.
             n_removed -= 1
@@ -295,14 +295,18 @@ def _thin(
 
 @njit(cache=True, nogil=True)
 def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
-    """The vertex of triangle t that deviates most, and by how much (-1: none deviates)."""
+    """Return the vertex of triangle t that deviates most, and by how much (-1: none deviates)."""
     mesh = live.mesh
     worst = -1
     most = 0.0
     i = live.head[t >> 3]
     emitted = (live.kind[t >> 3] & EMITTED) != 0
     while i >= 0:
-        d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i) if emitted else live.cost[i]
+        d = live.cost[i]
+        if emitted:
+            d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+        elif live.bare_segment[i] < 0:
+            d = 1.0  # there is no mesh yet; any vertex will do
         if d > most or (d == most and worst >= 0 and i < worst):
             most = d
             worst = i
@@ -321,11 +325,11 @@ def _grow(
     at = np.full(n_records, -1, np.int32)
     n = 0
     changed = np.empty(len(live.ring), np.int64)
-    n_changed = live.count[END] // RECORD
+    n_changed = live.tally[END] // RECORD
     for r in range(n_changed):
         changed[r] = r
     error[0] = _total(live)
-    triangles[0] = live.count[N_EMITTED]
+    triangles[0] = live.tally[N_EMITTED]
     n_inserted = 0
     while True:
         for k in range(n_changed):
@@ -338,7 +342,7 @@ def _grow(
                     urgency = 0.0
                     i = live.head[r]
                     while i >= 0:
-                        urgency += live.cost[i]
+                        urgency += live.cost[i] if live.bare_segment[i] >= 0 else 1.0
                         i = live.following[i]
             key[r] = -urgency if best[r] >= 0 else np.inf
             if at[r] < 0:
@@ -354,7 +358,7 @@ def _grow(
         inserted[n_inserted] = v
         n_inserted += 1
         error[n_inserted] = _total(live)
-        triangles[n_inserted] = live.count[N_EMITTED]
+        triangles[n_inserted] = live.tally[N_EMITTED]
         n_changed = _star(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
         for k in range(n_changed):
             changed[k] = np.int64(live.cavity[k]) // RECORD

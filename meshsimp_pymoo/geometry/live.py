@@ -1,10 +1,11 @@
 """A triangulation that lives: insert a vertex, remove one, move one, and know the exact change of the error.
 
-Every triangle keeps the list of the original vertices it covers and the sum of their costs. Inserting a vertex replaces the
-triangles whose circle holds it by a fan (Bowyer [1]_, Watson [2]_); removing one fills its star by Delaunay ears
-(Devillers [3]_). Only the vertices of the triangles replaced are looked at, so an operation, tried or done, costs what it
-touches and not N. The triangulation of a subset is unique (see :mod:`~meshsimp_pymoo.geometry.triangulation`), hence after any
-sequence of operations triangles and error are those of :func:`~meshsimp_pymoo.geometry.error.simplify` from scratch.
+Every triangle keeps the list of the original vertices it covers and the sum of their costs. Inserting a vertex replaces
+the triangles whose circle holds it by a fan (Bowyer [1]_, Watson [2]_); removing one fills its star by Delaunay ears
+(Devillers [3]_). Only the vertices of the triangles replaced are looked at, so an operation, tried or done, costs what
+it touches and not N. The triangulation of a subset is unique (see :mod:`~meshsimp_pymoo.geometry.triangulation`), hence
+after any sequence of operations triangles and error are those of :func:`~meshsimp_pymoo.geometry.error.simplify` from
+scratch.
 
 Where the outline is touched more has to be done: vertices that no triangle covers ("bare" ones) know the segment of the
 outline that is nearest to them; those whose segment goes look for another, and all compare with the segments that come.
@@ -43,7 +44,7 @@ NONE = 0xFFFFFFFF
 EMITTED, THIN, PEELED, INSIDE, VISITED = 1, 2, 4, 8, 16
 PLAIN = EMITTED | INSIDE
 
-# Entries of ``count``.
+# Entries of ``tally``.
 (
     END,
     N_FREE,
@@ -114,8 +115,8 @@ class Live(NamedTuple):
     edge: np.ndarray
     ears: np.ndarray  # (2 N, 3)
     ear_edges: np.ndarray  # (2 N, 3)
-    count: np.ndarray
-    amount: np.ndarray
+    tally: np.ndarray  # numbers of things, see the names above
+    amount: np.ndarray  # errors, see the names above
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -242,8 +243,8 @@ def _fill(
 ) -> int:
     """Triangulate the polygon ``ring`` (destroyed) by Delaunay ears; return their number, m - 2, or 0 if there is none.
 
-    Side i of the polygon has the number i, the third side of ear k the number m + k; ``ear_edges`` says which sides an ear
-    has, in the order of its vertices.
+    Side i of the polygon has the number i, the third side of ear k the number m + k; ``ear_edges`` says which sides an
+    ear has, in the order of its vertices.
     """
     for i in range(m):
         edge[i] = i
@@ -294,7 +295,7 @@ def _fill(
 
 @njit(cache=True, nogil=True, forceinline=True)
 def _cost_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) -> float:
-    """d_p of vertex i on the plane of triangle (a, b, c)."""  # noqa: D403
+    """d_p of vertex i on the plane of triangle (a, b, c)."""
     ax = xy[2 * a]
     ay = xy[2 * a + 1]
     ux = xy[2 * b] - ax
@@ -352,7 +353,7 @@ def _slot(h: int) -> int:
 @njit(cache=True, nogil=True)
 def _set_segment(live: Live, h: int, wanted: bool) -> None:
     """Make halfedge h an outline segment, or no longer one."""
-    count = live.count
+    count = live.tally
     s = live.segment_of[_slot(h)]
     if wanted and s < 0:
         if count[N_FREE_SEGMENTS] > 0:
@@ -384,8 +385,8 @@ def _forget_bare(live: Live, i: int) -> None:
     at = live.bare_at[i]
     if at < 0:
         return
-    live.count[N_BARE] -= 1
-    last = live.bare[live.count[N_BARE]]
+    live.tally[N_BARE] -= 1
+    last = live.bare[live.tally[N_BARE]]
     live.bare[at] = last
     live.bare_at[last] = at
     live.bare_at[i] = -1
@@ -396,9 +397,9 @@ def _forget_bare(live: Live, i: int) -> None:
 def _note_bare(live: Live, i: int) -> None:
     if live.bare_at[i] >= 0:
         return
-    live.bare_at[i] = live.count[N_BARE]
-    live.bare[live.count[N_BARE]] = i
-    live.count[N_BARE] += 1
+    live.bare_at[i] = live.tally[N_BARE]
+    live.bare[live.tally[N_BARE]] = i
+    live.tally[N_BARE] += 1
     live.bare_segment[i] = -1
     live.cost[i] = 0.0
 
@@ -473,9 +474,9 @@ def _settle_bare(g: Ground, live: Live) -> None:
     bare_gap = live.bare_gap
     added = live.added
     alive = live.alive
-    n_added = live.count[N_ADDED]
-    n_alive = live.count[N_SEGMENTS]
-    for n in range(live.count[N_BARE]):
+    n_added = live.tally[N_ADDED]
+    n_alive = live.tally[N_SEGMENTS]
+    for n in range(live.tally[N_BARE]):
         i = live.bare[n]
         x = xy[2 * i]
         y = xy[2 * i + 1]
@@ -503,7 +504,7 @@ def _settle_bare(g: Ground, live: Live) -> None:
         if best != before or before < 0:
             bare_segment[i] = best
             bare_gap[i] = gap
-            cost = _bare_cost(xy, g.z, mesh, segment[best], i, g.unit, g.nearest) if best >= 0 else np.inf
+            cost = _bare_cost(xy, g.z, mesh, segment[best], i, g.unit, g.nearest) if best >= 0 else 0.0
             live.amount[BARE_ERROR] += cost - live.cost[i]
             live.cost[i] = cost
 
@@ -514,7 +515,7 @@ def _settle_bare(g: Ground, live: Live) -> None:
 @njit(cache=True, nogil=True)
 def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
     """Take triangles out of the books: their vertices into the pool, their errors, their segments."""
-    count = live.count
+    count = live.tally
     kind = live.kind
     head = live.head
     following = live.following
@@ -581,12 +582,12 @@ def _settle_thin(g: Ground, live: Live, seed: int) -> None:
         bits = kind[t >> 3] & ~VISITED
         if ((bits & PEELED) != 0) != reaches:
             in_region = False
-            for q in range(live.count[N_REGION]):
+            for q in range(live.tally[N_REGION]):
                 in_region = in_region or live.region[q] == t
             if not in_region:
-                live.region[live.count[N_REGION]] = t
-                _collect(live, live.region[live.count[N_REGION] :], 1)
-                live.count[N_REGION] += 1
+                live.region[live.tally[N_REGION]] = t
+                _collect(live, live.region[live.tally[N_REGION] :], 1)
+                live.tally[N_REGION] += 1
             bits = (bits | PEELED) if reaches else (bits & ~PEELED)
         kind[t >> 3] = bits
     # Only now may the emitted bit follow: _collect has read it.
@@ -603,7 +604,7 @@ def _settle(g: Ground, live: Live) -> None:
     z = g.z
     mesh = live.mesh
     kind = live.kind
-    count = live.count
+    count = live.tally
     region = live.region
     head = live.head
     subtotal = live.subtotal
@@ -715,7 +716,7 @@ def _settle(g: Ground, live: Live) -> None:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def _new_record(live: Live) -> int:
-    count = live.count
+    count = live.tally
     if count[N_FREE] > 0:
         count[N_FREE] -= 1
         return live.free[count[N_FREE]]
@@ -728,7 +729,7 @@ def _new_record(live: Live) -> int:
 def insert(g: Ground, live: Live, p: int) -> None:
     """Insert vertex p, which is no site; its position must be free."""
     mesh = live.mesh
-    count = live.count
+    count = live.tally
     t0 = live.place[p]
     n_cavity, n_rim = _cavity(g.xy, mesh, t0, p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift)
     _collect(live, live.cavity, n_cavity)
@@ -770,7 +771,7 @@ def insert(g: Ground, live: Live, p: int) -> None:
 def remove(g: Ground, live: Live, p: int) -> bool:
     """Remove site p; return False, with nothing changed, if the others would span no triangle."""
     mesh = live.mesh
-    count = live.count
+    count = live.tally
     m = _star(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
     n_ears = _fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
     if n_ears == 0 or count[N_SITES] <= 3:
@@ -811,6 +812,9 @@ def remove(g: Ground, live: Live, p: int) -> bool:
 
 @njit(cache=True, nogil=True, forceinline=True)
 def _total(live: Live) -> float:
+    """Error of the mesh; inf where there is none."""
+    if live.tally[N_EMITTED] == 0:
+        return np.inf
     return live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
 
 
@@ -827,7 +831,7 @@ def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
     segment_of = live.segment_of
     cavity = live.cavity
     ring = live.ring
-    n_bare = live.count[N_BARE]
+    n_bare = live.tally[N_BARE]
     m = _star(mesh, live.place[p], p, cavity, live.rim, ring)
     plain = True
     for k in range(m):
@@ -874,7 +878,7 @@ def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
 
 @njit(cache=True, nogil=True)
 def _nearest_ear(xy: np.ndarray, ears: np.ndarray, n: int, i: int) -> int:
-    """The triangle that vertex i lies least outside of: for vertices on an edge, where rounding decides."""
+    """Find the triangle that vertex i lies least outside of: on an edge, where rounding decides."""
     best = 0
     least = -np.inf
     for e in range(n):
@@ -889,17 +893,17 @@ def _nearest_ear(xy: np.ndarray, ears: np.ndarray, n: int, i: int) -> int:
 @njit(cache=True, nogil=True)
 def _done_and_undone(g: Ground, live: Live, p: int) -> tuple[float, int]:
     before = _total(live)
-    n = live.count[N_EMITTED]
+    n = live.tally[N_EMITTED]
     if live.site[p]:
         if not remove(g, live, p):
             return np.inf, 0
         change = _total(live) - before
-        n = live.count[N_EMITTED] - n
+        n = live.tally[N_EMITTED] - n
         insert(g, live, p)
     else:
         insert(g, live, p)
         change = _total(live) - before
-        n = live.count[N_EMITTED] - n
+        n = live.tally[N_EMITTED] - n
         remove(g, live, p)
     return change, n
 
@@ -918,7 +922,7 @@ def try_insert(g: Ground, live: Live, p: int) -> tuple[float, int]:
     cavity = live.cavity
     ring = live.ring
     rim = live.rim
-    n_bare = live.count[N_BARE]
+    n_bare = live.tally[N_BARE]
     n_cavity, n_rim = _cavity(
         xy, mesh, live.place[p], p, cavity, rim, live.stack, g.exact_area, g.exact_lift
     )
@@ -987,7 +991,7 @@ def _build(
 ) -> bool:
     """Triangulate the sites from scratch and enter everything into the books."""
     mesh = live.mesh
-    count = live.count
+    count = live.tally
     end = triangulate(
         site_xy, len(sites), first, np.empty(0, np.int64), inserted, mesh, g.exact_area, g.exact_lift
     )
@@ -1063,8 +1067,8 @@ class LiveTriangulation:
     >>> live.error, live.triangles
     (3.0, 2)
     >>> ridge = np.flatnonzero(roof.points[:, 2] == 1.0)
-    >>> live.try_insert(ridge[1])          # the middle of the ridge alone halves the error of the others
-    (-1.0, 2)
+    >>> live.try_insert(ridge[1])          # one end of the ridge, and half of its middle, and one triangle more
+    (-1.5, 1)
     """
 
     def __init__(
@@ -1101,17 +1105,17 @@ class LiveTriangulation:
     @property
     def error(self) -> float:
         """The sum of d_p over all N vertices [model units]."""
-        return float(self.live.amount.sum()) if self.triangles else np.inf
+        return float(_total(self.live))
 
     @property
     def triangles(self) -> int:
         """The number of emitted triangles."""
-        return int(self.live.count[N_EMITTED])
+        return int(self.live.tally[N_EMITTED])
 
     @property
     def faces(self) -> np.ndarray:
         """The emitted triangles (M, 3) as rows of ``model.points``, the least row first, sorted."""
-        end = int(self.live.count[END])
+        end = int(self.live.tally[END])
         records = self.live.mesh[:end].reshape(-1, RECORD)[:, :3].astype(np.int64)
         records = records[(self.live.kind[: end // RECORD] & EMITTED) != 0]
         turn = records.argmin(axis=1)
@@ -1186,7 +1190,7 @@ class LiveTriangulation:
         insert(self.ground, self.live, new)
 
     def _site_at(self, v: int, *, kept: bool = False) -> int | None:
-        """The site (or with ``kept`` the first kept vertex) at the position of v, if there is one."""
+        """Return the site (or with ``kept`` the first kept vertex) at the position of v, if there is one."""
         if self._group is None:
             return None
         low, high = np.searchsorted(self._group, [self._group[v], self._group[v] + 1])
@@ -1258,7 +1262,7 @@ def make_live(n_vertices: int) -> Live:
         edge=np.empty(2 * n, np.int32),
         ears=np.empty((2 * n, 3), np.uint32),
         ear_edges=np.empty((2 * n, 3), np.int32),
-        count=np.zeros(13, np.int64),
+        tally=np.zeros(13, np.int64),
         amount=np.zeros(2, np.float64),
     )
 

@@ -1,0 +1,164 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.geometry.error import FOOTPRINTS, OUTSIDES, simplify
+from meshsimp_pymoo.geometry.live import LiveTriangulation
+from meshsimp_pymoo.geometry.load import SourceMesh, grid_source
+from meshsimp_pymoo.geometry.model import build_model
+
+
+def holey():
+    rng = np.random.default_rng(4)
+    elevation = rng.integers(0, 50, (9, 11)).astype(float)
+    elevation[3:6, 4:7] = np.nan
+    elevation[:4, 8:] = np.nan
+    return grid_source(elevation, 2.0, 3.0, name="holey")
+
+
+def turned_grid():
+    """A grid turned by 10 degrees: its hull is full of slivers that must be peeled."""
+    grid = grid_source(np.random.default_rng(0).random((6, 9)), 1.0, 1.0)
+    c, s = np.cos(np.pi / 18), np.sin(np.pi / 18)
+    return SourceMesh(grid.points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), grid.faces, {}, "turned")
+
+
+def cliff():
+    """Two vertices at one position, over a fan."""
+    points = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 5.0], [1, 1, 9.0], [0.5, 1, 2], [1.5, 1, 3]]
+    faces = [[0, 1, 4], [1, 7, 5], [7, 2, 5], [1, 2, 7], [2, 3, 5], [3, 6, 4], [6, 0, 4], [3, 0, 6]]
+    return SourceMesh(np.array(points, float), np.array(faces), {}, "cliff")
+
+
+SOURCES = {
+    "grid": lambda: load("roof:9"),
+    "terrain": lambda: load("jacksboro:30"),
+    "holey": holey,
+    "turned": turned_grid,
+    "face": lambda: load("face:150"),
+    "horseshoe": lambda: load("horseshoe:120"),
+    "cliff": cliff,
+}
+MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()}
+
+
+def assert_as_from_scratch(live, footprint, outside):
+    scratch = simplify(live.model, live.kept, footprint=footprint, outside=outside)
+    np.testing.assert_array_equal(live.faces, scratch.faces)
+    assert live.triangles == scratch.quality.triangles
+    scale = live.model.n_vertices * live.model.diagonal
+    assert live.error == pytest.approx(scratch.quality.error, rel=1e-9, abs=1e-12 * scale)
+
+
+class LiveMachine(RuleBasedStateMachine):
+    """Any sequence of operations ends where the from-scratch evaluation of the same subset is."""
+
+    @initialize(
+        name=st.sampled_from(sorted(MODELS)),
+        footprint=st.sampled_from(FOOTPRINTS),
+        outside=st.sampled_from(OUTSIDES),
+        share=st.floats(0, 1),
+        seed=st.integers(0, 1000),
+    )
+    def start(self, name, footprint, outside, share, seed):
+        self.model = MODELS[name]
+        self.rules = footprint, outside
+        kept = np.random.default_rng(seed).random(self.model.n_vertices) < share
+        kept[self.model.corners] = True
+        self.live = LiveTriangulation(self.model, kept, footprint=footprint, outside=outside)
+
+    def pick(self, choice, kept):
+        rows = np.flatnonzero(self.live.kept == kept)
+        rows = np.setdiff1d(rows, self.model.corners) if kept else rows
+        return int(rows[choice % len(rows)]) if len(rows) else None
+
+    def apply(self, tried, act):
+        error, triangles = self.live.error, self.live.triangles
+        expected = tried()
+        scale = self.model.n_vertices * self.model.diagonal
+        assert self.live.triangles == triangles
+        act()
+        if np.isfinite(error) and np.isfinite(self.live.error):
+            assert expected[0] == pytest.approx(self.live.error - error, rel=1e-9, abs=1e-11 * scale)
+            assert expected[1] == self.live.triangles - triangles
+
+    @rule(choice=st.integers(0, 10**6))
+    def insert(self, choice):
+        v = self.pick(choice, kept=False)
+        if v is not None:
+            self.apply(lambda: self.live.try_insert(v), lambda: self.live.insert(v))
+
+    @rule(choice=st.integers(0, 10**6))
+    def remove(self, choice):
+        v = self.pick(choice, kept=True)
+        if v is not None:
+            self.apply(lambda: self.live.try_remove(v), lambda: self.live.remove(v))
+
+    @rule(one=st.integers(0, 10**6), other=st.integers(0, 10**6))
+    def move(self, one, other):
+        v, w = self.pick(one, kept=True), self.pick(other, kept=False)
+        if v is not None and w is not None:
+            self.apply(lambda: self.live.try_move(v, w), lambda: self.live.move(v, w))
+
+    @precondition(lambda self: hasattr(self, "live"))
+    @invariant()
+    def equals_scratch(self):
+        if self.live.triangles:
+            assert_as_from_scratch(self.live, *self.rules)
+
+
+LiveMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+TestLive = LiveMachine.TestCase
+
+
+@pytest.mark.parametrize("name", ["terrain", "turned", "holey", "face"])
+def test_a_thousand_random_operations_do_not_drift(name):
+    model = MODELS[name]
+    rng = np.random.default_rng(1)
+    kept = rng.random(model.n_vertices) < 0.3
+    kept[model.corners] = True
+    live = LiveTriangulation(model, kept)
+    free = np.setdiff1d(np.arange(model.n_vertices), model.corners)
+    for _ in range(1000):
+        v = int(rng.choice(free))
+        (live.remove if live.kept[v] else live.insert)(v)
+    assert_as_from_scratch(live, "model", "nearest")
+
+
+def test_removing_everything_but_the_corners_and_putting_it_back_restores_the_mesh():
+    model = MODELS["grid"]
+    live = LiveTriangulation(model, np.ones(model.n_vertices, bool))
+    before = live.faces
+    free = np.setdiff1d(np.arange(model.n_vertices), model.corners)
+    for v in free:
+        live.remove(int(v))
+    assert live.triangles == 2
+    for v in np.random.default_rng(0).permutation(free):
+        live.insert(int(v))
+    np.testing.assert_array_equal(live.faces, before)
+    assert live.error == pytest.approx(0, abs=1e-9)
+
+
+def test_wrong_operations_are_refused_and_change_nothing():
+    model = MODELS["grid"]
+    live = LiveTriangulation(model, np.isin(np.arange(model.n_vertices), model.corners))
+    kept, dropped = int(model.corners[0]), int(np.setdiff1d(np.arange(81), model.corners)[0])
+    with pytest.raises(ValueError, match="kept already"):
+        live.insert(kept)
+    with pytest.raises(ValueError, match="is not kept"):
+        live.remove(dropped)
+    with pytest.raises(ValueError, match="vertex 81 is none of the 81"):
+        live.try_insert(81)
+    live.remove(kept)
+    with pytest.raises(ValueError, match="span no triangle"):
+        live.remove(int(model.corners[1]))
+    assert live.triangles == 1
+    with pytest.raises(ValueError, match="bool array"):
+        LiveTriangulation(model, np.ones(80, bool))
+    with pytest.raises(ValueError, match="span no triangle"):
+        LiveTriangulation(model, np.zeros(81, bool))
