@@ -20,9 +20,10 @@ from pymoo.optimize import minimize
 
 import meshsimp_pymoo
 from meshsimp_pymoo import MeshProblem, cli, nsga2_v1
+from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.results import read_front, write_mesh
+from meshsimp_pymoo.results import MESH_FORMATS, MESHES_BY_DEFAULT, read_front, write_mesh
 
 QUICK = ("--generations", "3", "--population", "12")
 
@@ -50,7 +51,7 @@ def one_line(capsys):
     return err
 
 
-# ------------------------------------------------------------------------------------------------------ the main job
+# -------------------------------------------------------------------------------------------------------- the main job
 
 
 def test_simplify_writes_a_front_that_reads_back_and_meshes_that_open(tmp_path, capsys):
@@ -99,7 +100,8 @@ def test_another_seed_gives_another_front(tmp_path):
 
 
 def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
-    options = ("--footprint", "hull", "--outside", "ignore", "--pin", "3,7", "--evaluations", "30", "--population", "12")
+    options = ("--footprint", "hull", "--outside", "ignore", "--pin", "3,7")
+    options += ("--evaluations", "30", "--population", "12")
     assert run("simplify", "roof:5", "-o", tmp_path / "out", *options) == 0
     record = json.loads((tmp_path / "out" / "run.json").read_text())
     assert record["settings"] == {
@@ -140,7 +142,7 @@ def test_the_budget_in_seconds_is_kept(tmp_path):
     assert time.perf_counter() - start < 8
 
 
-# ------------------------------------------------------------------------------------------------------ the mesh wanted
+# ----------------------------------------------------------------------------------------------------- the mesh wanted
 
 
 def chosen_row(folder, suffix="ply"):
@@ -157,7 +159,8 @@ def test_triangles_picks_the_most_accurate_that_is_small_enough(tmp_path, capsys
     row, quality = chosen_row(tmp_path / "out")
     assert quality["triangles"][row] <= 150
     assert quality["triangles"][row + 1] > 150
-    assert re.search(rf"chosen: .*chosen\.ply \(solution {row}\): {quality['triangles'][row]} triangles", capsys.readouterr().out)
+    said = rf"chosen: .*chosen\.ply \(solution {row}\): {quality['triangles'][row]} triangles"
+    assert re.search(said, capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("column", ["max_error", "mean_error"])
@@ -179,7 +182,8 @@ def test_the_knee_lies_below_the_line_between_the_ends(tmp_path):
 
 
 def test_a_front_of_one_solution_has_a_knee(tmp_path):
-    assert run("simplify", "plane:3", "-o", tmp_path / "out", "--pick", "knee", "--generations", 30, "--population", 20) == 0
+    options = ("--pick", "knee", "--generations", 30, "--population", 20)
+    assert run("simplify", "plane:3", "-o", tmp_path / "out", *options) == 0
     stored = read_front(tmp_path / "out")
     assert stored.F.tolist() == [[0, 2]]
     assert stored.run["chosen"] == 0
@@ -197,7 +201,10 @@ def test_a_target_that_was_not_reached_says_so_and_leaves_the_front(tmp_path, ca
     ("options", "message"),
     [
         (("--triangles", 1), r"--triangles 1 is impossible: roof:9 has 2 to 128 triangles"),
-        (("--triangles", 5, "--footprint", "hull", "--pin", "hull"), r"--triangles 5 is impossible: roof:9 has 30 to 128"),
+        (
+            ("--triangles", 5, "--footprint", "hull", "--pin", "hull"),
+            r"--triangles 5 is impossible: roof:9 has 30 to 128",
+        ),
         (("--triangles", 0), r"argument --triangles: '0' is not a whole number of at least 1"),
         (("--max-error", -1), r"--max-error.*"),
         (("--max-error", "nan"), r"argument --max-error: 'nan' is not a finite number"),
@@ -221,7 +228,7 @@ def test_an_error_below_that_of_the_whole_model_is_impossible(tmp_path, capsys):
     assert re.search(r"--max-error 0\.5 is impossible: .* reaches 3 \(all vertices\) to ", one_line(capsys))
 
 
-# ------------------------------------------------------------------------------------------------------ options
+# ------------------------------------------------------------------------------------------------------------- options
 
 
 @pytest.mark.parametrize("suffix", cli.FORMATS)
@@ -286,6 +293,11 @@ def test_the_front_of_a_closed_surface_is_cut_out_when_asked(tmp_path, capsys):
     assert mesh.vertices[:, 2].min() > -0.2
 
 
+def test_the_asked_number_of_threads_is_used():
+    args = cli._parser().parse_args(["simplify", "roof:5", "-o", "x", "--threads", "3"])
+    assert cli._mesh_problem(args).elementwise_runner.n_threads == 3
+
+
 def test_results_are_replaced_only_when_asked(tmp_path, capsys):
     assert run("simplify", "roof:5", "-o", tmp_path / "out", "--quiet", *QUICK) == 0
     before = files(tmp_path / "out")
@@ -329,7 +341,7 @@ def test_a_terminal_sees_progress(tmp_path, monkeypatch):
     assert "36 evaluations" in sys.stderr.getvalue()
 
 
-# ------------------------------------------------------------------------------------------------------ Ctrl-C
+# -------------------------------------------------------------------------------------------------------------- Ctrl-C
 
 
 def interrupt_after(monkeypatch, generations):
@@ -375,21 +387,25 @@ def test_an_interruption_while_writing_leaves_nothing_half_written(tmp_path, mon
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to one process")
 def test_ctrl_c_in_a_real_shell_keeps_the_front(tmp_path):
-    command = [sys.executable, "-m", "meshsimp_pymoo.cli", "simplify", "face:2000", "-o", str(tmp_path / "out"), "--time", "10min"]
+    command = [sys.executable, "-m", "meshsimp_pymoo.cli", "simplify", "face:2000", "--time", "10min"]
+    command += ["-o", str(tmp_path / "out")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         time.sleep(6)
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=60)
     assert process.returncode == 130, err
     assert "Traceback" not in err
     assert len(read_front(tmp_path / "out").F) > 10
 
 
-# ------------------------------------------------------------------------------------------------------ bad input
+# ----------------------------------------------------------------------------------------------------------- bad input
 
 
 ROOF = load("roof:5")
-BINARY_HEADER = b"ply\nformat binary_little_endian 1.0\nelement vertex 100\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+BINARY_HEADER = (
+    b"ply\nformat binary_little_endian 1.0\nelement vertex 100\n"
+    b"property float x\nproperty float y\nproperty float z\nend_header\n"
+)
 
 
 def text_ply(points, faces):
@@ -418,11 +434,14 @@ BAD_FILES = {
     "empty": (b"", r"bad\.ply: is empty"),
     "text": (b"Dear reviewer,\n", r"bad\.ply: "),
     "truncated": (BINARY_HEADER + bytes(500), r"bad\.ply: "),
-    "nan": (text_ply(changed(7, [0, float("nan"), 0]), ROOF.faces), r"bad\.ply: 1 of 25 vertices have NaN or infinite"),
-    "infinite": (text_ply(changed(7, [0, float("inf"), 0]), ROOF.faces), r"bad\.ply: 1 of 25 vertices have NaN or inf"),
+    "nan": (text_ply(changed(7, [0, float("nan"), 0]), ROOF.faces), r"bad\.ply: 1 of 25 vertices have NaN"),
+    "infinite": (
+        text_ply(changed(7, [0, float("inf"), 0]), ROOF.faces),
+        r"bad\.ply: 1 of 25 vertices have NaN or infinite",
+    ),
     "three vertices": (text_ply(ROOF.points[:3], [[0, 1, 2]]), r"bad\.ply: has 3 vertices; at least 4"),
     "collinear": (text_ply([[k, 2 * k, 3 * k] for k in range(4)], [[0, 1, 2], [1, 2, 3]]), r"bad\.ply: .* line"),
-    "past the end": (text_ply(ROOF.points, [*ROOF.faces.tolist(), [0, 1, 25]]), r"bad\.ply: 1 of 33 faces name vertices"),
+    "past the end": (text_ply(ROOF.points, [*ROOF.faces.tolist(), [0, 1, 25]]), r"bad\.ply: 1 of 33 faces name"),
     "closed": (text_ply(BOX.vertices, BOX.faces), r"bad\.ply: .*closed.*--patch front"),
     "non-manifold": (
         text_ply([*ROOF.points.tolist(), [0, 0, 9]], [*ROOF.faces.tolist(), [0, 6, 25], [6, 0, 25]]),
@@ -449,7 +468,10 @@ def test_a_bad_file_is_answered_with_its_name_the_cause_and_the_way_out(tmp_path
     ("model", "message"),
     [
         ("missing.ply", r"missing\.ply: no such file"),
-        ("jaksboro:11", r"jaksboro:11: no such file, and no built-in model of that name \(did you mean 'jacksboro'\?\)"),
+        (
+            "jaksboro:11",
+            r"jaksboro:11: no such file, and no built-in model of that name \(did you mean 'jacksboro'\?\)",
+        ),
         ("roof:4", r"roof:4: side is 4; it must be a power of two plus one"),
         ("face:10", r"face:10: vertices is 10; it must be 60 to"),
     ],
@@ -481,7 +503,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(tmp_path, capsy
         (("--footprint", "box"), r"invalid choice: 'box'"),
         (("--up", "sideways"), r"'sideways' is no direction"),
         (("--pin", "0,here"), r"'here' is not a whole number of at least 0"),
-        (("--pin", "25"), r"pin: row 25 of roof:5 is not among the 25 vertices"),
+        (("--pin", "25"), r"pin: row 25 of roof:5 is not among"),
         (("--spacing", "0"), r"'0' is not one or two positive numbers"),
         (("--spacing", "2"), r"roof:5: spacing and nodata describe height grids"),
         (("--nodata", "x"), r"'x' is not a finite number"),
@@ -527,7 +549,14 @@ def test_anything_unexpected_keeps_its_traceback(tmp_path, monkeypatch):
 def test_info_says_what_a_model_is(roof_ply, capsys):
     assert run("info", roof_ply) == 0
     out = capsys.readouterr().out
-    for line in (r"vertices +25", r"triangles +32", r"extent +2 x 2 x 1 ", r"up +0, 0, 1", r"border +16 edges, 1 ", "usable"):
+    for line in (
+        r"vertices +25",
+        r"triangles +32",
+        r"extent +2 x 2 x 1 ",
+        r"up +0, 0, 1",
+        r"border +16 edges, 1 ",
+        "usable",
+    ):
         assert re.search(line, out), line
 
 
@@ -576,6 +605,12 @@ def test_the_version_is_that_of_the_installed_package(capsys):
     assert done.value.code == 0
     assert capsys.readouterr().out == f"meshsimp {installed}\n"
     assert meshsimp_pymoo.__version__ == installed
+
+
+def test_the_choices_offered_are_those_of_the_library():
+    assert cli.FORMATS == MESH_FORMATS
+    assert set(cli.ALGORITHMS) < set(PRESETS)
+    assert cli._parser().parse_args(["simplify", "roof", "-o", "x"]).meshes == MESHES_BY_DEFAULT
 
 
 def test_every_public_name_can_be_imported_and_plotting_waits_until_it_is_needed():

@@ -1,0 +1,561 @@
+"""Built-in models by name: nothing to download, known answers, any size.
+
+A model is named as in ``load("roof")``; a colon adds parameters, in a form that needs no quoting in a shell
+or in YAML::
+
+    jacksboro             the model with its defaults
+    jacksboro:11          its main parameter (here the stride, so every 11th post of the grid)
+    face:5000,seed=3      the main parameter, then others by name
+    face:vertices=5000    the main parameter by name
+
+``describe()`` lists all of them with their parameters, and ``meshsimp info NAME`` shows one.
+
+Two are real terrain from the sample data that matplotlib installs. The others are made here: surfaces whose
+whole front is known (``plane``, ``roof``, ``pyramid``), smooth and rough test surfaces, a synthetic scan of a
+face, and outlines with a hole or a bay. Everything is a pure function of the parameters, the scan noise
+included.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import math
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, grid_source, read_source
+
+__all__ = ["describe", "find_source", "load", "names"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+METRES_PER_DEGREE = 111_200.0  # of latitude, at the latitudes of both terrains (36 and 49 degrees north), to 0.05 %
+SPACING_STEP = (
+    1 / 1024
+)  # metres; grid spacings are multiples of it, so that row and column positions are exact in binary
+MAX_SIDE = 4097  # vertices per side of a square grid: 17 million vertices, beyond any use here
+MAX_SCATTERED = 2_000_000  # vertices of a scattered model; their first triangulation takes half a minute
+
+# Corners of a curved outline; far more than the vertices on it, so that no three of those lie on a line.
+OUTLINE_SAMPLES = 24_000
+
+# The R2 low-discrepancy sequence (M. Roberts, 2018): with the plastic number, the first n points of it cover
+# a square evenly for every n, which gives a model of exactly the wanted number of vertices without clumps.
+PLASTIC_NUMBER = 1.324717957244746
+
+
+def load(name: str, /, **parameters: float) -> SourceMesh:
+    """Make the built-in model of this name.
+
+    Parameters
+    ----------
+    name : str
+        A name out of :func:`names`, optionally followed by parameters: ``"jacksboro:11"``,
+        ``"face:5000,seed=3"``.
+    **parameters : int or float
+        The same parameters by keyword; they win over those spelled in the name.
+
+    Returns
+    -------
+    SourceMesh
+        Its ``name`` is the spelled name with the parameters in effect where they differ from the defaults.
+
+    Raises
+    ------
+    ModelError
+        If there is no such model (the nearest name is suggested), or a parameter does not exist or is out of
+        range.
+
+    Examples
+    --------
+    Two roof planes that meet in a ridge, 17 vertices a side:
+
+    >>> roof = load("roof:17")
+    >>> roof.points.shape, float(roof.points[:, 2].max())
+    ((289, 3), 1.0)
+    """
+    base, _, spelled = name.partition(":")
+    make = _MODELS.get(base)
+    if make is None:
+        raise ModelError(_unknown(name, base))
+    known = inspect.signature(make).parameters
+    given = _spelled_parameters(name, base, spelled, known) | parameters
+    for key, value in given.items():
+        if key not in known:
+            raise ModelError(f"{name}: no parameter {key!r}{_suggestion(key, known)}; {base} takes {', '.join(known)}")
+        given[key] = _number(name, key, value, known[key])
+    try:
+        source = make(**given)
+    except ValueError as problem:
+        raise ModelError(f"{name}: {problem}") from None
+    changed = {key: given[key] for key in known if key in given and given[key] != known[key].default}
+    full_name = base
+    if changed:
+        main = next(iter(known))
+        full_name += ":" + ",".join(f"{v}" if k == main else f"{k}={v}" for k, v in changed.items())
+    return replace(source, name=full_name)
+
+
+def names() -> list[str]:
+    """Return the names of the built-in models.
+
+    Examples
+    --------
+    >>> "jacksboro" in names()
+    True
+    """
+    return list(_MODELS)
+
+
+def describe() -> dict[str, str]:
+    """Return one line about each built-in model: its name with all parameters and defaults, and what it is.
+
+    Examples
+    --------
+    >>> describe()["plane"]
+    'plane:side=9 - a tilted plane; 2 triangles are exact, so the front is that one point'
+    """
+    lines = {}
+    for name, make in _MODELS.items():
+        parameters = inspect.signature(make).parameters.values()
+        spelled = ",".join(f"{p.name}={p.default}" for p in parameters)
+        summary = (make.__doc__ or "").strip().splitlines()[0]
+        lines[name] = f"{name}:{spelled} - {summary.removeprefix('Return ').rstrip('.')}"
+    return lines
+
+
+def find_source(
+    model: str | os.PathLike[str],
+    *,
+    spacing: float | tuple[float, float] | None = None,
+    nodata: float | None = None,
+) -> SourceMesh:
+    """Read the file of this name or, where there is none, make the built-in model of this name.
+
+    Parameters
+    ----------
+    model : str or path
+        A mesh or grid file, or the name of a built-in model. A file wins over a built-in model of the same
+        name.
+    spacing, nodata : optional
+        Passed on to :func:`~meshsimp_pymoo.geometry.load.read_source`; for files only.
+
+    Raises
+    ------
+    ModelError
+        If there is neither, or the file cannot be used.
+    """
+    text = os.fspath(model)
+    looks_like_file = bool(Path(text.partition(":")[0]).suffix) or os.sep in text or "/" in text
+    if Path(text).exists() or looks_like_file or isinstance(model, Path):
+        return read_source(Path(text), spacing=spacing, nodata=nodata)
+    source = load(text)
+    if spacing is not None or nodata is not None:
+        raise ModelError(f"{text}: spacing and nodata describe height grids in files; a built-in model has its own")
+    return source
+
+
+# -------------------------------------------------------------------------------------------------------- real terrain
+
+
+def _jacksboro(stride: int = 1, vertices: int = 0, seed: int = 1) -> SourceMesh:
+    """Return real terrain in metres (Jacksboro fault): every stride-th post, or that many scattered ones."""
+    with np.load(_sample_data("jacksboro_fault_dem.npz"), allow_pickle=False) as file:
+        elevation = file["elevation"].astype(np.float64)
+        middle = math.radians(0.5 * float(file["ymin"] + file["ymax"]))
+        dx = float(file["dx"]) * METRES_PER_DEGREE * math.cos(middle)
+        dy = float(file["dy"]) * METRES_PER_DEGREE
+    return _terrain(elevation, dx, dy, stride, vertices, seed)
+
+
+def _topobathy(stride: int = 1, vertices: int = 0, seed: int = 1) -> SourceMesh:
+    """Return land and sea floor in metres (Juan de Fuca): every stride-th post, or that many scattered."""
+    with np.load(_sample_data("topobathy.npz"), allow_pickle=False) as file:
+        elevation = file["topo"][::-1].astype(np.float64)  # the file begins in the south
+        longitude, latitude = file["longitude"].astype(np.float64), file["latitude"].astype(np.float64)
+    # Its rows lie evenly in Mercator's projection, whose scale is the same in both directions; true at mid
+    # latitude.
+    side = METRES_PER_DEGREE * math.cos(math.radians(float(latitude.mean()))) * float(np.diff(longitude).mean())
+    return _terrain(elevation, side, side, stride, vertices, seed)
+
+
+def _sample_data(file: str) -> Path:
+    from matplotlib.cbook import get_sample_data
+
+    path = Path(get_sample_data(file, asfileobj=False))
+    if not path.is_file():
+        raise ModelError(
+            f"{path} is missing; reinstall matplotlib with its sample data (some Linux packages leave them out)"
+        )
+    return path
+
+
+def _terrain(elevation: FloatArray, dx: float, dy: float, stride: int, vertices: int, seed: int) -> SourceMesh:
+    rows, cols = elevation.shape
+    if not 1 <= stride < min(rows, cols):
+        raise ValueError(
+            f"stride is {stride}; a grid of {rows} x {cols} posts can be read at 1 to {min(rows, cols) - 1}"
+        )
+    dx, dy = (max(1, round(step / SPACING_STEP)) * SPACING_STEP * stride for step in (dx, dy))
+    source = grid_source(elevation[::stride, ::stride], dx, dy)
+    if not vertices:
+        return source
+    # Scattered vertices of the grid, its corners among them: a surveyed terrain of any N.
+    points = source.points
+    _check_range("vertices", vertices, 4, len(points))
+    x, y = points[:, 0], points[:, 1]
+    corner = np.flatnonzero(np.isin(x, (x.min(), x.max())) & np.isin(y, (y.min(), y.max())))
+    others = np.setdiff1d(np.arange(len(points)), corner)
+    chosen = np.random.default_rng(seed).choice(others, size=vertices - 4, replace=False)
+    points = points[np.sort(np.concatenate([corner, chosen]))]
+    return SourceMesh(points, _delaunay(points[:, :2]), {}, name="terrain", up="z")
+
+
+# ----------------------------------------------------------------------------------------- square grids, known answers
+
+
+def _plane(side: int = 9) -> SourceMesh:
+    """Return a tilted plane; 2 triangles are exact, so the front is that one point."""
+    return _square(side, lambda x, y: 0.25 * x + 0.5 * y, exact=True)
+
+
+def _roof(side: int = 17) -> SourceMesh:
+    """Return two planes that meet in a ridge; 4 triangles are exact, 2 have the error side (side - 1) / 2."""
+    return _square(side, lambda x, y: 1.0 - np.abs(x), exact=True)
+
+
+def _pyramid(side: int = 17) -> SourceMesh:
+    """Return four planes meeting in an apex; 4 triangles are exact, 2 have the error side (side - 2) / 3."""
+    return _square(side, lambda x, y: 1.0 - np.maximum(np.abs(x), np.abs(y)), exact=True)
+
+
+def _saddle(side: int = 33) -> SourceMesh:
+    """Return a hyperbolic paraboloid, x y: curved everywhere, straight along its grid lines."""
+    return _square(side, lambda x, y: x * y, exact=True)
+
+
+def _peaks(side: int = 33) -> SourceMesh:
+    """Return three hills and three hollows on a plain, the usual smooth test surface."""
+
+    def height(x: FloatArray, y: FloatArray) -> FloatArray:
+        u, v = 3 * x, 3 * y
+        return (
+            3 * (1 - u) ** 2 * np.exp(-(u**2) - (v + 1) ** 2)
+            - 10 * (u / 5 - u**3 - v**5) * np.exp(-(u**2) - v**2)
+            - np.exp(-((u + 1) ** 2) - v**2) / 3
+        ) / 8
+
+    return _square(side, height)
+
+
+def _ridge(side: int = 33) -> SourceMesh:
+    """Return a sharp crest that winds across a valley: long thin triangles along it pay off."""
+    return _square(side, lambda x, y: np.exp(-4 * np.abs(y - 0.35 * np.sin(3 * x) - 0.2 * x)))
+
+
+def _crater(side: int = 49) -> SourceMesh:
+    """Return a ring wall around a bowl with a central peak on a gentle slope."""
+
+    def height(x: FloatArray, y: FloatArray) -> FloatArray:
+        r = np.hypot(x - 0.1, y + 0.05)
+        wall = 0.35 * np.exp(-np.abs(r - 0.55) * np.where(r < 0.55, 9.0, 5.0))
+        bowl = -0.25 * np.clip(1 - (r / 0.5) ** 2, 0, None)
+        peak = 0.22 * np.clip(1 - r / 0.14, 0, None)
+        return wall + bowl + peak + 0.05 * x
+
+    return _square(side, height)
+
+
+def _square(side: int, height: Callable[[FloatArray, FloatArray], FloatArray], *, exact: bool = False) -> SourceMesh:
+    """Sample a height function on a square grid over [-1, 1] x [-1, 1]."""
+    _check_range("side", side, 3, MAX_SIDE)
+    if exact and (side - 1) & (side - 2):
+        below = 2 ** ((side - 2).bit_length() - 1) + 1
+        raise ValueError(
+            f"side is {side}; it must be a power of two plus one (say {below} or {2 * below - 1}), so that "
+            "every coordinate is exact"
+        )
+    step = 2.0 / (side - 1)
+    at = np.arange(side) * step
+    x, y = np.meshgrid(at - 1.0, 1.0 - at)
+    return grid_source(height(x, y), step, step, origin=(-1.0, 1.0))
+
+
+# -------------------------------------------------------------------------------------------------- scattered vertices
+
+
+def _face(vertices: int = 2500, seed: int = 1, noise: float = 0.08) -> SourceMesh:
+    """Return a synthetic scan of a face in millimetres, any number of vertices, with scan noise."""
+    outline = _closed_curve(_face_outline)
+    return _scattered(vertices, seed, noise, [outline], _face_relief)
+
+
+def _ring(vertices: int = 900, seed: int = 1, noise: float = 0.0) -> SourceMesh:
+    """Return a ring with a ripple on it: an outline with a hole, which must not be bridged."""
+    outer = _closed_curve(lambda t: (np.cos(t), np.sin(t)))
+    inner = _closed_curve(lambda t: (0.15 + 0.4 * np.cos(-t), 0.45 * np.sin(-t)))
+    return _scattered(vertices, seed, noise, [outer, inner], lambda x, y: 0.12 * np.sin(7 * x + 2 * y) + 0.1 * x * y)
+
+
+def _horseshoe(vertices: int = 900, seed: int = 1, noise: float = 0.0) -> SourceMesh:
+    """Return a horseshoe with bumps on it: a deeply concave outline, whose bay must not be bridged."""
+    turn = np.linspace(-0.25 * math.pi, 1.25 * math.pi, OUTLINE_SAMPLES // 4)
+    half = np.linspace(0, math.pi, OUTLINE_SAMPLES // 16)[1:-1]
+
+    def arc(radius: float, angle: FloatArray, centre: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
+        return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
+
+    first, last = (
+        (0.75 * np.cos(turn[0]), 0.75 * np.sin(turn[0])),
+        (0.75 * np.cos(turn[-1]), 0.75 * np.sin(turn[-1])),
+    )
+    outline = [
+        arc(1, turn),
+        arc(0.25, turn[-1] + half, last),
+        arc(0.5, turn[::-1]),
+        arc(0.25, turn[0] + math.pi + half, first),
+    ]
+    return _scattered(
+        vertices, seed, noise, [np.concatenate(outline)], lambda x, y: 0.1 * np.cos(6 * x) * np.sin(5 * y + x)
+    )
+
+
+def _face_outline(t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Outline of a face seen from the front [mm]: wide at the temples, narrow at the chin."""
+    x, y = np.cos(t), np.sin(t)
+    width = 72.0 * (1 + 0.05 * y - 0.10 * np.clip(-y, 0, None) ** 2)
+    return width * x, 104.0 * y - 2.0
+
+
+def _face_relief(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Height of the face above the picture plane [mm]; x to the right, y up, from between nose and eyes."""
+
+    def bump(cx: float, cy: float, sx: float, sy: float, power: float = 1.0) -> FloatArray:
+        return np.exp(-((((x - cx) / sx) ** 2 + ((y - cy) / sy) ** 2) ** power))
+
+    ax = np.abs(x)
+    head = 78.0 * np.sqrt(np.clip(1 - (x / 88.0) ** 2 - ((y - 4) / 128.0) ** 2, 0.02, None))
+    # The nose: a wedge that widens and rises from the root down to the tip, with wings and an underside.
+    down = np.clip((32.0 - y) / 56.0, 0, 1)  # 0 at the root, 1 at the tip
+    half_width = 6.0 + 7.5 * down
+    underside = 1 / (1 + np.exp(-(y + 29.5 - 0.15 * ax) / 2.6))
+    nose = (3.0 + 19.0 * down**1.3) * np.exp(-((ax / half_width) ** 2.4)) * underside * np.clip((40 - y) / 12, 0, 1)
+    nose += 5.5 * bump(0, -21, 8.5, 8.0)
+    nose += 6.0 * (bump(-13, -23, 5.5, 6.5) + bump(13, -23, 5.5, 6.5))
+    nose -= 4.0 * (bump(-6, -30.5, 3.6, 2.2) + bump(6, -30.5, 3.6, 2.2))
+    # Eyes: a socket, the lids over the ball, and the slit between them.
+    eyes = np.zeros_like(x)
+    for side in (-32.0, 32.0):
+        eyes -= 9.5 * bump(side * 0.97, 23, 17, 11)
+        eyes += 6.8 * bump(side, 21.5, 11.5, 7.5, 1.6)
+        u = (x - side) / 12.5
+        lid = np.clip(1 - u**2, 0, None)
+        for level, depth in ((21.5 + 4.6 * lid, 1.9), (21.5 - 3.6 * lid, 1.3)):
+            eyes -= depth * np.exp(-(((y - level) / 1.5) ** 2)) * (np.abs(u) < 1.0) * np.sqrt(lid)
+    # The brows follow a curve, lower at the root of the nose and at the temples.
+    arch = 38.0 + 4.5 * np.sin(np.clip(ax, 0, 62) / 62.0 * math.pi)
+    brow = 4.5 * np.exp(-(((y - arch) / 6.5) ** 2)) * np.exp(-(((ax - 30) / 24) ** 4))
+    # Mouth: two lips full in the middle, the line between them, the groove above and the hollow below.
+    u = x / 24.0
+    inside = np.clip(1 - u**2, 0, None)
+    line = -53.5 + 1.8 * u**2 - 0.8 * np.exp(-((x / 5.0) ** 2))
+    mouth = 5.5 * bump(0, -52, 34, 19)
+    mouth += 3.4 * np.exp(-(((y - line - 3.4 * inside) / 3.6) ** 2)) * inside**0.7
+    mouth += 4.4 * np.exp(-(((y - line + 4.6 * inside) / 4.4) ** 2)) * inside**0.7
+    mouth -= 3.2 * np.exp(-(((y - line) / 1.8) ** 2)) * inside**0.4
+    mouth -= 1.6 * np.exp(-((x / 3.4) ** 2)) * np.exp(-(((y + 40) / 6.5) ** 2))
+    mouth -= 3.0 * bump(0, -68, 18, 5.0)
+    cheeks = 5.0 * (bump(-43, -8, 19, 19) + bump(43, -8, 19, 19))
+    fold = -1.7 * np.exp(-(((ax - 20 - 0.45 * (-24 - y)) / 5.0) ** 2)) * np.exp(-(((y + 34) / 12) ** 2))
+    chin = 11.0 * bump(0, -84, 21, 13)
+    temples = -4.0 * (bump(-66, 40, 16, 26) + bump(66, 40, 16, 26))
+    return head + nose + eyes + brow + mouth + cheeks + fold + chin + temples
+
+
+def _closed_curve(curve: Callable[[FloatArray], tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Return a closed polygon (OUTLINE_SAMPLES, 2) along a curve of the angle 0 .. 2 pi."""
+    return np.column_stack(curve(np.linspace(0, 2 * math.pi, OUTLINE_SAMPLES, endpoint=False)))
+
+
+def _scattered(
+    vertices: int,
+    seed: int,
+    noise: float,
+    outlines: list[FloatArray],
+    height: Callable[[FloatArray, FloatArray], FloatArray],
+) -> SourceMesh:
+    """Scatter exactly that many vertices evenly but irregularly over a region and triangulate them inside it.
+
+    Parameters
+    ----------
+    vertices : int
+        Vertices in all, those on the outlines included.
+    seed : int
+        Of the sampling and of the noise.
+    noise : float
+        Standard deviation of the noise added to the heights [model units].
+    outlines : list of (k, 2) float arrays
+        The outer outline first, then the holes; dense closed polygons that do not cross.
+    height : callable
+        Height of the surface at (x, y) [model units].
+    """
+    _check_range("vertices", vertices, 60, MAX_SCATTERED)
+    if not 0 <= noise < math.inf:
+        raise ValueError(f"noise is {noise:g}; it must be 0 or more [model units]")
+    rng = np.random.default_rng(seed)
+    area = sum(_signed_area(polygon) * (1 if i == 0 else -1) for i, polygon in enumerate(map(_turned_left, outlines)))
+    gap = math.sqrt(area * 2 / math.sqrt(3) / vertices)  # edge of the equilateral triangles that would fill the region
+    border = [_evenly_along(polygon, gap, rng) for polygon in outlines]
+    rim = np.concatenate(border)
+    if len(rim) > vertices:
+        raise ValueError(f"vertices is {vertices}; the outline alone takes {len(rim)}")
+
+    low, extent = outlines[0].min(axis=0), np.ptp(outlines[0], axis=0)
+    start = rng.random(2)
+    inner = np.empty((0, 2))
+    tries = 1.05 * vertices * float(extent.prod()) / area
+    while len(inner) < vertices - len(rim):
+        k = np.arange(1, int(tries) + 1)[:, None]
+        even = low + extent * np.mod(start + k / PLASTIC_NUMBER ** np.array([1.0, 2.0]), 1.0)
+        inner = even[_inside(even, border) & ~_near(even, border, 0.45 * gap)]
+        tries *= 1.3
+    # The first points of the sequence are as even as all of them, so that the count can be cut to the wanted
+    # one.
+    inner = inner[: vertices - len(rim)]
+    inner = inner + rng.uniform(-0.12 * gap, 0.12 * gap, inner.shape)
+    xy = np.concatenate([rim, inner])
+    faces = _delaunay(xy)
+    centre = xy[faces].mean(axis=1)
+    on_rim = (faces < len(rim)).all(axis=1)
+    outside = np.zeros(len(faces), dtype=bool)
+    outside[on_rim] = ~_inside(centre[on_rim], border)
+    z = height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, 1.0, len(xy)) * noise
+    return SourceMesh(np.column_stack([xy, z]), faces[~outside], {}, name="scattered", up="z")
+
+
+def _evenly_along(polygon: FloatArray, gap: float, rng: np.random.Generator) -> FloatArray:
+    """Return points about ``gap`` apart on a closed polygon, irregular by a quarter of it."""
+    closed = np.concatenate([polygon, polygon[:1]])
+    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    count = max(8, round(length[-1] / gap))
+    at = (np.arange(count) + rng.uniform(-0.25, 0.25, count)) * (length[-1] / count) % length[-1]
+    at.sort()
+    return np.column_stack([np.interp(at, length, closed[:, axis]) for axis in (0, 1)])
+
+
+def _delaunay(xy: FloatArray) -> IntArray:
+    """Return the Delaunay triangles (T, 3) of points (n, 2), counter-clockwise."""
+    from scipy.spatial import Delaunay
+
+    faces = Delaunay(xy).simplices.astype(np.int64)
+    a, b, c = (xy[faces[:, k]] for k in range(3))
+    twice_area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    faces[twice_area < 0] = faces[twice_area < 0][:, [0, 2, 1]]
+    return faces[twice_area != 0]
+
+
+def _signed_area(polygon: FloatArray) -> float:
+    x, y = polygon.T
+    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def _turned_left(polygon: FloatArray) -> FloatArray:
+    return polygon if _signed_area(polygon) > 0 else polygon[::-1]
+
+
+def _inside(points: FloatArray, polygons: list[FloatArray]) -> npt.NDArray[np.bool_]:
+    """Tell from which points (n, 2) a ray to the right crosses an odd number of polygon edges."""
+    order = np.argsort(points[:, 1], kind="stable")
+    x, y = points[order].T
+    odd = np.zeros(len(points), dtype=bool)
+    for polygon in polygons:
+        start, end = polygon, np.roll(polygon, -1, axis=0)
+        ends = np.sort(np.searchsorted(y, [start[:, 1], end[:, 1]], side="left"), axis=0)
+        for (x0, y0), (x1, y1), first, last in zip(start, end, *ends, strict=True):
+            level = y[first:last]
+            odd[first:last] ^= x[first:last] < x0 + (level - y0) * (x1 - x0) / (y1 - y0)
+    inside = np.empty_like(odd)
+    inside[order] = odd
+    return inside
+
+
+def _near(points: FloatArray, polygons: list[FloatArray], distance: float) -> npt.NDArray[np.bool_]:
+    """Tell which points (n, 2) lie within a distance of the polygons' edges, each sampled at its thirds."""
+    from scipy.spatial import cKDTree
+
+    samples = [p + (np.roll(p, -1, axis=0) - p) * t for p in polygons for t in (0.0, 1 / 3, 2 / 3)]
+    found, _ = cKDTree(np.concatenate(samples)).query(points, distance_upper_bound=distance)
+    return np.isfinite(found)
+
+
+# ------------------------------------------------------------------------------------------------ names and parameters
+
+_MODELS: dict[str, Callable[..., SourceMesh]] = {
+    "jacksboro": _jacksboro,
+    "topobathy": _topobathy,
+    "face": _face,
+    "plane": _plane,
+    "roof": _roof,
+    "pyramid": _pyramid,
+    "saddle": _saddle,
+    "peaks": _peaks,
+    "ridge": _ridge,
+    "crater": _crater,
+    "ring": _ring,
+    "horseshoe": _horseshoe,
+}
+
+
+def _spelled_parameters(name: str, base: str, spelled: str, known: Any) -> dict[str, Any]:
+    given: dict[str, Any] = {}
+    if not spelled and not name.endswith(":"):
+        return given
+    for place, item in enumerate(spelled.split(",")):
+        key, equals, value = item.partition("=")
+        if not equals:
+            if place:
+                raise ModelError(f"{name}: {item!r} needs a name, as in {base}:{spelled.split(',')[0]},seed=2")
+            key, value = next(iter(known)), item
+        if key in given:
+            raise ModelError(f"{name}: {key} is given twice")
+        given[key] = value.strip()
+    return given
+
+
+def _number(name: str, key: str, value: Any, parameter: inspect.Parameter) -> float:
+    kind = type(parameter.default)
+    try:
+        number = kind(value)
+        if isinstance(value, bool) or float(value) != number:
+            raise ValueError
+    except (TypeError, ValueError, OverflowError):
+        wanted = "a whole number" if kind is int else "a number"
+        raise ModelError(f"{name}: {key} must be {wanted}, not {value!r}") from None
+    if key == "seed" and number < 0:
+        raise ModelError(f"{name}: seed must be 0 or more, not {number}")
+    return number
+
+
+def _check_range(key: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise ValueError(f"{key} is {value}; it must be {low} to {high}")
+
+
+def _suggestion(word: str, known: Any) -> str:
+    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def _unknown(name: str, base: str) -> str:
+    return (
+        f"{name}: no such file, and no built-in model of that name{_suggestion(base.lower(), _MODELS)}; "
+        f"built-in models: {', '.join(_MODELS)}"
+    )

@@ -1,0 +1,135 @@
+"""The whole report of an experiment, made anew from its stored results alone.
+
+::
+
+    OUT/findings.md                              the paper's claims, with verdicts and numbers
+    OUT/tables/BUDGET/SCORING/NAME.csv|md|tex    see `meshsimp_pymoo.report.tables`
+    OUT/tables/runs.csv, findings.csv            all runs, all verdicts
+    OUT/figures/BUDGET/SCORING/*.png             fronts_MODEL, hvr, cardinality, selected, meshes_MODEL
+    OUT/times.csv, times.md                      measured seconds, kept apart: never the same twice
+
+Tables and findings are the same bytes for the same runs. Each folder is made complete beside the old one, and
+then takes its place.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from meshsimp_pymoo.report import findings as verdicts
+from meshsimp_pymoo.report import tables
+from meshsimp_pymoo.report.study import Study, slug
+from meshsimp_pymoo.runs import ExperimentWarning, put_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["write_report", "write_tables"]
+
+
+def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, float, str], None] | None = None) -> Study:
+    """Write all tables, figures and findings of an experiment.
+
+    Parameters
+    ----------
+    out : path
+        The experiment's folder.
+    progress : callable, optional
+        Told (done, all, what is being done).
+
+    Returns
+    -------
+    Study
+        What the report is about.
+
+    Raises
+    ------
+    ResultError
+        If there is no experiment, or none of its runs is finished.
+    """
+    study = write_tables(out)
+    _write_figures(study, progress)
+    return study
+
+
+def write_tables(out: str | os.PathLike[str]) -> Study:
+    """Write the tables and findings of an experiment, without figures."""
+    study = Study(out)
+    for what, items in (("missing", study.missing), ("damaged", study.damaged), ("without a mesh", study.empty)):
+        if items:
+            more = f" and {len(items) - 1} more" if len(items) > 1 else ""
+            warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=2)
+    found = []
+    with _replaced(study.out / "tables") as folder:
+        for budget in study.budgets:
+            for scoring in study.scorings:
+                if not study.compared(budget, scoring):
+                    continue
+                place = folder / slug(budget) / slug(scoring)
+                for make in (tables.scores, tables.coverage, tables.epsilon, tables.wilcoxon, tables.selected):
+                    tables.write_table(place, make(study, budget, scoring))
+                found += verdicts.findings(study, budget, scoring)
+            meshlab = tables.meshlab(study, budget)
+            if meshlab is not None:
+                tables.write_table(folder / slug(budget), meshlab)
+        tables.write_table(folder, verdicts.table(found))
+        (folder / "runs.csv").write_text(tables.runs(study).csv(), encoding="utf-8")
+    put_text(study.out / "findings.md", verdicts.page(study, found))
+    put_text(study.out / "times.csv", tables.times(study).csv())
+    put_text(study.out / "times.md", verdicts.times_page(study))
+    return study
+
+
+def _write_figures(study: Study, progress: Callable[[float, float, str], None] | None) -> None:
+    from meshsimp_pymoo.report import comparison_figures as figures
+
+    drawings: list[tuple[str, Callable[[], Figure]]] = []
+    for place, budget in enumerate(study.budgets):
+        for scoring in study.scorings:
+            cases = study.compared(budget, scoring)
+            if not cases:
+                continue
+            where = f"{slug(budget)}/{slug(scoring)}"
+            for case in cases:
+                name = slug(case.problem.name)
+                drawings.append((f"{where}/fronts_{name}.png", partial(figures.fronts_figure, study, case)))
+                if place == 0:  # meshes look much the same at every budget
+                    drawings.append((f"{where}/meshes_{name}.png", partial(figures.meshes_figure, study, case)))
+            for indicator in ("hvr", "cardinality"):
+                drawings.append((f"{where}/{indicator}.png", partial(figures.box_figure, study, cases, indicator)))
+            drawings.append((f"{where}/selected.png", partial(figures.selected_figure, study, cases)))
+    with _replaced(study.out / "figures") as folder:
+        for done, (path, draw) in enumerate(drawings):
+            if progress is not None:
+                progress(done, len(drawings), path)
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            draw().savefig(folder / path)
+
+
+@contextmanager
+def _replaced(target: Path) -> Iterator[Path]:
+    """Yield a new folder that takes the place of an old one when it is complete."""
+    for leftover in target.parent.glob(f".{target.name}.*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+    unfinished = target.with_name(f".{target.name}.{secrets.token_hex(4)}.partial")
+    unfinished.mkdir()
+    try:
+        yield unfinished
+        if target.exists():
+            old = target.with_name(f".{target.name}.{secrets.token_hex(4)}.old")
+            target.rename(old)
+            unfinished.rename(target)
+            shutil.rmtree(old)
+        else:
+            unfinished.rename(target)
+    except BaseException:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise

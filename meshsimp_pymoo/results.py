@@ -1,0 +1,618 @@
+"""What a simplification leaves on disk: written whole or not at all, read back with every number checked.
+
+::
+
+    OUT/front.csv      one row per solution, sorted by triangles; the columns are FRONT_COLUMNS
+    OUT/meshes/        007_412.ply is solution 7, of 412 triangles; see the column ``mesh``
+    OUT/chosen.ply     the solution that was asked for, if one was
+    OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
+    OUT/run.json       settings, seed, package versions, evaluations, seconds, hash of the model
+
+All but run.json (which holds the time taken) are the same bytes again for the same front. Floats are written
+with the fewest digits that read back to the same number. Everything is written to a hidden folder beside OUT,
+flushed to the disk and then renamed, so that OUT is either complete or absent.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import platform
+import secrets
+import shutil
+import warnings
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.geometry.load import ModelWarning
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.geometry.error import Quality
+    from meshsimp_pymoo.geometry.model import OpenModel
+
+__all__ = [
+    "FRONT_COLUMNS",
+    "MESHES_BY_DEFAULT",
+    "MESH_FORMATS",
+    "ResultError",
+    "StoredFront",
+    "claim_output",
+    "mesh_arrays",
+    "package_versions",
+    "read_front",
+    "write_front",
+    "write_mesh",
+]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.integer[Any]]
+BoolArray = npt.NDArray[np.bool_]
+
+FRONT_COLUMNS = (
+    "solution",
+    "error",
+    "triangles",
+    "vertices",
+    "mean_error",
+    "rms_error",
+    "max_error",
+    "uncovered",
+    "mesh",
+)
+INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
+MESH_FORMATS = ("ply", "obj", "stl", "off", "glb")
+SINGLE_PRECISION_FORMATS = ("stl", "glb")  # by their own definitions
+SINGLE_PRECISION_LOSS = 1e-6  # share of the model's diagonal; a larger shift of a vertex is worth a warning
+MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
+OWN_ENTRIES = (
+    "front.csv", "front.npz", "front.png", "run.json", "meshes",
+    "report.html", "tables", "figures", "times.csv",
+)  # fmt: skip
+PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
+
+# PLY has no 64-bit integers, no half floats and no booleans: such attributes are written in the next type
+# that holds them.
+PLY_TYPES = {
+    "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
+    "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
+}  # fmt: skip
+PLY_WIDER = {"b1": "u1", "f2": "f4", "i8": "f8", "u8": "f8"}
+PLY_COLORS = ("red", "green", "blue", "alpha")
+
+
+class ResultError(ValueError):
+    """An output folder cannot be used or does not hold what it should: one line with the way out."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFront:
+    """A front read back from its folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it was read.
+    quality : dict of str to (S,) array
+        The numbers of front.csv by column, sorted by triangles.
+    kept : (S, N) bool array
+        The chromosomes, in vector order.
+    source_index : (N,) int array
+        Row of each vertex in the model's file.
+    meshes : tuple of str
+        Path of each solution's mesh relative to the folder; empty where it was not written.
+    run : dict
+        The content of run.json.
+    """
+
+    folder: Path
+    quality: dict[str, npt.NDArray[Any]]
+    kept: BoolArray
+    source_index: IntArray
+    meshes: tuple[str, ...]
+    run: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def F(self) -> FloatArray:
+        """The objectives, (S, 2): error [model units] and triangles."""
+        return np.column_stack([self.quality["error"], self.quality["triangles"]]).astype(np.float64)
+
+
+def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Check, before any work, that results can be written to this folder; nothing is left behind.
+
+    Parameters
+    ----------
+    folder : path
+        The folder to be made. Missing parents are made when the results are written.
+    overwrite : bool
+        Accept a folder that holds results of this package already; they are replaced when the new ones are
+        complete.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ResultError
+        If it exists (or, with ``overwrite``, holds anything that is not ours), or cannot be made.
+    """
+    folder = Path(folder)
+    target = folder.resolve()
+    if target.exists() and not target.is_dir():
+        raise ResultError(f"{folder}: is a file; name a new folder")
+    if target.exists():
+        if not overwrite:
+            raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
+        foreign = sorted(e.name for e in target.iterdir() if e.name not in OWN_ENTRIES and e.stem != "chosen")
+        if foreign:
+            raise ResultError(
+                f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
+                "name another folder"
+            )
+    parent = target.parent
+    while not parent.exists():
+        parent = parent.parent
+    try:
+        _partial_folder(parent / target.name).rmdir()
+    except OSError as problem:
+        raise ResultError(
+            f"{folder}: cannot be written in {parent} ({problem.strerror}); name another folder"
+        ) from None
+    return folder
+
+
+def write_front(
+    folder: str | os.PathLike[str],
+    model: OpenModel,
+    quality: Sequence[Quality],
+    kept: BoolArray,
+    *,
+    faces: Callable[[int], IntArray] | None = None,
+    meshes: int | None = MESHES_BY_DEFAULT,
+    mesh_format: str = "ply",
+    chosen: int | None = None,
+    run: Mapping[str, Any] | None = None,
+    extra: Callable[[Path], None] | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write a front, its meshes and the record of its run to a new folder, all or nothing.
+
+    Parameters
+    ----------
+    folder : path
+        The folder to make; see :func:`claim_output`.
+    model : OpenModel
+        The original mesh.
+    quality : sequence of Quality, length S
+        The numbers of each solution, in any order; written sorted by triangles, then error.
+    kept : (S, N) bool array
+        The solutions in vector order.
+    faces : callable, optional
+        Triangles (M, 3) of the solution in this row of ``kept``, as indices in vector order. Needed for
+        meshes.
+    meshes : int or None
+        The most meshes to write; a longer front writes an even selection, its ends included. None writes all,
+        0 none.
+    mesh_format : str
+        One of MESH_FORMATS. PLY (binary, double precision) keeps every attribute; OBJ and OFF keep full
+        precision; STL and GLB are single precision by definition.
+    chosen : int, optional
+        Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
+    run : mapping, optional
+        What to record in run.json beside the package versions and the model.
+    extra : callable, optional
+        Called with the unfinished folder before it is put in place, to add files to it (a figure, say).
+    overwrite : bool
+        Replace results that exist.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ResultError
+        If the folder cannot be written.
+    ValueError
+        If the front is empty, holds a number that is not finite, or does not fit the model.
+    """
+    kept = np.asarray(kept, dtype=bool)
+    if len(quality) == 0:
+        raise ValueError("the front is empty; there is nothing to write")
+    if kept.shape != (len(quality), model.n_vertices):
+        raise ValueError(
+            f"kept has the shape {kept.shape}; {len(quality)} solutions of a model of {model.n_vertices} vertices "
+            f"need {(len(quality), model.n_vertices)}"
+        )
+    if mesh_format not in MESH_FORMATS:
+        raise ValueError(f"mesh_format is {mesh_format!r}; it must be one of {', '.join(MESH_FORMATS)}")
+    F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
+    if not np.isfinite(F).all():
+        raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
+    order = np.lexsort((F[:, 0], F[:, 1]))
+    with_mesh = set(_even_selection(len(order), meshes))
+    if (with_mesh or chosen is not None) and faces is None:
+        raise ValueError("meshes are asked for but no faces are given; pass faces= or meshes=0")
+
+    folder = claim_output(folder, overwrite=overwrite)
+    target = folder.resolve()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    partial = _partial_folder(target)
+    try:
+        digits = max(3, len(str(len(order) - 1)))
+        rows, shift = [], 0.0
+        if with_mesh:
+            (partial / "meshes").mkdir()
+        for solution, row in enumerate(order):
+            path = ""
+            if faces is not None and (solution in with_mesh or row == chosen):
+                arrays = mesh_arrays(model, faces(int(row)))
+                shift = max(shift, _single_precision_shift(arrays[0]))
+                if solution in with_mesh:
+                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{mesh_format}"
+                    write_mesh(partial / path, *arrays)
+                if row == chosen:
+                    write_mesh(partial / f"chosen.{mesh_format}", *arrays)
+            numbers = [_spelled(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
+            rows.append([str(solution), *numbers, path])
+        diagonal = float(np.linalg.norm(np.ptp(model.points, axis=0)))
+        if mesh_format in SINGLE_PRECISION_FORMATS and shift > SINGLE_PRECISION_LOSS * diagonal:
+            warnings.warn(
+                f"{model.name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
+                "[file units]; ply, obj and off keep them exactly",
+                ModelWarning,
+                stacklevel=2,
+            )
+        _write_csv(partial / "front.csv", rows)
+        packed = np.packbits(kept[order], axis=1)
+        _write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
+        record = dict(run or {}) | {
+            "model": {
+                "name": model.name,
+                "hash": model.hash,
+                "vertices": model.n_vertices,
+                "triangles": len(model.faces),
+                "up": model.up,
+            },
+            "solutions": len(order),
+            "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
+            "versions": package_versions(),
+        }
+        (partial / "run.json").write_text(
+            json.dumps(record, indent=2, default=_plain, allow_nan=False) + "\n", encoding="utf-8"
+        )
+        if extra is not None:
+            extra(partial)
+        _put_in_place(partial, target, folder, overwrite)
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+    return folder
+
+
+def read_front(folder: str | os.PathLike[str]) -> StoredFront:
+    """Read a front back and check that its files are whole and agree.
+
+    Parameters
+    ----------
+    folder : path
+        What :func:`write_front` wrote.
+
+    Raises
+    ------
+    ResultError
+        If a file is missing, damaged or contradicts another; the message names the file and what is wrong in
+        it.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ResultError(f"{folder}: no such folder")
+    quality, meshes = _read_csv(folder / "front.csv")
+    count = len(meshes)
+    F, packed, source_index = _read_npz(folder / "front.npz")
+    n = len(source_index)
+    if F.shape != (count, 2) or not (
+        np.array_equal(F[:, 0], quality["error"]) and np.array_equal(F[:, 1], quality["triangles"])
+    ):
+        raise ResultError(f"{folder / 'front.npz'}: its F is not that of front.csv; write the front again")
+    if packed.shape != (count, -(-n // 8)):
+        raise ResultError(
+            f"{folder / 'front.npz'}: kept has the shape {packed.shape}; {count} solutions of {n} vertices need "
+            f"{(count, -(-n // 8))}"
+        )
+    bits = np.unpackbits(packed, axis=1).astype(bool)
+    if bits[:, n:].any():
+        raise ResultError(f"{folder / 'front.npz'}: kept has bits set beyond the {n} vertices of the model")
+    kept = bits[:, :n]
+    too_few = np.flatnonzero(kept.sum(axis=1) < quality["vertices"])
+    if too_few.size:
+        raise ResultError(
+            f"{folder / 'front.npz'}: solution {too_few[0]} keeps {kept[too_few[0]].sum()} vertices, but "
+            f"front.csv says its mesh has {quality['vertices'][too_few[0]]}"
+        )
+    record = folder / "run.json"
+    try:
+        run = json.loads(record.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise ResultError(f"{record}: cannot be read ({_short(problem)})") from None
+    if not isinstance(run, dict) or run.get("solutions") != count:
+        raise ResultError(f"{record}: is not the record of this front of {count} solutions")
+    return StoredFront(folder, quality, kept, source_index, meshes, run)
+
+
+def mesh_arrays(
+    model: OpenModel, faces: IntArray
+) -> tuple[FloatArray, npt.NDArray[np.int64], dict[str, npt.NDArray[Any]]]:
+    """Return a simplified mesh in the file's own frame.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh.
+    faces : (M, 3) int array
+        Triangles as indices of the model's vertices in vector order.
+
+    Returns
+    -------
+    vertices : (V, 3) float array
+        The vertices that the triangles use, with the very coordinates of the file.
+    faces : (M, 3) int array
+        The triangles as indices of those.
+    attributes : dict of str to (V, ...) array
+        Colours and whatever else the file says of those vertices.
+    """
+    used, compact = np.unique(np.asarray(faces, dtype=np.int64), return_inverse=True)
+    attributes = {name: values[used] for name, values in model.attributes.items()}
+    return model.file_points[used], compact.reshape(-1, 3), attributes
+
+
+def write_mesh(
+    path: str | os.PathLike[str],
+    vertices: FloatArray,
+    faces: IntArray,
+    attributes: Mapping[str, npt.NDArray[Any]] | None = None,
+) -> None:
+    """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
+
+    Parameters
+    ----------
+    path : path
+        Ends in one of MESH_FORMATS.
+    vertices : (V, 3) float array
+        Coordinates; written in double precision (STL and GLB, by definition: single).
+    faces : (M, 3) int array
+        Triangles.
+    attributes : mapping of str to (V,) or (V, k) array, optional
+        ``color`` (uint8, 3 or 4 columns) goes to every format but STL and OFF, anything else to PLY only.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is not known.
+    """
+    path = Path(path)
+    attributes = dict(attributes or {})
+    suffix = path.suffix.lower().lstrip(".")
+    if suffix == "ply":
+        path.write_bytes(_ply_bytes(vertices, faces, attributes))
+        return
+    if suffix not in MESH_FORMATS:
+        raise ValueError(f"{path}: no such mesh format; write one of {', '.join(MESH_FORMATS)}")
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=attributes.get("color"), process=False)
+    options: dict[str, Any] = {}
+    if suffix in ("obj", "off"):
+        options["digits"] = 17  # significant digits that carry any double
+    if suffix == "obj":
+        options |= {"include_normals": False, "header": None}
+    written = mesh.export(file_type=suffix, **options)
+    path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))
+
+
+def package_versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that decide the results; absent ones are left out."""
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+def _even_selection(count: int, most: int | None) -> list[int]:
+    """Return at most ``most`` of the rows 0 .. count - 1, evenly spread, the ends included.
+
+    >>> _even_selection(5, None), _even_selection(5, 3), _even_selection(5, 0)
+    ([0, 1, 2, 3, 4], [0, 2, 4], [])
+    """
+    if most is None or most >= count:
+        return list(range(count))
+    if most < 0:
+        raise ValueError(f"meshes is {most}; it must be 0 or more")
+    return [int(row) for row in np.unique(np.rint(np.linspace(0, count - 1, most)).astype(int))]
+
+
+def _spelled(column: str, value: float) -> str:
+    return str(int(value)) if column in INT_COLUMNS else repr(float(value))
+
+
+def _write_csv(path: Path, rows: Sequence[Sequence[str]]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(FRONT_COLUMNS)
+        writer.writerows(rows)
+
+
+def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file, strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
+    if not rows or tuple(rows[0]) != FRONT_COLUMNS:
+        raise ResultError(f"{path}: its first line must be {','.join(FRONT_COLUMNS)}")
+    if len(rows) == 1:
+        raise ResultError(f"{path}: holds no solution")
+    columns: dict[str, npt.NDArray[Any]] = {}
+    for line, row in enumerate(rows[1:], start=2):
+        if len(row) != len(FRONT_COLUMNS):
+            raise ResultError(
+                f"{path}, line {line}: {len(row)} values instead of {len(FRONT_COLUMNS)}; the file is cut off"
+            )
+    for at, column in enumerate(FRONT_COLUMNS[:-1]):
+        kind = int if column in INT_COLUMNS else float
+        values = []
+        for line, row in enumerate(rows[1:], start=2):
+            try:
+                value = kind(row[at])
+                if not 0 <= value < float("inf"):
+                    raise ValueError
+            except ValueError:
+                raise ResultError(f"{path}, line {line}: {column} is {row[at]!r}") from None
+            values.append(value)
+        columns[column] = np.array(values, dtype=np.int64 if kind is int else np.float64)
+    if not np.array_equal(columns["solution"], np.arange(len(rows) - 1)):
+        raise ResultError(f"{path}: solutions are not numbered 0 to {len(rows) - 2}; a line is missing or out of place")
+    if (np.diff(columns["triangles"]) < 0).any():
+        line = int(np.argmax(np.diff(columns["triangles"]) < 0)) + 3
+        raise ResultError(f"{path}, line {line}: not sorted by triangles")
+    meshes = tuple(row[-1] for row in rows[1:])
+    for line, mesh in enumerate(meshes, start=2):
+        if mesh and (PurePosixPath(mesh).is_absolute() or ".." in PurePosixPath(mesh).parts):
+            raise ResultError(f"{path}, line {line}: mesh {mesh!r} is not inside the folder")
+    return columns, meshes
+
+
+def _write_npz(path: Path, **arrays: npt.NDArray[Any]) -> None:
+    """Write arrays as .npz without the time of writing, so that equal arrays give equal bytes."""
+    with zipfile.ZipFile(path, "w") as file:
+        for name, array in arrays.items():
+            content = io.BytesIO()
+            np.lib.format.write_array(content, np.ascontiguousarray(array), allow_pickle=False)
+            entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            file.writestr(entry, content.getvalue())
+
+
+def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            F, packed, source_index = file["F"], file["kept"], file["source_index"]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, TypeError) as problem:
+        raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
+    for name, array, kind, ndim in (
+        ("F", F, "f", 2),
+        ("kept", packed, "u", 2),
+        ("source_index", source_index, "i", 1),
+    ):
+        if array.dtype.kind != kind or array.ndim != ndim:
+            raise ResultError(
+                f"{path}: {name} has the type {array.dtype} and {array.ndim} dimensions; the file is not ours"
+            )
+    if packed.dtype != np.uint8:
+        raise ResultError(f"{path}: kept has the type {packed.dtype} instead of packed bits (uint8)")
+    if len(np.unique(source_index)) != len(source_index) or source_index.min(initial=0) < 0:
+        raise ResultError(f"{path}: source_index is not a list of different rows")
+    return F, packed, source_index
+
+
+def _ply_bytes(vertices: FloatArray, faces: IntArray, attributes: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """Return a binary PLY with double coordinates; trimesh's own writer stores single precision."""
+    vertices = np.asarray(vertices, dtype=np.float64)
+    columns: list[tuple[str, npt.NDArray[Any]]] = [(axis, vertices[:, k]) for k, axis in enumerate("xyz")]
+    for name, values in attributes.items():
+        kind = values.dtype.str[1:]
+        kind = PLY_WIDER.get(kind, kind)
+        if kind not in PLY_TYPES or values.ndim > 2 or len(values) != len(vertices):
+            raise ValueError(
+                f"attribute {name!r} of type {values.dtype} and shape {values.shape} does not fit into a PLY"
+            )
+        table = values.astype(kind).reshape(len(values), -1)
+        for k in range(table.shape[1]):
+            spelled = PLY_COLORS[k] if name == "color" else name if values.ndim == 1 else f"{name}_{k}"
+            columns.append((spelled, table[:, k]))
+    names = ["_".join(name.split()) for name, _ in columns]
+    record = np.empty(len(vertices), dtype=[(f"c{k}", f"<{c.dtype.str[1:]}") for k, (_, c) in enumerate(columns)])
+    for k, (_, column) in enumerate(columns):
+        record[f"c{k}"] = column
+    triangles = np.empty(len(faces), dtype=[("count", "u1"), ("index", "<i4", (3,))])
+    triangles["count"], triangles["index"] = 3, faces
+    properties = [f"property {PLY_TYPES[c.dtype.str[1:]]} {name}" for name, (_, c) in zip(names, columns, strict=True)]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(vertices)}",
+        *properties,
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    return "\n".join(header).encode("ascii") + record.tobytes() + triangles.tobytes()
+
+
+def _single_precision_shift(vertices: FloatArray) -> float:
+    return float(np.abs(vertices - vertices.astype(np.float32)).max(initial=0.0))
+
+
+def _partial_folder(target: Path) -> Path:
+    """Make a hidden folder beside the target, with the permissions that the user's folders usually get."""
+    partial = target.with_name(f".{target.name}.{secrets.token_hex(4)}.partial")
+    partial.mkdir()
+    return partial
+
+
+def _put_in_place(partial: Path, target: Path, folder: Path, overwrite: bool) -> None:
+    """Flush the finished folder to the disk and rename it to the target."""
+    for path in [*partial.rglob("*"), partial]:
+        _flush(path)
+    old = None
+    if overwrite and target.exists():
+        old = target.with_name(f".{target.name}.{secrets.token_hex(4)}.old")
+        target.rename(old)
+    try:
+        partial.rename(target)
+    except OSError as problem:
+        if old is not None:
+            old.rename(target)
+        raise ResultError(f"{folder}: cannot be put in place ({problem.strerror}); name another folder") from None
+    _flush(target.parent)
+    if old is not None:
+        shutil.rmtree(old)
+
+
+def _flush(path: Path) -> None:
+    if path.is_dir() and os.name == "nt":  # Windows cannot open folders
+        return
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise TypeError(f"a {type(value).__name__} cannot be recorded in run.json; pass numbers, texts, lists and mappings")
+
+
+def _short(problem: Exception) -> str:
+    text = getattr(problem, "strerror", None) or str(problem) or type(problem).__name__
+    return str(text).splitlines()[0]
