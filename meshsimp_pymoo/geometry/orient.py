@@ -115,6 +115,12 @@ def up_direction(source: SourceMesh, up: Up = "auto") -> FloatArray:
     areas = np.linalg.norm(normals, axis=1)
     total = normals.sum(axis=0)
     length = float(np.linalg.norm(total))
+    extent = float(np.ptp(source.points, axis=0).max())
+    if areas.sum() <= WIDTH_SHARE * extent**2:
+        raise ModelError(
+            f"{source.name}: all {len(source.points)} vertices lie on one line: the {len(source.faces)} faces have no "
+            "area; give a mesh that spans a surface"
+        )
     if length <= NET_AREA_SHARE * areas.sum():
         raise ModelError(
             f"{source.name}: faces all ways alike (net projected area "
@@ -248,6 +254,11 @@ class SurfaceFacts:
             return (
                 f"{self.name}: all {self.n_vertices} vertices lie on one line as seen from up (width "
                 f"{self.width_share:.2g} of the length); choose another viewing side with --up"
+            )
+        if self.vertical_faces == self.n_faces:
+            return (
+                f"{self.name}: all {self.n_faces} faces are seen edge-on from up, so there is no height field; "
+                "choose another viewing side with --up"
             )
         if self.nonmanifold_example is not None:
             a, b, count = self.nonmanifold_example
