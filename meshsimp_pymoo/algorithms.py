@@ -1,4 +1,4 @@
-"""The paper's algorithms, wired: functions that return pymoo algorithms with its operators and settings.
+"""The paper's algorithms, and a better one, wired: functions that return pymoo algorithms.
 
 =================== ============================================= ==================
 preset              algorithm                                     crossover
@@ -8,9 +8,10 @@ preset              algorithm                                     crossover
 `moead`             MOEA/D, Tchebycheff (Eq. 7), neighbourhood 20 uniform
 `weighted_ga_v1`    elitist GA on the weighted sum (Eq. 8)        uniform
 `weighted_ga_v2`    elitist GA on the weighted sum (Eq. 8)        OAX over L4
+`memetic`           not the paper's; thinning, local search (memetic)  half-plane
 =================== ============================================= ==================
 
-All start from random subsets of every size, cross with probability 0.8, mutate by `NeighbourShift` with
+The paper's all start from random subsets of every size, cross with probability 0.8, mutate by `NeighbourShift` with
 probability 1 / N, pin the corners and, except MOEA/D, eliminate duplicates. The paper gives each 50
 generations of 100; that is a termination which the caller passes (``minimize(problem, nsga2_v1(), ("n_gen",
 50), seed=1)``), and what the presets use when none is passed. Any other argument of the pymoo algorithm can
@@ -36,6 +37,7 @@ from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.util.display.column import Column
 from pymoo.util.display.output import Output
 
+from meshsimp_pymoo.memetic import memetic
 from meshsimp_pymoo.operators import (
     OAX,
     NeighbourShift,
@@ -166,6 +168,7 @@ PRESETS: dict[str, Callable[..., Any]] = {
     "moead": moead,
     "weighted_ga_v1": weighted_ga_v1,
     "weighted_ga_v2": weighted_ga_v2,
+    "memetic": memetic,
 }
 
 

@@ -176,7 +176,8 @@ def run_experiment(
         A new folder, or that of an earlier, perhaps interrupted call. Runs that are found there and that are
         asked for now are not done again; others are named, left there, and not used.
     jobs : int
-        Number of processes. With 1, everything is done in this one.
+        Number of processes. With 1, everything is done in this one. They are started anew, so in a script
+        the call has to stand under ``if __name__ == "__main__":``.
     folder : path, optional
         Where the model files are, in place of what the configuration says.
     progress : callable, optional

@@ -498,15 +498,16 @@ def evaluate_subsets(
         return table
     # Several parts a thread, since subsets differ in size.
     cuts = np.linspace(0, len(rows), min(4 * n_threads, len(rows)) + 1).astype(int)
-    list(_executor(n_threads).map(evaluate, [slice(a, b) for a, b in itertools.pairwise(cuts)]))
+    list(thread_pool(n_threads).map(evaluate, [slice(a, b) for a, b in itertools.pairwise(cuts)]))
     return table
 
 
 _executors: dict[int, ThreadPoolExecutor] = {}
 
 
-def _executor(n_threads: int) -> ThreadPoolExecutor:
-    """One pool of threads a process and size, so that the threads and their workspaces are made once."""
+def thread_pool(n_threads: int | None = None) -> ThreadPoolExecutor:
+    """Return one pool of threads a process and size, so that the threads and their workspaces are made once."""
+    n_threads = n_threads or os.cpu_count() or 1
     if n_threads not in _executors:
         _executors[n_threads] = ThreadPoolExecutor(n_threads, thread_name_prefix="meshsimp")
     return _executors[n_threads]

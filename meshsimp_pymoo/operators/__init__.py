@@ -6,31 +6,34 @@
 kind       name            class                    what it does
 ========== =============== ======================== ==========================================
 sampling   random_subset   `RandomSubset`           a random size, then a random subset of it
+sampling   nested          `NestedSubsets`          thinned subsets of all sizes
 crossover  uniform         `SubsetUniformCrossover` every gene from either parent
 crossover  oax             `OAX`                    segments by main effects, orthogonal array
+crossover  half_plane      `HalfPlaneCrossover`     the sides of a random line, exchanged
 mutation   neighbour_shift `NeighbourShift`         kept vertices move to neighbours
+mutation   relocation      `Relocation`             annealed moves of kept vertices
 repair     pinned_corners  `PinnedCorners`          pinned vertices are kept
 duplicates packed          `PackedDuplicates`       exact duplicates out, by hashing
 ========== =============== ======================== ==========================================
 
 All of them draw from pymoo's ``random_state`` alone, never change their input, and take from the problem only
-``pinned``, ``model.neighbours`` and ``n_var``.
+``pinned``, ``model`` and ``n_var`` (the thinning and annealing ones also its ``footprint`` and ``outside``).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from meshsimp_pymoo.operators.crossover import OAX, SubsetUniformCrossover
+from meshsimp_pymoo.operators.crossover import OAX, HalfPlaneCrossover, SubsetUniformCrossover
 from meshsimp_pymoo.operators.duplicates import PackedDuplicates
-from meshsimp_pymoo.operators.mutation import NeighbourShift
+from meshsimp_pymoo.operators.mutation import NeighbourShift, Relocation
 from meshsimp_pymoo.operators.repair import PinnedCorners
-from meshsimp_pymoo.operators.sampling import RandomSubset
+from meshsimp_pymoo.operators.sampling import NestedSubsets, RandomSubset
 
 OPERATORS: dict[str, dict[str, type[Any]]] = {
-    "sampling": {"random_subset": RandomSubset},
-    "crossover": {"uniform": SubsetUniformCrossover, "oax": OAX},
-    "mutation": {"neighbour_shift": NeighbourShift},
+    "sampling": {"random_subset": RandomSubset, "nested": NestedSubsets},
+    "crossover": {"uniform": SubsetUniformCrossover, "oax": OAX, "half_plane": HalfPlaneCrossover},
+    "mutation": {"neighbour_shift": NeighbourShift, "relocation": Relocation},
     "repair": {"pinned_corners": PinnedCorners},
     "duplicates": {"packed": PackedDuplicates},
 }
@@ -38,9 +41,12 @@ OPERATORS: dict[str, dict[str, type[Any]]] = {
 __all__ = [
     "OAX",
     "OPERATORS",
+    "HalfPlaneCrossover",
     "NeighbourShift",
+    "NestedSubsets",
     "PackedDuplicates",
     "PinnedCorners",
     "RandomSubset",
+    "Relocation",
     "SubsetUniformCrossover",
 ]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 
+from meshsimp_pymoo.operators.local_search import relocate_all
 from meshsimp_pymoo.operators.requirements import (
     mesh_neighbours,
     pinned_vertices,
@@ -75,6 +76,62 @@ class NeighbourShift(Mutation):
         for start in range(0, len(X), rows):
             shift_kept(shifted[start : start + rows], pinned, rate, neighbours, random_state)
         return shifted
+
+
+class Relocation(Mutation):
+    """Move kept vertices to better places by annealing on the live triangulation; the size stays.
+
+    A local search with a bounded effort whose result is inherited (Lamarckian): the child never has a larger
+    error than it came with. See :func:`~meshsimp_pymoo.operators.local_search.relocate` for a single move.
+
+    Parameters
+    ----------
+    moves_per_vertex : float
+        Moves to try for each kept vertex that is not pinned.
+    max_moves : int
+        Moves of all rows together; where there would be more, all rows get fewer. A move takes some
+        microseconds.
+    temperature : float
+        Initial temperature, in units of the error per kept vertex; 0 accepts improvements only.
+    prob : float
+        The probability of an individual to keep the result.
+
+    Raises
+    ------
+    ValueError
+        If one of the numbers is negative.
+    TypeError
+        When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
+    """
+
+    def __init__(
+        self,
+        moves_per_vertex: float = 30.0,
+        *,
+        max_moves: int = 300_000,
+        temperature: float = 0.2,
+        prob: float = 1.0,
+    ) -> None:
+        super().__init__(prob=prob)
+        given = {"moves_per_vertex": moves_per_vertex, "max_moves": max_moves, "temperature": temperature}
+        for name, value in given.items():
+            if not value >= 0:
+                raise ValueError(f"{name} = {value} is no number of at least 0")
+        self.moves_per_vertex = moves_per_vertex
+        self.max_moves = max_moves
+        self.temperature = temperature
+
+    def _do(
+        self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
+    ) -> NDArray[np.bool_]:
+        pinned = pinned_vertices(problem, self)
+        mesh_neighbours(problem, self)
+        require_bool(X, self)
+        moves = self.moves_per_vertex * (X & ~pinned).sum(axis=1)
+        total = moves.sum()
+        if total > self.max_moves:
+            moves = moves * (self.max_moves / total)
+        return relocate_all(problem, X, moves.astype(int), random_state, temperature=self.temperature)
 
 
 def shift_kept(

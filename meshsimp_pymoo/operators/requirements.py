@@ -39,6 +39,22 @@ def mesh_neighbours(problem: Any, operator: object) -> tuple[NDArray[np.integer]
     return indptr, indices
 
 
+def plane_coordinates(problem: Any, operator: object) -> NDArray[np.float64]:
+    """Return ``problem.model.xy``, the (N, 2) positions of the vertices in the plane.
+
+    Raises
+    ------
+    TypeError
+        If the problem has no mesh model.
+    """
+    pinned_vertices(problem, operator)
+    try:
+        xy: NDArray[np.float64] = problem.model.xy
+    except AttributeError:
+        raise TypeError(_not_a_mesh_problem(problem, operator, "model.xy")) from None
+    return xy
+
+
 def require_bool(X: NDArray[Any], operator: object) -> None:
     """Refuse chromosomes that are not bool.
 

@@ -7,6 +7,7 @@ all of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,6 +45,18 @@ FRONT, SIDE = (90.0, 0.0), (20.0, -60.0)
 # The error's colour ends at this share of the largest deviation of any mesh shown, so that a few spikes do not
 # pale all the rest.
 COLOUR_END = 0.98
+UNCOVERED = "#0072B2"
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """A mesh to draw: upright points, faces, and deviation and cover of the original's vertices."""
+
+    title: str
+    points: FloatArray
+    faces: npt.NDArray[Any]
+    deviation: FloatArray
+    covered: npt.NDArray[np.bool_]
 
 
 def fronts_figure(study: Study, case: Case) -> Figure:
@@ -166,28 +179,32 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     engine: Any = figure.get_layout_engine()
     engine.set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)
     panels = figure.subplots(3, n, squeeze=False, height_ratios=(depth / width, 0.75, depth / width))
-    end = max(float(np.quantile(deviation, COLOUR_END)) for *_, deviation in shown) or 1.0
+    end = max(float(np.quantile(surface.deviation, COLOUR_END)) for surface in shown) or 1.0
     exaggeration = _exaggeration(model)
-    surfaces: list[tuple[str, FloatArray, npt.NDArray[Any], FloatArray | None]] = [
-        (f"original\n{len(model.faces):,} triangles", model.points, model.faces, None)
-    ]
-    surfaces += [(title, points, faces, deviation) for title, points, faces, deviation in shown]
+    nothing = np.zeros(model.n_vertices)
+    title = f"original\n{len(model.faces):,} triangles"
+    original = _Surface(title, model.points, model.faces, nothing, nothing == 0)
     drawn: Any = None
-    for column, (title, points, faces, deviation) in enumerate(surfaces):
+    for column, surface in enumerate([original, *shown]):
         for row, view in enumerate((FRONT, SIDE)):
-            plot_mesh(panels[row, column], points, faces, view=view, exaggeration=exaggeration, edges=column > 0)
-            panels[row, column].set(xlim=panels[row, 0].get_xlim(), ylim=panels[row, 0].get_ylim())
-        panels[0, column].set_title(title, fontsize=8.5)
+            panel = panels[row, column]
+            plot_mesh(panel, surface.points, surface.faces, view=view, exaggeration=exaggeration, edges=column > 0)
+            panel.set(xlim=panels[row, 0].get_xlim(), ylim=panels[row, 0].get_ylim())
+        panels[0, column].set_title(surface.title, fontsize=8.5)
         below = panels[2, column]
         below.axis("off")
         below.set_aspect("equal")
-        if deviation is None:
-            text = "error at every\nvertex of the original:"
+        if column == 0:
+            text = "error at every\nvertex of the original\n\nblue: vertices that\nno triangle covers"
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
         x, y = (model.points - model.points.mean(axis=0))[:, :2].T
-        drawn = below.tripcolor(x, y, model.faces, deviation, shading="gouraud", cmap="magma_r", vmin=0, vmax=end)
+        drawn = below.tripcolor(
+            x, y, model.faces, surface.deviation, shading="gouraud", cmap="magma_r", vmin=0, vmax=end
+        )
         drawn.set_rasterized(True)
+        bare = ~surface.covered
+        below.plot(x[bare], y[bare], ".", color=UNCOVERED, markersize=2.5)
         below.set(xlim=panels[0, 0].get_xlim(), ylim=panels[0, 0].get_ylim())
     bar = figure.colorbar(drawn, ax=panels[2, :].tolist(), shrink=0.8, pad=0.01, extend="max")
     bar.set_label("error [file units]", fontsize=9)
@@ -195,8 +212,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     return figure
 
 
-def _meshes(study: Study, case: Case, model: OpenModel) -> list[tuple[str, FloatArray, npt.NDArray[Any], FloatArray]]:
-    """Return title, upright vertices, faces and deviation of the meshes to show."""
+def _meshes(study: Study, case: Case, model: OpenModel) -> list[_Surface]:
+    """Return the meshes to show."""
     chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
     trade_offs = {method: next(s for s in solutions if s.kind == "trade_off") for method, solutions in chosen.items()}
     evolutionary = [m for m in case.runs if m not in case.classic]
@@ -211,7 +228,7 @@ def _meshes(study: Study, case: Case, model: OpenModel) -> list[tuple[str, Float
         kept = np.unpackbits(found.run.arrays["kept"][found.row])[: model.n_vertices].astype(bool)
         mesh = simplify(model, kept, footprint=case.problem.footprint, outside=_outside(case))
         title = f"{method}\n{mesh.quality.triangles:,} triangles, mean {mesh.quality.mean_error:.3g}"
-        shown.append((title, model.points, mesh.faces, np.abs(mesh.deviation)))
+        shown.append(_Surface(title, model.points, mesh.faces, np.abs(mesh.deviation), mesh.covered))
     for (name, method), run in study.classic_runs.items():
         if name == case.problem.name and method == "quadric_collapse":
             sizes = run.arrays["F"][:, 1]
@@ -226,7 +243,7 @@ def _meshes(study: Study, case: Case, model: OpenModel) -> list[tuple[str, Float
             # the original's, so that all meshes stand in the same place
             upright = model.to_local(vertices)
             mirrored = 2 * model.points.mean(axis=0) - upright
-            shown.append((title, np.concatenate([upright, mirrored]), faces, deviation))
+            shown.append(_Surface(title, np.concatenate([upright, mirrored]), faces, deviation, covered))
     return shown
 
 

@@ -37,7 +37,7 @@ PAPER_CLASSIC = ("quadric_collapse", "vertex_clustering")
 
 
 @dataclass(frozen=True)
-class Tested:
+class Outcome:
     """One comparison of a finding.
 
     Attributes
@@ -73,13 +73,13 @@ class Comparisons:
 
     Attributes
     ----------
-    tested : tuple of Tested
+    tested : tuple of Outcome
         The comparisons.
     alpha : float
         Level of significance.
     """
 
-    tested: tuple[Tested, ...]
+    tested: tuple[Outcome, ...]
     alpha: float = ALPHA
 
     @property
@@ -91,7 +91,7 @@ class Comparisons:
                 adjusted[row] = float(p)
         return adjusted
 
-    def significant(self, direction: int, *, raw: bool = False) -> list[Tested]:
+    def significant(self, direction: int, *, raw: bool = False) -> list[Outcome]:
         """Return the comparisons that are significant in a direction."""
         p_values = [t.p for t in self.tested] if raw else self.corrected
         return [t for t, p in zip(self.tested, p_values, strict=True) if p < self.alpha and t.direction == direction]
@@ -404,7 +404,7 @@ def _methods(study: Study, claim: Claim) -> tuple[list[tuple[str, str]], list[st
 
 def _tested(
     study: Study, budget: str, scoring: str, cases: Sequence[Case], pairs: Iterable[tuple[str, str]], indicator: str
-) -> list[Tested]:
+) -> list[Outcome]:
     """Return the comparisons of pairs of methods, of which the second may be without chance."""
     with_chance = {
         (c.model, c.a, c.b): c for c in study.comparisons(budget, scoring, indicator)
@@ -426,15 +426,15 @@ def _tested(
             n, m = len(x), len(y)
             shown = _values(case, a, b, indicator)
             apart = len(np.unique(np.concatenate([x, y]))) > 1
-            tested.append(Tested(model, a, b, c.p, 2 / math.comb(n + m, n), direction, *shown, informative=apart))
+            tested.append(Outcome(model, a, b, c.p, 2 / math.comb(n + m, n), direction, *shown, informative=apart))
     return tested
 
 
-def _rank_sum(model: str, a: str, b: str, x: np.ndarray, y: np.ndarray, value_a: float, value_b: float) -> Tested:
+def _rank_sum(model: str, a: str, b: str, x: np.ndarray, y: np.ndarray, value_a: float, value_b: float) -> Outcome:
     from meshsimp_pymoo.analysis import rank_sum
 
     least = 2 / math.comb(len(x) + len(y), len(x))
-    return Tested(model, a, b, rank_sum(x, y).p, least, _direction(x.mean(), y.mean(), x, y), value_a, value_b)
+    return Outcome(model, a, b, rank_sum(x, y).p, least, _direction(x.mean(), y.mean(), x, y), value_a, value_b)
 
 
 def _direction(mean_x: float, mean_y: float, x: np.ndarray, y: np.ndarray) -> int:
@@ -445,7 +445,7 @@ def _direction(mean_x: float, mean_y: float, x: np.ndarray, y: np.ndarray) -> in
     return int(larger > smaller) - int(larger < smaller)
 
 
-def _by_signs(case: Case, a: str, b: str, indicator: str) -> Tested:
+def _by_signs(case: Case, a: str, b: str, indicator: str) -> Outcome:
     """Compare the runs of a method with the one front of a method without chance."""
     if indicator == "epsilon":
         forth, back = case.literal_epsilon.values[a, b][:, 0], case.literal_epsilon.values[b, a][0]
@@ -458,10 +458,10 @@ def _by_signs(case: Case, a: str, b: str, indicator: str) -> Tested:
     direction = int(wins > losses) - int(wins < losses)
     values = _values(case, a, b, indicator)
     least_p = 2.0 ** (1 - n_runs)
-    return Tested(case.problem.name, a, b, p, least_p, direction, *values, informative=wins + losses > 0)
+    return Outcome(case.problem.name, a, b, p, least_p, direction, *values, informative=wins + losses > 0)
 
 
-def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[Tested]:
+def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[Outcome]:
     """Compare two methods without chance by their values on all models."""
     both = [case for case in cases if a in case.runs and b in case.runs]
     if not both:
@@ -472,7 +472,7 @@ def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[
     n = int(np.count_nonzero(difference))
     p = float(stats.wilcoxon(difference, method="exact" if n == len(difference) else "auto").pvalue) if n else 1.0
     direction = int(np.sign(np.median(difference)))
-    return [Tested("all models", a, b, p, 2.0 ** (1 - len(both)), direction, *values.mean(axis=0).tolist())]
+    return [Outcome("all models", a, b, p, 2.0 ** (1 - len(both)), direction, *values.mean(axis=0).tolist())]
 
 
 def _values(case: Case, a: str, b: str, indicator: str) -> tuple[float, float]:

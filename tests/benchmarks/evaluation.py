@@ -1,7 +1,7 @@
 """How fast an evaluation and a run are, as ratios: both sides in one process, warm, in alternation.
 
-Run ``python tests/benchmarks/evaluation.py`` (about two minutes), or with ``--memory`` for the peak memory of a population
-of 100 at N = 1 000 000 alone.
+Run ``python tests/benchmarks/evaluation.py`` (about two minutes), or with ``--memory`` for the peak memory of a
+population of 100 at N = 1 000 000 alone.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CONSOLE = Console(width=110)
 
 
 def by_scipy(model, kept):
-    """The same error from SciPy's parts: Delaunay, find_simplex, barycentric interpolation; uncovered vertices cost 0."""
+    """The same error from SciPy's parts: Delaunay, find_simplex, interpolation; uncovered vertices cost 0."""
     xy, z = np.ascontiguousarray(model.points[:, :2]), model.points[:, 2]
     delaunay = Delaunay(xy[kept])
     simplex = delaunay.find_simplex(xy)
@@ -66,8 +66,8 @@ def evaluations():
             for k in range(rounds):
                 X = subsets(model, share, batch, k)
                 rules = {"footprint": "hull", "outside": "ignore"}
-                mine = seconds(lambda X=X, rules=rules: evaluate_subsets(model, X, **rules)) / batch
-                reference = seconds(lambda X=X: by_scipy(model, X[0]))
+                mine = seconds(lambda model=model, X=X, rules=rules: evaluate_subsets(model, X, **rules)) / batch
+                reference = seconds(lambda model=model, X=X: by_scipy(model, X[0]))
                 ours.append(mine)
                 theirs.append(reference)
                 ratios.append(reference / mine)
@@ -94,10 +94,10 @@ def concave():
             evaluate_subsets(model, X)
             ratios = []
             for _ in range(ROUNDS):
-                default = seconds(lambda X=X: evaluate_subsets(model, X))
-                ratios.append(
-                    default / seconds(lambda X=X: evaluate_subsets(model, X, footprint="hull", outside="ignore"))
-                )
+                default = seconds(lambda model=model, X=X: evaluate_subsets(model, X))
+                rules = {"footprint": "hull", "outside": "ignore"}
+                hull = seconds(lambda model=model, X=X, rules=rules: evaluate_subsets(model, X, **rules))
+                ratios.append(default / hull)
             table.add_row(name, f"{model.n_vertices}", f"{share:.0%}", f"{statistics.median(ratios):.2f}")
     CONSOLE.print(table)
 

@@ -14,15 +14,20 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.population import Population
-from stand_in_problem import GridProblem
 
+from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.operators import OPERATORS
 
-PROBLEM = GridProblem(6)
+PROBLEM = MeshProblem("peaks:6")
 CROSSOVERS = sorted(OPERATORS["crossover"])
 MUTATIONS = sorted(OPERATORS["mutation"])
 ALL = [(kind, name) for kind, table in OPERATORS.items() for name in table]
 seeds = st.integers(0, 2**32 - 1)
+# What makes a mutation stronger, from not at all (0) to as strong as can be (1).
+STRENGTH = {
+    "neighbour_shift": lambda rate: {"prob_var": rate},
+    "relocation": lambda rate: {"moves_per_vertex": 20 * rate, "temperature": 1.0},
+}
 few = settings(max_examples=25, deadline=None)
 
 
@@ -148,8 +153,8 @@ def test_parents_are_left_as_they_are(name: str) -> None:
 
 @pytest.mark.parametrize("name", CROSSOVERS)
 def test_only_as_many_pairs_cross_as_the_probability_says(name: str) -> None:
-    parents = genomes(6, 2000, 2)
-    parents[:, 0, 7], parents[:, 1, 7] = True, False  # never the same
+    # Half the genes differ, so that a crossing pair hardly ever has copies of itself as children.
+    parents = (rng(6).random((2000, 2, PROBLEM.n_var)) < 0.5) | PROBLEM.pinned
     children = cross(name, parents, 7, prob=0.8)
     copied = np.all(children[0] == parents[:, 0], axis=1) & np.all(children[1] == parents[:, 1], axis=1)
     # Children that are copies of their parents although these cross are rare: 0.02.
@@ -181,7 +186,7 @@ def test_impossible_crossover_arguments_are_refused_with_their_value(
 def test_mutation_keeps_shape_dtype_pins_and_its_input(name: str, seed: int, rate: float) -> None:
     X = genomes(seed, 5)
     X.flags.writeable = False
-    mutation = OPERATORS["mutation"][name](prob_var=rate)
+    mutation = OPERATORS["mutation"][name](**STRENGTH[name](rate))
     mutated = mutation.do(PROBLEM, Population.new("X", X), random_state=rng(seed)).get("X")
     again = mutation._do(PROBLEM, X, random_state=rng(seed))
     assert mutated.shape == X.shape
@@ -193,7 +198,7 @@ def test_mutation_keeps_shape_dtype_pins_and_its_input(name: str, seed: int, rat
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_mutation_changes_something_and_depends_on_the_seed(name: str) -> None:
     X = genomes(1, 20)
-    mutation = OPERATORS["mutation"][name](prob_var=0.3)
+    mutation = OPERATORS["mutation"][name](**STRENGTH[name](0.3))
     one, other = (mutation._do(PROBLEM, X, random_state=rng(seed)) for seed in (1, 2))
     assert (one != X).any()
     assert (one != other).any()
