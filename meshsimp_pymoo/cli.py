@@ -46,7 +46,7 @@ OK, TARGET_MISSED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 DEFAULT_GENERATIONS = 200
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}
 # Presets that return a front; the weighted-sum ones return one solution.
-ALGORITHMS = ("nsga2_v1", "nsga2_v2", "moead")
+ALGORITHMS = ("nsga2_v1", "nsga2_v2", "moead", "memetic")
 FORMATS = ("ply", "obj", "stl", "off", "glb")
 
 EPILOG = """\

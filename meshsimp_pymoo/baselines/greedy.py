@@ -158,6 +158,8 @@ def greedy_insertion(
     """
     if choose not in ("point", "triangle"):
         raise ValueError(f"choose={choose!r} is unknown; use 'point' or 'triangle'")
+    if most is not None and most < 0:
+        raise ValueError(f"most={most} is no number of vertices; give 0 or more")
     fixed = _pinned(model, pinned)
     sites = _sites(model, fixed, fixed)
     ground = make_ground(model, footprint=footprint, outside=outside)
@@ -174,6 +176,10 @@ def greedy_insertion(
 
 
 def _pinned(model: OpenModel, pinned: np.ndarray | None) -> np.ndarray:
+    if pinned is not None and (pinned.dtype != np.bool_ or pinned.shape != (model.n_vertices,)):
+        raise ValueError(
+            f"pinned is a bool array of shape ({model.n_vertices},), not {pinned.dtype} of shape {pinned.shape}"
+        )
     fixed = np.zeros(model.n_vertices, bool)
     fixed[model.corners] = True
     return fixed if pinned is None else fixed | pinned
@@ -294,6 +300,16 @@ def _thin(
 
 
 @njit(cache=True, nogil=True)
+def _at_a_corner(xy: np.ndarray, mesh: np.ndarray, t: int, i: int) -> bool:
+    """Whether vertex i has the position of a corner of triangle t, where there is no room for it."""
+    for k in range(3):
+        v = mesh[t + k]
+        if v <= LAST_INDEX and xy[2 * v] == xy[2 * i] and xy[2 * v + 1] == xy[2 * i + 1]:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
     """Return the vertex of triangle t that deviates most, and by how much (-1: none deviates)."""
     mesh = live.mesh
@@ -302,6 +318,9 @@ def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
     i = live.head[t >> 3]
     emitted = (live.kind[t >> 3] & EMITTED) != 0
     while i >= 0:
+        if _at_a_corner(g.xy, mesh, t, i):
+            i = live.following[i]
+            continue
         d = live.cost[i]
         if emitted:
             d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)

@@ -23,7 +23,8 @@ import numpy as np
 from numba import njit
 
 from meshsimp_pymoo.geometry.footprint import inside
-from meshsimp_pymoo.geometry.nearest import build_grid, nearest_segment
+from meshsimp_pymoo.geometry.hilbert import hilbert_keys
+from meshsimp_pymoo.geometry.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
 
 if TYPE_CHECKING:
@@ -92,11 +93,10 @@ class Simplified:
 
 
 class Workspace:
-    """The arrays one thread needs to evaluate subsets of a model of N vertices; 140 N bytes, made once."""
+    """The arrays one thread needs to evaluate subsets of a model of N vertices; 135 N bytes, made once."""
 
     def __init__(self, n_vertices: int) -> None:
         n = n_vertices + 1
-        self.side_limit = max(int(np.sqrt(n_vertices) / 2), 4)
         self.arrays = (
             np.empty(n, np.int32),  # sites: rows of the kept vertices
             np.empty(n, np.int32),  # dropped: rows of the others
@@ -107,7 +107,6 @@ class Workspace:
             np.empty(2 * n, np.uint8),  # emitted triangles
             np.empty(2 * n, np.uint32),  # stack
             np.empty(n, np.uint32),  # a triangle of each site
-            np.empty(self.side_limit**2 + 1, np.int32),  # the outline's cells
         )
 
 
@@ -278,7 +277,6 @@ def _measure_bare(
     mesh: np.ndarray,
     end: int,
     emitted: np.ndarray,
-    cells: np.ndarray,
     nearest: bool,
     row: np.ndarray,
     deviation: np.ndarray,
@@ -286,14 +284,14 @@ def _measure_bare(
 ) -> None:
     """Add the cost of the vertices that lie in no emitted triangle, by the nearest point of the mesh's outline."""
     ends, key = _outline(mesh, end, emitted)
-    side = min(max(len(key) // 4, 1), int(np.sqrt(len(cells) - 1)))
-    items = build_grid(site_xy, ends, len(key), side, cells)
+    boxes = build_tree(site_xy, ends, len(key))
+    stack = np.empty(64, np.int64)
     guess = 0
     for q in range(n_bare):
         i = bare[q]
         x = xy[2 * i]
         y = xy[2 * i + 1]
-        guess, t, d2 = nearest_segment(site_xy, ends, key, side, cells, items, x, y, guess)
+        guess, t, d2 = nearest_segment(site_xy, ends, key, len(key), boxes, stack, x, y, guess)
         a, b, c = ends[guess, 0], ends[guess, 1], ends[guess, 2]
         ux = site_xy[2 * b] - site_xy[2 * a]
         uy = site_xy[2 * b + 1] - site_xy[2 * a + 1]
@@ -334,7 +332,7 @@ def _evaluate_one(
 ) -> int:
     """Fill ``row`` with the six numbers of one subset; return the end of the triangles' records in the workspace."""
     xy, z, corners, has_twins, unit, min_height, exact_area, exact_lift, side, state, start, items, faces = model
-    sites, dropped, site_xy, site_z, inserted, mesh, emitted, stack, site_triangle, cells = workspace
+    sites, dropped, site_xy, site_z, inserted, mesh, emitted, stack, site_triangle = workspace
     n_all = len(z)
     n = _gather(xy, z, kept, has_twins, sites, dropped, site_xy, site_z)
     first = np.empty(len(corners), np.int64)
@@ -431,7 +429,7 @@ def _evaluate_one(
     row[UNCOVERED] = 0
     if n_bare > 0:
         _measure_bare(
-            xy, z, dropped, n_bare, site_xy, site_z, unit, mesh, end, emitted, cells, nearest, row, deviation, covered
+            xy, z, dropped, n_bare, site_xy, site_z, unit, mesh, end, emitted, nearest, row, deviation, covered
         )
     return end
 
@@ -481,7 +479,9 @@ def evaluate_subsets(
         triangle has error, squares and maximum inf.
     """
     use_footprint, nearest = _rules(footprint, outside)
-    rows = np.ascontiguousarray(np.atleast_2d(kept), np.bool_)
+    rows = np.ascontiguousarray(np.atleast_2d(kept))
+    if rows.dtype != np.bool_:
+        raise TypeError(f"subsets are bool arrays, one entry a vertex, not {rows.dtype}")
     if rows.shape[1] != model.n_vertices:
         raise ValueError(f"a subset of {model.name} has {model.n_vertices} entries, one a vertex, not {rows.shape[1]}")
     if not rows.flags.writeable:
@@ -553,7 +553,9 @@ def simplify(model: OpenModel, kept: np.ndarray, *, footprint: str = "model", ou
     3.0
     """
     use_footprint, nearest = _rules(footprint, outside)
-    row = np.array(kept, np.bool_, order="C")
+    row = np.array(kept, order="C")
+    if row.dtype != np.bool_:
+        raise TypeError(f"a subset is a bool array, one entry a vertex, not {row.dtype}")
     if row.shape != (model.n_vertices,):
         raise ValueError(
             f"a subset of {model.name} has shape ({model.n_vertices},), one entry a vertex, not {row.shape}"
@@ -656,8 +658,14 @@ def mesh_deviation(
     _, nearest = _rules("model", outside)
     if frame not in ("file", "local"):
         raise ValueError(f"frame={frame!r} is unknown; choose 'file' or 'local'")
-    vertices = np.asarray(vertices, float).reshape(-1, 3)
-    faces = np.ascontiguousarray(np.asarray(faces).reshape(-1, 3), np.int64)
+    vertices = np.asarray(vertices, float)
+    faces = np.asarray(faces)
+    for name, array in (("vertices", vertices), ("faces", faces)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ValueError(f"{name} have shape {array.shape}; give (rows, 3), as of a triangle mesh")
+    if len(faces) and not np.issubdtype(faces.dtype, np.integer):
+        raise ValueError(f"faces are {faces.dtype}; give whole numbers, rows of the vertices")
+    faces = np.ascontiguousarray(faces, np.int64)
     if len(faces) == 0:
         raise ValueError("a mesh without faces has no error; it needs at least one triangle")
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -753,10 +761,8 @@ def _mesh_deviation(
                         covered[i] = True
     if m == 0:
         return False
-    outline_side = min(max(int(np.sqrt(m / 2)), 1), 4096)
-    cells = np.empty(outline_side * outline_side + 1, np.int64)
-    outline_items = np.empty(0, np.int32)
-    built = False
+    boxes = np.empty((0, 4))
+    stack = np.empty(64, np.int64)
     guess = 0
     for i in range(n):
         if covered[i]:
@@ -764,12 +770,17 @@ def _mesh_deviation(
         if not nearest:
             deviation[i] = 0.0
             continue
-        if not built:
-            outline_items = build_grid(xy, ends, m, outline_side, cells)
-            built = True
-        guess, t, d = nearest_segment(
-            xy, ends, key, outline_side, cells, outline_items, samples[2 * i], samples[2 * i + 1], guess
-        )
+        if len(boxes) == 0:
+            # Along the curve, so that the tree's boxes are small whatever the order of the faces.
+            middle = np.empty((m, 2))
+            for k in range(m):
+                for axis in range(2):
+                    middle[k, axis] = (xy[2 * ends[k, 0] + axis] + xy[2 * ends[k, 1] + axis]) / 2.0
+            order = np.argsort(hilbert_keys(middle))
+            ends[:m] = ends[order]
+            key[:m] = key[order]
+            boxes = build_tree(xy, ends, m)
+        guess, t, d = nearest_segment(xy, ends, key, m, boxes, stack, samples[2 * i], samples[2 * i + 1], guess)
         dz = (1.0 - t) * height[ends[guess, 0]] + t * height[ends[guess, 1]] - z[i]
         deviation[i] = np.sqrt(d * unit * unit + dz * dz)
     return True

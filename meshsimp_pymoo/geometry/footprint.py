@@ -157,13 +157,19 @@ def _face_cells(
     """Count (then list) the faces of each MIXED cell; set the cells whose centre a face holds INSIDE."""
     for f in range(len(faces)):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        low_x = min(xy[2 * a], xy[2 * b], xy[2 * c])
-        high_x = max(xy[2 * a], xy[2 * b], xy[2 * c])
         low_y = min(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
         high_y = max(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
         first_row, last_row = _cell_span(low_y, high_y, side)
-        first, last = _cell_span(low_x, high_x, side)
         for row in range(first_row, last_row + 1):
+            # The columns between the sides that pass through this row.
+            first, last = side, -1
+            for u, v in ((a, b), (b, c), (c, a)):
+                uy, vy = xy[2 * u + 1], xy[2 * v + 1]
+                one, other = _cell_span(min(uy, vy), max(uy, vy), side)
+                if one <= row <= other:
+                    one, other = _row_span(xy[2 * u], uy, xy[2 * v], vy, row, side)
+                    first = min(first, one)
+                    last = max(last, other)
             for column in range(first, last + 1):
                 cell = row * side + column
                 if state[cell] == MIXED:

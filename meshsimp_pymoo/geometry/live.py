@@ -776,6 +776,15 @@ def remove(g: Ground, live: Live, p: int) -> bool:
     n_ears = _fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
     if n_ears == 0 or count[N_SITES] <= 3:
         return False
+    # All others on one line: neither the ears nor what lies beyond the ring is a triangle.
+    solid = False
+    for k in range(n_ears):
+        solid = solid or (live.ears[k, 0] | live.ears[k, 1] | live.ears[k, 2]) <= LAST_INDEX
+    for k in range(m):
+        t = live.rim[k] & TRIANGLE
+        solid = solid or (mesh[t] | mesh[t + 1] | mesh[t + 2]) <= LAST_INDEX
+    if not solid:
+        return False
     _collect(live, live.cavity, m)
     live.pool[count[N_POOL]] = p
     count[N_POOL] += 1

@@ -17,6 +17,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from meshsimp_pymoo.geometry.error import SLIVER_HEIGHT
 from meshsimp_pymoo.geometry.footprint import Footprint, make_footprint
+from meshsimp_pymoo.geometry.hilbert import hilbert_keys
 from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, from_trimesh, read_source
 from meshsimp_pymoo.geometry.orient import Up, check_open_surface, front_patch, up_direction, upright_rotation
 from meshsimp_pymoo.geometry.predicates import exact_ranges
@@ -24,8 +25,6 @@ from meshsimp_pymoo.geometry.predicates import exact_ranges
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-# Resolution of the Hilbert curve in bits along one side: finer than any raster, and two of them fit an int64.
-HILBERT_BITS = 26
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +120,8 @@ class OpenModel:
     @cached_property
     def footprint(self) -> Footprint:
         """The projection of the original faces, for ``footprint="model"``."""
-        outline, area = _outline_edges(self.xy, self.faces)
-        corners = np.unique(outline)
-        hull_area = ConvexHull(self.xy[corners]).volume if len(corners) > 2 else 0.0
-        return make_footprint(self.xy, self.faces, outline, convex=abs(area - hull_area) <= 1e-9 * hull_area)
+        outline = _outline_edges(self.xy, self.faces)
+        return make_footprint(self.xy, self.faces, outline, convex=_all_on_hull(self.xy, outline))
 
     @cached_property
     def kernel_arguments(self) -> tuple[Any, ...]:
@@ -289,7 +286,7 @@ def vector_order(xy: FloatArray, z: FloatArray) -> IntArray:
     ----------
     D. Hilbert, "Ueber die stetige Abbildung einer Linie auf ein Flaechenstueck", Mathematische Annalen 38, 1891.
     """
-    key = _hilbert_keys(np.ascontiguousarray(xy, float))
+    key = hilbert_keys(np.ascontiguousarray(xy, float))
     order = np.argsort(key, kind="stable")
     key = key[order]
     tied = np.zeros(len(key), bool)
@@ -300,29 +297,6 @@ def vector_order(xy: FloatArray, z: FloatArray) -> IntArray:
         rows = order[tied]
         order[tied] = rows[np.lexsort((z[rows], xy[rows, 1], xy[rows, 0], key[tied]))]
     return order
-
-
-@njit(cache=True)
-def _hilbert_keys(xy: np.ndarray) -> np.ndarray:
-    keys = np.empty(len(xy), np.int64)
-    limit = 2**HILBERT_BITS - 1
-    for i in range(len(xy)):
-        x = min(int(xy[i, 0] * 2.0**HILBERT_BITS), limit)
-        y = min(int(xy[i, 1] * 2.0**HILBERT_BITS), limit)
-        key = np.int64(0)
-        s = np.int64(1) << (HILBERT_BITS - 1)
-        while s > 0:
-            rx = 1 if x & s else 0
-            ry = 1 if y & s else 0
-            key = (key << 2) | ((3 * rx) ^ ry)
-            if ry == 0:
-                if rx == 1:
-                    x = limit - x
-                    y = limit - y
-                x, y = y, x
-            s >>= 1
-        keys[i] = key
-    return keys
 
 
 def find_corners(xy: FloatArray) -> IntArray:
@@ -373,8 +347,8 @@ def _on_hull(xy: FloatArray) -> IntArray:
     return np.flatnonzero(on)
 
 
-def _outline_edges(xy: FloatArray, faces: npt.NDArray[np.int32]) -> tuple[IntArray, float]:
-    """Edges that may bound the projection (borders and folds), and the sum of the projected face areas."""
+def _outline_edges(xy: FloatArray, faces: npt.NDArray[np.int32]) -> IntArray:
+    """Edges that may bound the projection: borders and folds."""
     a, b, c = (xy[faces[:, k]] for k in range(3))
     double = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     up = double > 0
@@ -388,7 +362,24 @@ def _outline_edges(xy: FloatArray, faces: npt.NDArray[np.int32]) -> tuple[IntArr
     count = np.diff(np.r_[first, len(key)])
     facing = np.add.reduceat(side.astype(np.int64), first)
     bounding = (count == 1) | ((facing > 0) & (facing < count)) | (facing == 0)
-    return edges[first[bounding]], float(np.abs(double).sum() / 2)
+    return edges[first[bounding]]
+
+
+def _all_on_hull(xy: FloatArray, outline: IntArray) -> bool:
+    """Whether the outline is the convex hull and nothing else: then the footprint is all of it."""
+    ends = xy[outline]
+    points = np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)])
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return False
+    tolerance = SLIVER_HEIGHT * float(np.hypot(*np.ptp(xy, axis=0)))
+    away = np.full(len(points), np.inf)
+    for a, b, c in np.unique(hull.equations, axis=0):
+        np.minimum(away, np.abs(points[:, 0] * a + points[:, 1] * b + c), out=away)
+        if len(hull.equations) > 5000:  # an oval of so many sides: not worth the time, and never a mistake
+            return False
+    return bool((away <= tolerance).all())
 
 
 @njit(cache=True)

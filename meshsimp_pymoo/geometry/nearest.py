@@ -1,67 +1,63 @@
-"""The point of a mesh's outline nearest in the plane: exact, through a grid of cells over its segments."""
+"""The point of a mesh's outline nearest in the plane: exact, through a tree of boxes over its segments.
+
+The segments are listed along the surface, so consecutive ones are close to each other, and a complete binary tree over
+runs of ``LEAF`` of them has small boxes. It takes no more than the order of the segments to build, whatever their
+lengths.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from meshsimp_pymoo.geometry.footprint import _cell_span, _row_span
+# Segments in one leaf.
+LEAF = 4
 
 
 @njit(cache=True, nogil=True)
-def _visit_cells(xy: np.ndarray, ends: np.ndarray, m: int, side: int, start: np.ndarray, items: np.ndarray) -> None:
-    fill = len(items) > 0
-    for k in range(m):
-        a = ends[k, 0]
-        b = ends[k, 1]
-        ax, ay, bx, by = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1]
-        first_row, last_row = _cell_span(min(ay, by), max(ay, by), side)
-        for row in range(first_row, last_row + 1):
-            first, last = _row_span(ax, ay, bx, by, row, side)
-            for column in range(first, last + 1):
-                cell = row * side + column
-                if fill:
-                    items[start[cell]] = k
-                start[cell] += 1
-
-
-@njit(cache=True, nogil=True)
-def build_grid(xy: np.ndarray, ends: np.ndarray, m: int, side: int, start: np.ndarray) -> np.ndarray:
-    """List, for each cell of the unit square, the segments that pass through it.
+def build_tree(xy: np.ndarray, ends: np.ndarray, m: int) -> np.ndarray:
+    """Return the boxes of a tree over ``m`` segments, listed so that neighbours are close.
 
     Parameters
     ----------
     xy : (2 n,) float array
-        Coordinates x0, y0, x1, ...; what lies outside the unit square is listed in the outermost cells.
-    ends : (m, 2) int array
+        Coordinates x0, y0, x1, ...
+    ends : (m, 2) or wider int array
         Segments, as rows of ``xy``.
     m : int
         Number of segments; at least 1.
-    side : int
-        Cells along one side.
-    start : (side * side + 1,) int array
-        Receives where each cell's segments begin.
 
     Returns
     -------
-    (M,) int32 array
-        The segments, cell by cell.
+    (2 L, 4) float array
+        Lowest and highest x, then y, of each node; node 1 is the root, the children of k are 2 k and 2 k + 1, and the
+        last L nodes are the leaves, each over ``LEAF`` segments.
     """
-    n_cells = side * side
-    for k in range(n_cells + 1):
-        start[k] = 0
-    _visit_cells(xy, ends, m, side, start, np.empty(0, np.int32))
-    total = 0
-    for k in range(n_cells + 1):
-        count = start[k]
-        start[k] = total
-        total += count
-    items = np.empty(total, np.int32)
-    _visit_cells(xy, ends, m, side, start, items)
-    for k in range(n_cells, 0, -1):
-        start[k] = start[k - 1]
-    start[0] = 0
-    return items
+    n_leaves = 1
+    while n_leaves * LEAF < m:
+        n_leaves *= 2
+    boxes = np.empty((2 * n_leaves, 4))
+    for leaf in range(n_leaves):
+        low_x = low_y = np.inf
+        high_x = high_y = -np.inf
+        for k in range(leaf * LEAF, min(leaf * LEAF + LEAF, m)):
+            for e in range(2):
+                x = xy[2 * ends[k, e]]
+                y = xy[2 * ends[k, e] + 1]
+                low_x = min(low_x, x)
+                high_x = max(high_x, x)
+                low_y = min(low_y, y)
+                high_y = max(high_y, y)
+        node = n_leaves + leaf
+        boxes[node, 0] = low_x
+        boxes[node, 1] = high_x
+        boxes[node, 2] = low_y
+        boxes[node, 3] = high_y
+    for node in range(n_leaves - 1, 0, -1):
+        for k in (0, 2):
+            boxes[node, k] = min(boxes[2 * node, k], boxes[2 * node + 1, k])
+            boxes[node, k + 1] = max(boxes[2 * node, k + 1], boxes[2 * node + 1, k + 1])
+    return boxes
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -80,13 +76,21 @@ def _to_segment(xy: np.ndarray, a: int, b: int, x: float, y: float) -> tuple[flo
 
 
 @njit(cache=True, nogil=True, forceinline=True)
+def _to_box(boxes: np.ndarray, node: int, x: float, y: float) -> float:
+    """Squared distance from (x, y) to a node's box; a little less, so that rounding hides no segment."""
+    dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 1])
+    dy = max(boxes[node, 2] - y, 0.0, y - boxes[node, 3])
+    return (dx * dx + dy * dy) * (1.0 - 1e-9)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def nearest_segment(
     xy: np.ndarray,
     ends: np.ndarray,
     key: np.ndarray,
-    side: int,
-    start: np.ndarray,
-    items: np.ndarray,
+    m: int,
+    boxes: np.ndarray,
+    stack: np.ndarray,
     x: float,
     y: float,
     guess: int,
@@ -94,36 +98,33 @@ def nearest_segment(
     """Return the segment nearest to (x, y), the parameter of its nearest point and the squared distance.
 
     Of segments at the same distance the one with the least ``key`` is returned, whatever the order of search. ``guess``
-    is any segment (a near one spares work).
+    is any segment (a near one spares work); ``stack`` has room for 64 nodes.
     """
     best = guess
     best_d, best_t = _to_segment(xy, ends[guess, 0], ends[guess, 1], x, y)
-    column = min(max(int(x * side), 0), side - 1)
-    row = min(max(int(y * side), 0), side - 1)
-    for ring in range(side + 1):
-        for i in range(max(row - ring, 0), min(row + ring, side - 1) + 1):
-            step = 1 if abs(i - row) == ring else max(2 * ring, 1)
-            for j in range(column - ring, column + ring + 1, step):
-                if j < 0 or j >= side:
+    n_leaves = len(boxes) // 2
+    stack[0] = 1
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if _to_box(boxes, node, x, y) > best_d:
+            continue
+        if node >= n_leaves:
+            first = (node - n_leaves) * LEAF
+            for k in range(first, min(first + LEAF, m)):
+                if k == best:
                     continue
-                cell = i * side + j
-                for q in range(start[cell], start[cell + 1]):
-                    k = items[q]
-                    if k == best:
-                        continue
-                    d, t = _to_segment(xy, ends[k, 0], ends[k, 1], x, y)
-                    if d < best_d or (d == best_d and key[k] < key[best]):
-                        best, best_d, best_t = k, d, t
-        # Whatever has not been looked at lies beyond the block of cells seen so far.
-        reach = np.inf
-        if column - ring > 0:
-            reach = min(reach, x - (column - ring) / side)
-        if column + ring < side - 1:
-            reach = min(reach, (column + ring + 1) / side - x)
-        if row - ring > 0:
-            reach = min(reach, y - (row - ring) / side)
-        if row + ring < side - 1:
-            reach = min(reach, (row + ring + 1) / side - y)
-        if reach == np.inf or (reach > 0.0 and best_d < reach * reach * (1 - 1e-9)):
-            break
+                d, t = _to_segment(xy, ends[k, 0], ends[k, 1], x, y)
+                if d < best_d or (d == best_d and key[k] < key[best]):
+                    best, best_d, best_t = k, d, t
+            continue
+        # The nearer child on top.
+        near = 2 * node
+        far = near + 1
+        if _to_box(boxes, far, x, y) < _to_box(boxes, near, x, y):
+            near, far = far, near
+        stack[depth] = far
+        stack[depth + 1] = near
+        depth += 2
     return best, best_t, best_d

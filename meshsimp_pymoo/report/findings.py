@@ -467,8 +467,7 @@ def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[
     if not both:
         return []
     values = np.array([_values(case, a, b, indicator) for case in both])
-    sign = 1 if indicator == "hvr" else -1
-    difference = sign * (values[:, 0] - values[:, 1])
+    difference = values[:, 0] - values[:, 1] if indicator == "hvr" else values[:, 1] - values[:, 0]
     n = int(np.count_nonzero(difference))
     p = float(stats.wilcoxon(difference, method="exact" if n == len(difference) else "auto").pvalue) if n else 1.0
     direction = int(np.sign(np.median(difference)))

@@ -6,7 +6,8 @@ import pytest
 from meshsimp_pymoo.baselines.greedy import greedy_insertion, thinning
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.geometry.error import evaluate_subsets, mesh_deviation, simplify
-from meshsimp_pymoo.geometry.model import load_model
+from meshsimp_pymoo.geometry.load import SourceMesh
+from meshsimp_pymoo.geometry.model import build_model, load_model
 
 METHODS = {
     "thinning": thinning,
@@ -100,3 +101,22 @@ def test_other_starts_and_wrong_arguments():
         front.kept(len(front))
     deviation, _, _ = mesh_deviation(model, model.file_points, simplify(model, front.kept(5)).faces)
     assert front.error[5] == pytest.approx(deviation.sum())
+
+
+def test_insertion_leaves_out_vertices_whose_position_is_taken():
+    points = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 0], [2, 2, 9.0], [2, 2, 5]]
+    source = SourceMesh(np.array(points), np.array([[0, 1, 4], [1, 2, 5], [2, 3, 4], [3, 0, 6]]), {}, "step")
+    model = build_model(source, up="z")
+    for method in METHODS.values():
+        front = method(model)
+        table = evaluate_subsets(model, np.array([front.kept(k) for k in range(len(front))]))
+        np.testing.assert_allclose(table[:, 0], front.error)
+        np.testing.assert_array_equal(table[:, 1], front.triangles)
+
+
+def test_pins_and_counts_that_are_none_are_refused():
+    model = load_model(load("face:150"))
+    with pytest.raises(ValueError, match=r"pinned is a bool array of shape \(150,\)"):
+        thinning(model, np.arange(4))
+    with pytest.raises(ValueError, match="most=-1"):
+        greedy_insertion(model, most=-1)

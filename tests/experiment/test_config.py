@@ -183,6 +183,10 @@ MISTAKES = {
         {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: .inf}}]"},
         ["algorithms[0].parameters.pop_size", "finite"],
     ),
+    "parameter is a date": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: 2020-01-01}}]"},
+        ["algorithms[0].parameters.pop_size", "2020-01-01", "date is not understood"],
+    ),
     "weight missing": ({"algorithms": "[weighted_ga_v1]"}, ["algorithms[0]", "'w'"]),
     "weight impossible": (
         {"algorithms": "[{preset: weighted_ga_v1, merged_over: {w: [0.5, 1.5]}}]"},

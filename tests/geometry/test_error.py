@@ -21,7 +21,7 @@ from meshsimp_pymoo.geometry.error import (
     mesh_quality,
     simplify,
 )
-from meshsimp_pymoo.geometry.load import SourceMesh, grid_source
+from meshsimp_pymoo.geometry.load import ModelWarning, SourceMesh, grid_source
 from meshsimp_pymoo.geometry.model import build_model, load_model
 
 RULES = [(f, o) for f in FOOTPRINTS for o in OUTSIDES]
@@ -410,3 +410,48 @@ def test_the_referee_agrees_on_a_terrain_with_nodata(referee, shared_data):
     with np.load(shared_data / "dem_sthelens.npz", allow_pickle=False) as stored:
         source = grid_source(stored["elevation"][::6, ::6], float(stored["dx"]) * 6, float(stored["dy"]) * 6)
     assert_referee_agrees(referee, load_model(source), [0.03, 0.3])
+
+
+def test_a_hole_is_seen_although_an_overlap_makes_up_for_its_area():
+    grid = grid_source(np.zeros((12, 12)), 1.0, 1.0)
+    corner = grid.points[grid.faces].mean(axis=1)[:, :2] - grid.points[:, :2].min(axis=0)
+    hole = (np.floor(corner) == [6, 6]).all(axis=1)
+    double = grid.faces[(np.floor(corner) == [2, 2]).all(axis=1)]
+    rows, inverse = np.unique(double, return_inverse=True)
+    copy = len(grid.points) + inverse.reshape(-1, 3)
+    points = np.vstack([grid.points, grid.points[rows] + [0, 0, 1]])
+    patched = SourceMesh(points, np.vstack([grid.faces[~hole], copy]), {}, "patched")
+    with pytest.warns(ModelWarning, match="folded over"):
+        model = build_model(patched, up="z")
+    everything = simplify(model, np.ones(model.n_vertices, bool)).quality
+    assert everything.triangles == 2 * 11 * 11 - 2
+
+
+def test_vertices_far_from_a_long_outline_are_found_at_once():
+    """A comb with everything kept in one corner: most vertices are bare and their nearest segment is far away."""
+    side = 61
+    elevation = np.zeros((side, side))
+    elevation[2:, 2::3] = np.nan
+    model = load_model(grid_source(elevation, 1.0, 1.0), up="z")
+    kept = (model.points[:, :2] < side / 4).all(axis=1)
+    kept[model.corners] = True
+    row = evaluate_subsets(model, kept, footprint="hull")[0]
+    again = mesh_quality(model, model.file_points, simplify(model, kept, footprint="hull").faces)
+    assert row[ERROR] == pytest.approx(again.error)
+
+
+@pytest.mark.parametrize("dtype", [float, int, object])
+def test_subsets_that_are_not_bool_are_refused(dtype):
+    plane = load_model(load("plane:5"))
+    with pytest.raises(TypeError, match="bool array"):
+        evaluate_subsets(plane, np.ones((2, 25), dtype))
+    with pytest.raises(TypeError, match="bool array"):
+        simplify(plane, np.ones(25, dtype))
+
+
+def test_quads_and_fractional_faces_are_refused():
+    plane = load_model(load("plane:5"))
+    with pytest.raises(ValueError, match=r"faces have shape \(1, 4\)"):
+        mesh_quality(plane, plane.file_points, [[0, 1, 2, 3]])
+    with pytest.raises(ValueError, match="faces are float64"):
+        mesh_quality(plane, plane.file_points, [[0.0, 1.0, 2.5]])

@@ -162,3 +162,18 @@ def test_wrong_operations_are_refused_and_change_nothing():
         LiveTriangulation(model, np.ones(80, bool))
     with pytest.raises(ValueError, match="span no triangle"):
         LiveTriangulation(model, np.zeros(81, bool))
+
+
+def test_a_site_without_which_all_lie_on_a_line_cannot_go():
+    model = MODELS["grid"]
+    on_a_line = np.flatnonzero(model.points[:, 1] == 0)[:3]
+    apex = int(np.flatnonzero(model.points[:, 1] > 0)[0])
+    kept = np.zeros(model.n_vertices, bool)
+    kept[on_a_line] = kept[apex] = True
+    live = LiveTriangulation(model, kept, footprint="hull")
+    before = live.triangles, live.error, live.faces
+    assert live.try_remove(apex) == (np.inf, 0)
+    with pytest.raises(ValueError, match="span no triangle"):
+        live.remove(apex)
+    assert (live.triangles, live.error) == before[:2]
+    np.testing.assert_array_equal(live.faces, before[2])

@@ -11,7 +11,8 @@ from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.runs import claim_experiment, write_experiment, write_model, write_run
 
 PRESETS = {
-    "N1": "nsga2_v1", "N2": "nsga2_v2", "MD": "moead", "G1": "weighted_ga_v1", "G2": "weighted_ga_v2",
+    "N1": "nsga2_v1", "N2": "nsga2_v2", "MD": "moead", "MD normalised": "moead", "G1": "weighted_ga_v1",
+    "G2": "weighted_ga_v2",
 }  # fmt: skip
 BUDGET = "9 generations"
 Front = list[tuple[float, float]]
@@ -84,7 +85,8 @@ def store(
             "algorithms": [
                 {
                     "name": name, "preset": PRESETS.get(name, ""), "class": "", "merged_parameter": "",
-                    "merged_values": [None], "description": {"parameters": {}},
+                    "merged_values": [None],
+                    "description": {"parameters": {"normalised": True} if "normalised" in name else {}},
                 }
                 for name in names
             ],

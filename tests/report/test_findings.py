@@ -76,6 +76,12 @@ def test_equal_methods_do_not_differ(tmp_path):
     assert found["nsga2_v2_over_v1", "hvr"] == UNDECIDED  # there is no v2
 
 
+def test_the_papers_own_settings_stand_for_a_preset(tmp_path):
+    s = study(tmp_path, {"MD normalised": 1.0, "N1": 1.0, "MD": 3.0})
+    assert s.role("moead") == "MD"
+    assert verdicts(s)["nsga2_and_moead", "hvr"] == DOES_NOT_HOLD
+
+
 def test_an_indicator_that_tells_nothing_apart_proves_no_equality(tmp_path):
     # every front has a solution that no other covers: no run dominates another
     fronts = {
