@@ -429,7 +429,7 @@ def test_a_hole_is_seen_although_an_overlap_makes_up_for_its_area():
 
 def test_vertices_far_from_a_long_outline_are_found_at_once():
     """A comb with everything kept in one corner: most vertices are bare and their nearest segment is far away."""
-    side = 61
+    side = 60
     elevation = np.zeros((side, side))
     elevation[2:, 2::3] = np.nan
     model = load_model(grid_source(elevation, 1.0, 1.0), up="z")
