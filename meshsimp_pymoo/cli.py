@@ -20,7 +20,9 @@ import argparse
 import json
 import math
 import re
+import signal
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -81,7 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     try:
         args = _parser().parse_args(argv)
-        with _warnings_as_lines():
+        with _warnings_as_lines(), _interruptible():
             return int(args.command(args))
     except KeyboardInterrupt:
         _say("interrupted; nothing is written")
@@ -91,6 +93,36 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         _say(" ".join(str(problem).split()))
         return BAD_INPUT
+
+
+class _Interrupt:
+    """Remembers Ctrl-C: some libraries swallow the exception while they are imported."""
+
+    seen = False
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Note each Ctrl-C besides raising KeyboardInterrupt; see :func:`_stop_if_interrupted`."""
+
+    def note(signum: int, frame: Any) -> None:
+        _Interrupt.seen = True
+        raise KeyboardInterrupt
+
+    _Interrupt.seen = False
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _stop_if_interrupted() -> None:
+    if _Interrupt.seen:
+        raise KeyboardInterrupt
 
 
 def _input_errors() -> tuple[type[Exception], ...]:
@@ -446,6 +478,7 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
     with _progress(args, problem.model.name) as show:
         try:
             while algorithm.has_next():
+                _stop_if_interrupted()
                 algorithm.next()
                 front, generations = algorithm.opt, algorithm.n_iter - 1
                 show(algorithm.termination.perc, algorithm.evaluator.n_eval, front)
@@ -453,7 +486,9 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
             interrupted = True
     if front is None:
         return None
-    kept = np.asarray(front.get("X"), dtype=bool) | problem.pinned
+    # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
+    ends = np.array([np.ones(problem.n_var, dtype=bool), problem.pinned])
+    kept = np.vstack([np.asarray(front.get("X"), dtype=bool) | problem.pinned, ends])
     table = problem.evaluate_subsets(kept)
     is_mesh = table[:, TRIANGLES] > 0
     if not is_mesh.any():
@@ -462,7 +497,9 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
             "inside its outline; search longer, or pass --footprint hull"
         )
     kept, table = kept[is_mesh], table[is_mesh]
-    _, first = np.unique(table[:, [TRIANGLES, ERROR]], axis=0, return_index=True)  # sorted by triangles, then error
+    F, first = np.unique(table[:, [TRIANGLES, ERROR]], axis=0, return_index=True)  # sorted by triangles, then error
+    better = np.r_[True, F[1:, 1] < np.minimum.accumulate(F[:-1, 1])]
+    first = first[better]
     return _Found(
         kept=kept[first],
         quality=[as_quality(row, problem.n_var) for row in table[first]],
@@ -493,13 +530,6 @@ def _refuse_impossible(args: argparse.Namespace, problem: MeshProblem) -> None:
             f"--triangles {args.triangles} is impossible: {problem.model.name} has {least} to "
             f"{whole.triangles} triangles with its pinned vertices"
         )
-    for option, field in (("max_error", "max_error"), ("mean_error", "mean_error")):
-        value = getattr(args, option)
-        if value is not None and value < getattr(whole, field):
-            raise UsageError(
-                f"--{option.replace('_', '-')} {value:g} is impossible: {problem.model.name} reaches "
-                f"{getattr(whole, field):.4g} (all vertices) to {getattr(bare, field):.4g} (pinned ones alone)"
-            )
 
 
 def _target(args: argparse.Namespace) -> bool:

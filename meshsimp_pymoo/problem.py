@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import hashlib
+import inspect
 import os
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
@@ -12,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import trimesh
-from pymoo.core.problem import ElementwiseProblem
+from pymoo.core.problem import ElementwiseProblem, Problem
 
 from meshsimp_pymoo.datasets import find_source
 from meshsimp_pymoo.geometry.error import (
@@ -140,6 +142,13 @@ class MeshProblem(ElementwiseProblem):
         elementwise_runner: Callable[..., Any] | None = None,
         **kwargs: Any,
     ) -> None:
+        unknown = sorted(set(kwargs) - set(inspect.signature(Problem).parameters))
+        if unknown:
+            names = [inspect.signature(kind).parameters for kind in (MeshProblem, Problem)]
+            near = difflib.get_close_matches(unknown[0], [*names[0], *names[1]], 1)
+            raise TypeError(
+                f"MeshProblem has no argument {unknown[0]!r}" + (f"; did you mean {near[0]!r}?" if near else "")
+            )
         if footprint not in FOOTPRINTS or outside not in OUTSIDES:
             wrong, known = (footprint, FOOTPRINTS) if footprint not in FOOTPRINTS else (outside, OUTSIDES)
             raise ValueError(f"{wrong!r} is unknown; choose one of {', '.join(map(repr, known))}")
@@ -242,6 +251,8 @@ class MeshProblem(ElementwiseProblem):
     def simplify(self, kept: npt.NDArray[Any]) -> Simplified:
         """Return the triangles, the quality and the deviation at every vertex of one chromosome (N,)."""
         _require_bool(kept)
+        if np.shape(kept) != (self.n_var,):
+            raise ValueError(f"a subset has shape ({self.n_var},), one entry a vertex, not {np.shape(kept)}")
         return simplify(self.model, np.asarray(kept) | self.pinned, footprint=self.footprint, outside=self.outside)
 
     def quality(self, kept: npt.NDArray[Any]) -> Quality:

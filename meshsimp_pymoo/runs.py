@@ -123,10 +123,14 @@ def claim_experiment(out: str | os.PathLike[str]) -> Path:
     if folder.exists() and not folder.is_dir():
         raise ResultError(f"{folder}: is a file; name a folder")
     if folder.is_dir() and not (folder / EXPERIMENT_FILE).exists():
-        foreign = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
+        # a process killed at its very beginning leaves the two folders, and perhaps models
+        own, begun = (folder / "runs", folder / "models"), list((folder / "models").glob("*.npz"))
+        entries = [*folder.iterdir(), *(path for part in own if part.is_dir() for path in part.iterdir())]
+        foreign = sorted({path for path in entries if not path.name.startswith(".")} - {*own, *begun})
         if foreign:
             raise ResultError(
-                f"{folder}: holds {foreign[0]} and is no experiment's folder; name another one or a new one"
+                f"{folder}: holds {foreign[0].relative_to(folder)} and is no experiment's folder; name another one "
+                "or a new one"
             )
     try:
         for name in ("runs", "models"):
@@ -281,8 +285,11 @@ class RunStore:
 
     def clean(self) -> None:
         """Remove what killed processes left behind."""
-        for leftover in self.folder.glob(".*.partial"):
-            leftover.unlink(missing_ok=True)
+        out = self.folder.parent
+        for folder in (out, out / "runs", out / "models"):
+            for leftover in folder.glob(".*.partial"):
+                if leftover.is_file():
+                    leftover.unlink(missing_ok=True)
 
 
 def write_model(out: Path, model: OpenModel) -> str:

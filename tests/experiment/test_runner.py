@@ -456,6 +456,20 @@ def test_a_folder_with_other_things_in_it_is_refused(config, tmp_path):
     assert not (tmp_path / "runs").exists()
 
 
+def test_a_folder_that_a_killed_process_had_only_begun_is_continued(config, tmp_path, reference):
+    import shutil
+
+    out = tmp_path / "out"
+    (out / "runs").mkdir(parents=True)
+    shutil.copytree(reference / "models", out / "models")
+    (out / "models" / ".half.npz.00000000.partial").write_text("half")
+    assert run_experiment(config, out).finished == RUNS
+    (tmp_path / "other" / "models").mkdir(parents=True)
+    (tmp_path / "other" / "models" / "face.ply").write_text("precious")
+    with pytest.raises(ResultError, match=r"models.face\.ply"):
+        run_experiment(config, tmp_path / "other")
+
+
 def test_two_calls_do_not_work_in_one_folder(config, stored):
     with locked(stored), pytest.raises(ResultError, match="another process"):
         run_experiment(config, stored)
