@@ -2,16 +2,18 @@
 
 The data flow, which is also the order in which one part may import another::
 
-    geometry/      load -> orient -> model -> triangulation -> error     arrays in, arrays out; knows no pymoo
+    geometry/      load -> orient -> model -> triangulation -> error -> live     arrays in, arrays out; knows no pymoo
     datasets       built-in models by name
     problem        MeshProblem: which vertices are kept -> (error, triangles)
     operators/     sampling, crossover, mutation, repair, duplicates: how fronts are searched
+    memetic_search the seeded search
     algorithms     the paper's algorithms, wired
-    baselines/     other people's simplification, scored by the same error
+    baselines/     other ways to simplify, scored by the same error
     indicators     how good a front is
     analysis       many runs -> merged fronts, tables, choices
-    results        what a run leaves on disk
-    report/        pictures
+    results, runs  what a run leaves on disk
+    report/        pictures, tables, findings
+    experiment/    YAML files and the runs they ask for
     cli            the shell command ``meshsimp``
 
 Public names are imported when they are first used, so that ``import meshsimp_pymoo`` is quick.
@@ -24,31 +26,43 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.algorithms import moead, nsga2_v1, nsga2_v2, weighted_ga_v1, weighted_ga_v2
+    from meshsimp_pymoo.baselines.greedy import greedy_insertion, thinning
     from meshsimp_pymoo.geometry.error import Quality
+    from meshsimp_pymoo.geometry.live import LiveTriangulation
     from meshsimp_pymoo.geometry.load import ModelError, ModelWarning
     from meshsimp_pymoo.geometry.model import OpenModel
+    from meshsimp_pymoo.memetic_search import memetic
     from meshsimp_pymoo.operators import (
         OAX,
+        HalfPlaneCrossover,
         NeighbourShift,
+        NestedSubsets,
         PackedDuplicates,
         PinnedCorners,
         RandomSubset,
+        Relocation,
         SubsetUniformCrossover,
     )
     from meshsimp_pymoo.problem import MeshProblem
     from meshsimp_pymoo.results import ResultError, read_front, write_front
 
 _HOMES = {
+    "memetic_search": ("memetic",),
     "algorithms": ("moead", "nsga2_v1", "nsga2_v2", "weighted_ga_v1", "weighted_ga_v2"),
     "geometry.error": ("Quality",),
     "geometry.load": ("ModelError", "ModelWarning"),
     "geometry.model": ("OpenModel",),
+    "geometry.live": ("LiveTriangulation",),
+    "baselines.greedy": ("greedy_insertion", "thinning"),
     "operators": (
         "OAX",
+        "HalfPlaneCrossover",
         "NeighbourShift",
+        "NestedSubsets",
         "PackedDuplicates",
         "PinnedCorners",
         "RandomSubset",
+        "Relocation",
         "SubsetUniformCrossover",
     ),
     "problem": ("MeshProblem",),
@@ -58,21 +72,28 @@ _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "OAX",
+    "HalfPlaneCrossover",
+    "LiveTriangulation",
     "MeshProblem",
     "ModelError",
     "ModelWarning",
     "NeighbourShift",
+    "NestedSubsets",
     "OpenModel",
     "PackedDuplicates",
     "PinnedCorners",
     "Quality",
     "RandomSubset",
+    "Relocation",
     "ResultError",
     "SubsetUniformCrossover",
+    "greedy_insertion",
+    "memetic",
     "moead",
     "nsga2_v1",
     "nsga2_v2",
     "read_front",
+    "thinning",
     "weighted_ga_v1",
     "weighted_ga_v2",
     "write_front",
@@ -92,4 +113,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted({*globals(), *__all__})

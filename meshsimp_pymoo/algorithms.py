@@ -37,7 +37,7 @@ from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.util.display.column import Column
 from pymoo.util.display.output import Output
 
-from meshsimp_pymoo.memetic import memetic
+from meshsimp_pymoo.memetic_search import memetic
 from meshsimp_pymoo.operators import (
     OAX,
     NeighbourShift,

@@ -8,7 +8,7 @@ from pymoo.optimize import minimize
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.baselines.greedy import thinning
 from meshsimp_pymoo.geometry.error import evaluate_subsets
-from meshsimp_pymoo.memetic import memetic
+from meshsimp_pymoo.memetic_search import memetic
 from meshsimp_pymoo.operators import (
     HalfPlaneCrossover,
     NestedSubsets,
