@@ -255,8 +255,9 @@ def test_a_turned_grid_has_no_slivers_and_no_uncovered_border(angle):
     grid = grid_source(np.random.default_rng(0).random((12, 17)), 1.0, 1.0)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     model = build_model(SourceMesh(grid.points @ turn.T, grid.faces, {}, "turned"), up="z")
-    everything = simplify(model, np.ones(model.n_vertices, bool)).quality
-    assert (everything.triangles, everything.uncovered) == (2 * 11 * 16, 0)
+    for footprint in FOOTPRINTS:
+        everything = simplify(model, np.ones(model.n_vertices, bool), footprint=footprint).quality
+        assert (everything.triangles, everything.uncovered) == (2 * 11 * 16, 0)
     corners = simplify(model, np.isin(np.arange(model.n_vertices), model.corners), outside="ignore").quality
     assert (corners.triangles, corners.uncovered) == (2, 0)
 
