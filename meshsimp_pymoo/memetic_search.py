@@ -3,8 +3,8 @@
 The population is a ladder of sizes: every rung is a number of triangles and holds the best mesh found of at most that
 many. Parents are neighbours on the ladder, so that their patches have a similar density; a child takes one side of a
 random line from each, is brought to the size of its first parent, and is annealed (Ho, Shu, Chen 2004 call the passing
-on of solutions between neighbouring sizes inheritance). The error on a rung never grows, so the front is never worse
-than the thinning it started from.
+on of solutions between neighbouring sizes inheritance). The error on a rung never grows, so at these sizes the front is
+never worse than the thinning it started from.
 """
 
 from __future__ import annotations
