@@ -76,6 +76,11 @@ class SizeLadder(Survival):
 
     def _do(self, problem: Any, pop: Population, *args: Any, n_survive: int | None = None, **kwargs: Any) -> Population:
         F = pop.get("F")
+        if F.shape[1] != 2:
+            raise ValueError(
+                f"the ladder of sizes has two objectives, a measure of the error and the triangles, the problem has "
+                f"{F.shape[1]}; leave one measure, or use nsga3()"
+            )
         violation = pop.get("CV").ravel() if problem.has_constraints() else np.zeros(len(pop))
         if self.rungs is None:
             self.rungs = np.unique(F[:, 1])
@@ -109,6 +114,8 @@ def memetic(
     **kwargs: Any,
 ) -> GeneticAlgorithm:
     """Return the seeded memetic algorithm: thinning, half-plane crossover, annealed relocation, a ladder of sizes.
+
+    It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error").
 
     Parameters
     ----------

@@ -18,8 +18,8 @@ from pymoo.core.problem import ElementwiseProblem, Problem
 
 from meshsimp_pymoo.datasets import find_source
 from meshsimp_pymoo.geometry.error import (
-    ERROR,
     FOOTPRINTS,
+    MEASURES,
     OUTSIDES,
     TRIANGLES,
     Quality,
@@ -37,6 +37,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # Chromosomes whose numbers are remembered; each takes about 200 bytes.
 MEMO_SIZE = 100_000
+# Numbers of each solution that pymoo keeps beside its objectives.
+REPORTED = ("error", "vertices", "mean_error", "rms_error", "max_error", "uncovered")
 # A landmark given by position is the nearest vertex, but not one farther away than this share of the diagonal.
 LANDMARK_REACH = 0.01
 
@@ -65,7 +67,7 @@ class ThreadRunner:
 
 
 class MeshProblem(ElementwiseProblem):
-    """Choose the vertices of an open mesh to keep: minimise (error, triangles).
+    """Choose the vertices of an open mesh to keep: minimise (error, triangles), or other measures of the error.
 
     A solution is a bool vector over the vertices in vector order (see :class:`OpenModel`); its mesh is the Delaunay
     triangulation of the kept vertices in the plane. Pinned vertices belong to every mesh, whether or not the chromosome
@@ -91,10 +93,16 @@ class MeshProblem(ElementwiseProblem):
     pin : "corners", "hull", file rows, positions, or a list of these
         Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole numbers
         for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's frame.
+    objectives : tuple of str
+        What is minimised: one or more of "error" (the sum of w_p d_p), "rms_error" and "max_error" (see
+        :class:`~meshsimp_pymoo.geometry.error.Quality`), then "triangles". All come from the same evaluation.
+    weights : str or array, optional
+        How much each vertex counts in the error: one number for each row of the file, or the name of one of its
+        per-vertex attributes; see :meth:`~meshsimp_pymoo.geometry.model.OpenModel.with_weights`. 1 by default.
     max_triangles : int, optional
         Largest number of triangles, as a pymoo constraint.
     max_error : float, optional
-        Largest error, as a pymoo constraint [model units].
+        Largest value of the first objective, as a pymoo constraint [model units].
     n_threads : int, optional
         Threads of the default runner; all cores by default.
     memo : int
@@ -107,15 +115,20 @@ class MeshProblem(ElementwiseProblem):
     Attributes
     ----------
     model : OpenModel
-        The original mesh.
+        The original mesh; it holds the weights.
+    objectives : tuple of str
+        Names of the columns of F.
     pinned : (N,) bool array
         Vertices that every mesh keeps.
+    settings : dict
+        The arguments that decide what a chromosome's mesh and numbers are; with the same model they make the problem
+        again.
 
     Notes
     -----
-    ``out`` also holds ``vertices``, ``mean_error``, ``rms_error``, ``max_error`` and ``uncovered``, so that
-    ``result.opt.get("max_error")`` works. A subset that emits no triangle is no mesh; it gets the worst objectives,
-    N times the diagonal and 2 N triangles, which any mesh dominates.
+    ``out`` also holds ``error``, ``vertices``, ``mean_error``, ``rms_error``, ``max_error`` and ``uncovered``, whatever
+    the objectives, so that ``result.opt.get("max_error")`` works. A subset that emits no triangle is no mesh; it gets
+    the worst objectives, N times the diagonal and 2 N triangles, which any mesh dominates.
 
     Examples
     --------
@@ -135,6 +148,8 @@ class MeshProblem(ElementwiseProblem):
         spacing: tuple[float, float] | None = None,
         nodata: float | None = None,
         pin: str | Sequence[Any] | npt.NDArray[Any] | None = None,
+        objectives: Sequence[str] = ("error", "triangles"),
+        weights: str | npt.ArrayLike | None = None,
         max_triangles: int | None = None,
         max_error: float | None = None,
         n_threads: int | None = None,
@@ -156,7 +171,21 @@ class MeshProblem(ElementwiseProblem):
             raise ValueError(f"max_triangles={max_triangles} leaves no mesh; give 1 or more")
         if max_error is not None and not max_error >= 0:
             raise ValueError(f"max_error={max_error} is no error; give 0 or more")
+        self.objectives = _checked_objectives(objectives)
+        self.settings: dict[str, Any] = {
+            "up": up,
+            "patch": patch,
+            "spacing": spacing,
+            "nodata": nodata,
+            "footprint": footprint,
+            "outside": outside,
+            "pin": pin,
+            "objectives": self.objectives,
+            "weights": weights,
+        }
         self.model = open_model(model, up=up, patch=patch, spacing=spacing, nodata=nodata)
+        if weights is not None:
+            self.model = self.model.with_weights(weights)
         self.footprint = footprint
         self.outside = outside
         self.pinned = pinned_vertices(self.model, pin)
@@ -166,7 +195,7 @@ class MeshProblem(ElementwiseProblem):
         self._memo_size = memo
         super().__init__(
             n_var=self.model.n_vertices,
-            n_obj=2,
+            n_obj=len(self.objectives),
             n_ieq_constr=(max_triangles is not None) + (max_error is not None),
             xl=0,
             xu=1,
@@ -218,35 +247,35 @@ class MeshProblem(ElementwiseProblem):
 
     def outcome(self, row: FloatArray) -> dict[str, Any]:
         """Turn one row of :meth:`evaluate_subsets` into pymoo's ``out``."""
-        n = self.model.n_vertices
         if row[TRIANGLES] == 0:
-            error, triangles = self.worst
-            out: dict[str, Any] = dict(
-                vertices=0, mean_error=error / n, rms_error=error / n, max_error=error / n, uncovered=n
-            )
+            n = self.model.n_vertices
+            worst = self.model.diagonal
+            quality = Quality(self.model.total_weight * worst, 2 * n, 0, worst, worst, worst, n)
         else:
-            quality = as_quality(row, n)
-            error, triangles = float(row[ERROR]), float(row[TRIANGLES])
-            out = dict(
-                vertices=quality.vertices,
-                mean_error=quality.mean_error,
-                rms_error=quality.rms_error,
-                max_error=quality.max_error,
-                uncovered=quality.uncovered,
-            )
-        out["F"] = [error, triangles]
+            quality = self.as_quality(row)
+        out: dict[str, Any] = {name: getattr(quality, name) for name in REPORTED}
+        F = [float(getattr(quality, name)) for name in self.objectives]
+        out["F"] = F
         if self.n_ieq_constr:
             out["G"] = []
             if self.max_triangles is not None:
-                out["G"].append(triangles - self.max_triangles)
+                out["G"].append(F[-1] - self.max_triangles)
             if self.max_error is not None:
-                out["G"].append(error - self.max_error)
+                out["G"].append(F[0] - self.max_error)
         return out
 
+    def as_quality(self, row: FloatArray) -> Quality:
+        """Name the columns of one row of :meth:`evaluate_subsets`."""
+        return as_quality(row, self.model.total_weight)
+
     @property
-    def worst(self) -> tuple[float, float]:
-        """Objectives that every mesh dominates, given to subsets that emit no triangle: (N times the diagonal, 2 N)."""
-        return self.model.n_vertices * self.model.diagonal, 2.0 * self.model.n_vertices
+    def worst(self) -> tuple[float, ...]:
+        """Objectives that every mesh dominates, given to subsets that emit no triangle.
+
+        By default (N times the diagonal, 2 N); the mean and the maximum of the error are at worst the diagonal.
+        """
+        nothing = np.zeros(6)
+        return tuple(self.outcome(nothing)["F"])
 
     def simplify(self, kept: npt.NDArray[Any]) -> Simplified:
         """Return the triangles, the quality and the deviation at every vertex of one chromosome (N,)."""
@@ -286,6 +315,18 @@ class MeshProblem(ElementwiseProblem):
     def __deepcopy__(self, memo: dict[int, Any]) -> MeshProblem:
         # Nothing of it changes during a run but what it remembers, so copies may share it (save_history makes many).
         return self
+
+
+def _checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
+    """Return the objectives as a tuple, or raise a ValueError that says what they must be."""
+    names = (objectives,) if isinstance(objectives, str) else tuple(objectives)
+    measures = names[:-1]
+    if names[-1:] != ("triangles",) or not measures or set(measures) - set(MEASURES) or len(set(names)) < len(names):
+        raise ValueError(
+            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, MEASURES))}, each "
+            "once, and 'triangles' last, as in ('error', 'triangles')"
+        )
+    return names
 
 
 def open_model(

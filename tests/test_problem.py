@@ -13,9 +13,18 @@ from pymoo.indicators.hv import HV
 from pymoo.operators.mutation.bitflip import BitflipMutation
 from pymoo.optimize import minimize
 from pymoo.parallelization import DaskParallelization, JoblibParallelization, StarmapParallelization
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
-from meshsimp_pymoo import OAX, MeshProblem, NeighbourShift, PinnedCorners, RandomSubset
-from meshsimp_pymoo.algorithms import nsga2_v1, nsga2_v2
+from meshsimp_pymoo import (
+    OAX,
+    MeshProblem,
+    NeighbourShift,
+    NestedSubsets,
+    PinnedCorners,
+    RandomSubset,
+    Relocation,
+)
+from meshsimp_pymoo.algorithms import memetic, moead, nsga2_v1, nsga2_v2, nsga3
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.geometry import error
 from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, grid_source
@@ -124,6 +133,111 @@ def test_impossible_arguments_are_refused(arguments, message):
 def test_a_misspelt_argument_is_refused_with_the_nearest_name():
     with pytest.raises(TypeError, match="no argument 'footprnt'; did you mean 'footprint'"):
         MeshProblem("roof:3", footprnt="hull")
+
+
+# ------------------------------------------------------------------------------- other objectives, and weights
+
+
+@pytest.mark.parametrize(
+    "objectives",
+    [
+        ("rms_error", "triangles"),
+        ("max_error", "triangles"),
+        ("error", "max_error", "triangles"),
+        ["error", "triangles"],
+    ],
+)
+def test_the_objectives_are_the_named_numbers_of_the_same_evaluation(problem, objectives):
+    other = MeshProblem("face:300", objectives=objectives)
+    assert other.n_obj == len(objectives)
+    out = other.evaluate(subsets(problem, 5), return_as_dictionary=True)
+    for kept, F in zip(subsets(problem, 5), out["F"], strict=True):
+        np.testing.assert_array_equal(F, [getattr(problem.quality(kept), name) for name in objectives])
+    np.testing.assert_array_equal(out["error"], problem.evaluate(subsets(problem, 5))[:, 0])
+    assert (other.evaluate(subsets(problem, 5)) < other.worst).all()
+
+
+def test_a_bound_on_the_error_is_one_on_the_first_objective():
+    problem = MeshProblem("face:300", objectives=("rms_error", "triangles"), max_error=2.0, max_triangles=90)
+    F, G = problem.evaluate(subsets(problem))
+    np.testing.assert_allclose(G, F[:, ::-1] - [90, 2.0])
+
+
+@pytest.mark.parametrize(
+    "objectives", ["error", (), ("error",), ("triangles",), ("triangles", "error"), ("l1", "triangles"), ("error",) * 2]
+)
+def test_objectives_that_make_no_problem_are_refused(objectives):
+    with pytest.raises(ValueError, match="'triangles' last"):
+        MeshProblem("roof:3", objectives=objectives)
+
+
+def test_nsga3_spreads_over_three_objectives():
+    problem = MeshProblem("face:300", objectives=("error", "max_error", "triangles"))
+    result = minimize(problem, nsga3(n_partitions=6), ("n_gen", 15), seed=1)
+    assert result.X.dtype == bool
+    assert len(NonDominatedSorting().do(result.F, only_non_dominated_front=True)) == len(result.F)
+    for kept, F in zip(result.X, result.F, strict=True):
+        q = problem.quality(kept)
+        assert F.tolist() == [q.error, q.max_error, q.triangles]
+    # The population holds solutions that the sum and the triangles alone would not have kept.
+    F = result.pop.get("F")
+    fronts = [NonDominatedSorting().do(F[:, columns], only_non_dominated_front=True) for columns in ([0, 2], [0, 1, 2])]
+    assert len(fronts[0]) < len(fronts[1])
+    again = minimize(problem, nsga3(n_partitions=6), ("n_gen", 15), seed=1)
+    assert again.X.tobytes() == result.X.tobytes()
+
+
+def test_algorithms_of_two_objectives_refuse_a_third_and_name_the_way_out():
+    problem = MeshProblem("roof:9", objectives=("error", "max_error", "triangles"))
+    for algorithm in (memetic(8), moead(8)):
+        with pytest.raises(ValueError, match=r"nsga3\(\)"):
+            minimize(problem, algorithm, ("n_gen", 2), seed=1)
+
+
+def test_the_memetic_search_lowers_the_measure_of_the_problem():
+    problem = MeshProblem("face:300", objectives=("rms_error", "triangles"))
+    seeds = minimize(problem, memetic(12), ("n_gen", 1), seed=1)
+    found = minimize(problem, memetic(12), ("n_gen", 8), seed=1)
+    sizes = seeds.F[:, 1]
+    best = np.array([found.F[found.F[:, 1] <= size, 0].min() for size in sizes])
+    assert (best <= seeds.F[:, 0]).all()
+    assert best.sum() < 0.97 * seeds.F[:, 0].sum()
+    assert problem.quality(found.X[0]).rms_error == found.F[0, 0]
+
+
+def test_relocation_lowers_the_measure_of_the_problem():
+    problems = [MeshProblem("face:300", objectives=(measure, "triangles")) for measure in ("error", "rms_error")]
+    X = subsets(problems[0], 12) | problems[0].pinned
+    by_sum, by_squares = (
+        problems[1].evaluate(Relocation(100)._do(problem, X, random_state=np.random.default_rng(0)))[:, 0]
+        for problem in problems
+    )
+    assert by_squares.sum() < 0.99 * by_sum.sum()
+
+
+def test_thinning_and_relocation_refuse_the_maximum():
+    problem = MeshProblem("roof:9", objectives=("max_error", "triangles"))
+    with pytest.raises(ValueError, match="the first objective is the maximum"):
+        NestedSubsets()(problem, 4, random_state=np.random.default_rng(0))
+    with pytest.raises(ValueError, match=r"nsga2_v1\(\)"):
+        Relocation()._do(problem, subsets(problem, 2), random_state=np.random.default_rng(0))
+
+
+def test_weights_come_as_an_array_in_the_file_s_order_or_by_name():
+    source = load("face:300")
+    importance = np.random.default_rng(1).random(300)
+    with_attribute = SourceMesh(source.points, source.faces, {"importance": importance}, "face")
+    named = MeshProblem(with_attribute, weights="importance")
+    given = MeshProblem(source, weights=importance)
+    X = subsets(given, 5)
+    np.testing.assert_array_equal(named.evaluate(X), given.evaluate(X))
+    deviation = given.simplify(X[0]).deviation
+    assert given.evaluate(X)[0, 0] == pytest.approx((importance[given.model.source_index] * deviation).sum())
+    # A model that has weights keeps them; pickling does too.
+    np.testing.assert_array_equal(MeshProblem(given.model).evaluate(X), given.evaluate(X))
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(given)).evaluate(X), given.evaluate(X))
+    np.testing.assert_array_equal(MeshProblem(source).evaluate(X)[:, 1], given.evaluate(X)[:, 1])
+    assert (MeshProblem(source).evaluate(X)[:, 0] > given.evaluate(X)[:, 0]).all()
 
 
 # --------------------------------------------------------------------------------------------------- pinning

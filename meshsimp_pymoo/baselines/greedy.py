@@ -22,12 +22,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numba import njit
 
+from meshsimp_pymoo.geometry.borrow import borrowed
 from meshsimp_pymoo.geometry.live import (
     EMITTED,
     END,
     N_EMITTED,
     Ground,
     Live,
+    _cost,
     _cost_in,
     _star,
     _total,
@@ -36,6 +38,7 @@ from meshsimp_pymoo.geometry.live import (
     make_ground,
     make_live,
     remove,
+    summed_error,
     try_remove,
 )
 from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD
@@ -55,7 +58,7 @@ class NestedFront:
     order : (M,) int array
         The further vertices; subset k has the base and the first k of them.
     error : (M + 1,) float array
-        Error of subset k [model units].
+        Error of subset k, in the measure that was asked for [model units].
     triangles : (M + 1,) int array
         Triangles of subset k.
     n_vertices : int
@@ -88,6 +91,7 @@ def thinning(
     kept: np.ndarray | None = None,
     footprint: str = "model",
     outside: str = "nearest",
+    measure: str = "error",
 ) -> NestedFront:
     """Remove the vertex whose removal adds the least error, until only the pinned ones are left.
 
@@ -101,6 +105,8 @@ def thinning(
         The subset to start from; all vertices by default (of several at one position, the first).
     footprint, outside : str
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
+    measure : {"error", "rms_error"}
+        What counts: w_p d_p, or w_p times the square of d_p; also what the front's ``error`` is.
 
     Returns
     -------
@@ -109,7 +115,7 @@ def thinning(
     fixed = _pinned(model, pinned)
     start = np.ones(model.n_vertices, bool) if kept is None else kept | fixed
     sites = _sites(model, start, fixed)
-    ground = make_ground(model, footprint=footprint, outside=outside)
+    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
     live = make_live(model.n_vertices)
     build(ground, live, model, sites)
     n = int((~fixed[sites]).sum())
@@ -121,7 +127,7 @@ def thinning(
     return NestedFront(
         base,
         removed[:n_removed][::-1].copy(),
-        error[: n_removed + 1][::-1].copy(),
+        summed_error(error[: n_removed + 1][::-1].copy(), ground, model),
         triangles[: n_removed + 1][::-1].copy(),
         model.n_vertices,
     )
@@ -135,6 +141,7 @@ def greedy_insertion(
     most: int | None = None,
     footprint: str = "model",
     outside: str = "nearest",
+    measure: str = "error",
 ) -> NestedFront:
     """Insert the worst vertex, starting from the pinned ones.
 
@@ -145,11 +152,13 @@ def greedy_insertion(
     pinned : (N,) bool array, optional
         Vertices to start from; the corners by default. They must span a triangle of the mesh.
     choose : {"point", "triangle"}
-        The vertex with the largest deviation of all, or that of the triangle with the largest sum of deviations.
+        The vertex with the largest cost of all, or that of the triangle with the largest sum of costs.
     most : int, optional
         Number of vertices to insert; all by default.
     footprint, outside : str
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
+    measure : {"error", "rms_error"}
+        What counts: w_p d_p, or w_p times the square of d_p; also what the front's ``error`` is.
 
     Returns
     -------
@@ -162,7 +171,7 @@ def greedy_insertion(
         raise ValueError(f"most={most} is no number of vertices; give 0 or more")
     fixed = _pinned(model, pinned)
     sites = _sites(model, fixed, fixed)
-    ground = make_ground(model, footprint=footprint, outside=outside)
+    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
     live = make_live(model.n_vertices)
     build(ground, live, model, sites)
     n = model.n_vertices - len(sites) if most is None else min(most, model.n_vertices - len(sites))
@@ -171,7 +180,11 @@ def greedy_insertion(
     triangles = np.empty(n + 1, np.int64)
     n_inserted = _grow(ground, live, choose == "point", inserted, error, triangles)
     return NestedFront(
-        sites, inserted[:n_inserted], error[: n_inserted + 1], triangles[: n_inserted + 1], model.n_vertices
+        sites,
+        inserted[:n_inserted],
+        summed_error(error[: n_inserted + 1], ground, model),
+        triangles[: n_inserted + 1],
+        model.n_vertices,
     )
 
 
@@ -247,6 +260,8 @@ def _thin(
     error: np.ndarray,
     triangles: np.ndarray,
 ) -> int:
+    g = borrowed(g)
+    live = borrowed(live)
     n_all = len(g.z)
     key = np.full(n_all, np.inf)
     heap = np.empty(len(sites), np.int32)
@@ -324,6 +339,8 @@ def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
         d = live.cost[i]
         if emitted:
             d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            if g.weighed:
+                d = _cost(g, d, i)
         elif live.bare_segment[i] < 0:
             d = 1.0  # there is no mesh yet; any vertex will do
         if d > most or (d == most and worst >= 0 and i < worst):
@@ -337,6 +354,8 @@ def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
 def _grow(
     g: Ground, live: Live, by_point: bool, inserted: np.ndarray, error: np.ndarray, triangles: np.ndarray
 ) -> int:
+    g = borrowed(g)
+    live = borrowed(live)
     n_records = len(live.kind)
     key = np.full(n_records, np.inf)  # minus what makes a triangle urgent
     best = np.full(n_records, -1, np.int32)

@@ -6,6 +6,10 @@ The error of a mesh is the sum of d_p over all N original vertices p (Campomanes
 * p not covered: its distance in space to the point of the mesh that is nearest to it in the plane
   (``outside="nearest"``), or 0 (``outside="ignore"``, the paper's reading).
 
+Where the model has weights (see :class:`~meshsimp_pymoo.geometry.model.OpenModel`) the error is the sum of w_p d_p,
+its mean and its root mean square are weighted by w, and its maximum is that of d_p over all p with w_p > 0. Weights
+of 1 are the same as none; other weights change numbers, never triangles.
+
 One compiled call does it for one subset or for many: gather, triangulate, emit (slivers, footprint), measure. It
 allocates nothing of the order of N; all it needs is in a :class:`Workspace`, one for each thread.
 """
@@ -40,6 +44,8 @@ COVER_TOLERANCE = 1e-9
 
 # Columns of the table that evaluation fills, one row a subset.
 ERROR, TRIANGLES, VERTICES, SQUARES, MAXIMUM, UNCOVERED = range(6)
+# What can be minimised besides the triangles, under the names that Quality gives them.
+MEASURES = ("error", "rms_error", "max_error")
 NO_SITE = 0xFFFFFFFF
 
 
@@ -50,13 +56,15 @@ class Quality:
     Attributes
     ----------
     error : float
-        Sum of d_p over all N original vertices [model units].
+        Sum of w_p d_p over all N original vertices; all w_p are 1 unless the model has weights [model units].
     triangles : int
         Number of triangles of the mesh.
     vertices : int
         Number of vertices its triangles use.
-    mean_error, rms_error, max_error : float
-        Mean, root mean square and maximum of d_p over all N original vertices [model units].
+    mean_error, rms_error : float
+        Mean and root mean square of d_p over all N original vertices, weighted by w [model units].
+    max_error : float
+        Maximum of d_p over the original vertices whose weight is not 0 [model units].
     uncovered : int
         Number of original vertices that no triangle covers.
     """
@@ -278,6 +286,7 @@ def _measure_bare(
     end: int,
     emitted: np.ndarray,
     nearest: bool,
+    weight: np.ndarray,
     row: np.ndarray,
     deviation: np.ndarray,
     covered: np.ndarray,
@@ -311,9 +320,11 @@ def _measure_bare(
             row[UNCOVERED] += 1
             dz = (1.0 - t) * site_z[a] + t * site_z[b] - z[i]
             d = np.sqrt(d2 * unit * unit + dz * dz) if nearest else 0.0
-        row[ERROR] += d
-        row[SQUARES] += d * d
-        row[MAXIMUM] = max(row[MAXIMUM], d)
+        w = weight[i] if len(weight) > 0 else 1.0
+        row[ERROR] += w * d
+        row[SQUARES] += w * d * d
+        if w > 0.0:
+            row[MAXIMUM] = max(row[MAXIMUM], d)
         if len(deviation) > 0:
             deviation[i] = d
             covered[i] = is_covered
@@ -331,7 +342,8 @@ def _evaluate_one(
     covered: np.ndarray,
 ) -> int:
     """Fill ``row`` with the six numbers of one subset; return the end of the triangles' records in the workspace."""
-    xy, z, corners, has_twins, unit, min_height, exact_area, exact_lift, side, state, start, items, faces = model
+    xy, z, corners, has_twins, unit, min_height, exact_area, exact_lift = model[:8]
+    side, state, start, items, faces, weight = model[8:]
     sites, dropped, site_xy, site_z, inserted, mesh, emitted, stack, site_triangle = workspace
     n_all = len(z)
     n = _gather(xy, z, kept, has_twins, sites, dropped, site_xy, site_z)
@@ -369,6 +381,7 @@ def _evaluate_one(
             site_triangle[mesh[t]] = t
             site_triangle[mesh[t + 1]] = t
             site_triangle[mesh[t + 2]] = t
+    weighted = len(weight) > 0
     total = 0.0
     squares = 0.0
     maximum = 0.0
@@ -404,9 +417,15 @@ def _evaluate_one(
         wb = cx * ay - cy * ax
         wc = ax * by - ay * bx
         d = abs((wa * site_z[a] + wb * site_z[b] + wc * site_z[c]) / (wa + wb + wc) - z[i])
-        total += d
-        squares += d * d
-        maximum = max(maximum, d)
+        if weighted:
+            w = weight[i]
+            total += w * d
+            squares += w * d * d
+            maximum = max(maximum, d) if w > 0.0 else maximum
+        else:
+            total += d
+            squares += d * d
+            maximum = max(maximum, d)
         if len(deviation) > 0:
             deviation[i] = d
             covered[i] = True
@@ -429,7 +448,7 @@ def _evaluate_one(
     row[UNCOVERED] = 0
     if n_bare > 0:
         _measure_bare(
-            xy, z, dropped, n_bare, site_xy, site_z, unit, mesh, end, emitted, nearest, row, deviation, covered
+            xy, z, dropped, n_bare, site_xy, site_z, unit, mesh, end, emitted, nearest, weight, row, deviation, covered
         )
     return end
 
@@ -475,8 +494,8 @@ def evaluate_subsets(
     Returns
     -------
     (P, 6) float array
-        Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of squared d_p), MAXIMUM, UNCOVERED. A subset that emits no
-        triangle has error, squares and maximum inf.
+        Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of w_p d_p squared, that is, w_p times the square of d_p),
+        MAXIMUM, UNCOVERED. A subset that emits no triangle has error, squares and maximum inf.
     """
     use_footprint, nearest = _rules(footprint, outside)
     rows = np.ascontiguousarray(np.atleast_2d(kept))
@@ -577,20 +596,39 @@ def simplify(model: OpenModel, kept: np.ndarray, *, footprint: str = "model", ou
     turn = records.argmin(axis=1)
     faces = np.stack([records[np.arange(len(records)), (turn + k) % 3] for k in range(3)], axis=1)
     faces = faces[np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))]
-    return Simplified(sites[faces], as_quality(numbers, model.n_vertices), deviation, covered)
+    return Simplified(sites[faces], as_quality(numbers, model.total_weight), deviation, covered)
 
 
-def as_quality(row: np.ndarray, n_vertices: int) -> Quality:
-    """Name the columns of one row of :func:`evaluate_subsets`."""
+def as_quality(row: np.ndarray, total_weight: float) -> Quality:
+    """Name the columns of one row of :func:`evaluate_subsets`; ``total_weight`` is that of the model, N without any."""
     return Quality(
         error=float(row[ERROR]),
         triangles=int(row[TRIANGLES]),
         vertices=int(row[VERTICES]),
-        mean_error=float(row[ERROR] / n_vertices),
-        rms_error=float(np.sqrt(row[SQUARES] / n_vertices)),
+        mean_error=float(row[ERROR] / total_weight),
+        rms_error=float(np.sqrt(row[SQUARES] / total_weight)),
         max_error=float(row[MAXIMUM]),
         uncovered=int(row[UNCOVERED]),
     )
+
+
+def measured(table: np.ndarray, measure: str, total_weight: float) -> np.ndarray:
+    """Return one of MEASURES for each row (..., 6) of :func:`evaluate_subsets`; the numbers of :func:`as_quality`.
+
+    Examples
+    --------
+    >>> measured(np.array([[6.0, 2, 4, 20, 4, 0]]), "rms_error", 5.0)
+    array([2.])
+    """
+    _require_measure(measure)
+    if measure == "error":
+        return table[..., ERROR]
+    return np.sqrt(table[..., SQUARES] / total_weight) if measure == "rms_error" else table[..., MAXIMUM]
+
+
+def _require_measure(measure: str) -> None:
+    if measure not in MEASURES:
+        raise ValueError(f"measure={measure!r} is unknown; choose one of {', '.join(map(repr, MEASURES))}")
 
 
 def _rules(footprint: str, outside: str) -> tuple[bool, bool]:
@@ -635,15 +673,15 @@ def mesh_quality(
     """
     deviation, covered, n_used = mesh_deviation(model, vertices, faces, outside=outside, frame=frame)
     n = model.n_vertices
-    return Quality(
-        error=float(deviation.sum()),
-        triangles=len(faces),
-        vertices=n_used,
-        mean_error=float(deviation.sum() / n),
-        rms_error=float(np.sqrt((deviation**2).sum() / n)),
-        max_error=float(deviation.max()),
-        uncovered=int(n - covered.sum()),
-    )
+    weights = np.ones(n) if model.weights is None else model.weights
+    row = np.empty(6)
+    row[ERROR] = (weights * deviation).sum()
+    row[TRIANGLES] = len(faces)
+    row[VERTICES] = n_used
+    row[SQUARES] = (weights * deviation**2).sum()
+    row[MAXIMUM] = deviation[weights > 0].max()
+    row[UNCOVERED] = n - covered.sum()
+    return as_quality(row, model.total_weight)
 
 
 def mesh_deviation(
@@ -655,6 +693,51 @@ def mesh_deviation(
     frame: str = "file",
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Return d_p (N,), covered (N,) and the number of vertices used, for any mesh; see :func:`mesh_quality`."""
+    deviation, covered, _ = _look_at_mesh(model, vertices, faces, outside, frame, n_recorded=0)
+    return deviation, covered, len(np.unique(faces))
+
+
+@dataclass(frozen=True)
+class MeshSamples:
+    """What a mesh's heights do to the d_p of each original vertex, with the mesh fixed in the plane.
+
+    With heights h of the mesh's vertices, d_p = sqrt(gap_p^2 + (h[sites_p] . shares_p - z_p)^2).
+
+    Attributes
+    ----------
+    sites : (N, 3) int array
+        The mesh's vertices that carry the surface at each original vertex, or at the point nearest to it.
+    shares : (N, 3) float array
+        Their shares in the height there, which add up to 1; all 0 where a vertex is not covered and costs nothing.
+    gap : (N,) float array
+        Distance in the plane to the mesh [model units]; 0 where it covers the vertex.
+    covered : (N,) bool array
+        Whether a triangle covers it.
+    """
+
+    sites: np.ndarray
+    shares: np.ndarray
+    gap: np.ndarray
+    covered: np.ndarray
+
+
+def mesh_samples(
+    model: OpenModel,
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    *,
+    outside: str = "nearest",
+    frame: str = "file",
+) -> MeshSamples:
+    """Return which vertices of a mesh decide about the deviation at each original vertex; see :func:`mesh_quality`."""
+    _, covered, recorded = _look_at_mesh(model, vertices, faces, outside, frame, n_recorded=model.n_vertices)
+    return MeshSamples(*recorded, covered)
+
+
+def _look_at_mesh(
+    model: OpenModel, vertices: np.ndarray, faces: np.ndarray, outside: str, frame: str, n_recorded: int
+) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Check a mesh and return d_p, covered, and as many rows of sites, shares and gaps as are to be recorded."""
     _, nearest = _rules("model", outside)
     if frame not in ("file", "local"):
         raise ValueError(f"frame={frame!r} is unknown; choose 'file' or 'local'")
@@ -681,9 +764,10 @@ def mesh_deviation(
     extent = float(np.ptp(model.xy, axis=0).max())
     deviation = np.empty(model.n_vertices)
     covered = np.empty(model.n_vertices, np.bool_)
-    if not _mesh_deviation(samples, z, xy, height, faces, model.unit, extent, nearest, deviation, covered):
+    recorded = np.zeros((n_recorded, 3), np.int64), np.zeros((n_recorded, 3)), np.zeros(n_recorded)
+    if not _mesh_deviation(samples, z, xy, height, faces, model.unit, extent, nearest, deviation, covered, *recorded):
         raise ValueError(f"none of the {len(faces)} faces has an area in the plane")
-    return deviation, covered, len(np.unique(faces))
+    return deviation, covered, recorded
 
 
 # Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are
@@ -703,8 +787,11 @@ def _mesh_deviation(
     nearest: bool,
     deviation: np.ndarray,
     covered: np.ndarray,
+    sites: np.ndarray,
+    shares: np.ndarray,
+    gap: np.ndarray,
 ) -> bool:
-    """Fill d_p and its coverage for an arbitrary mesh; return False if it has no solid face."""
+    """Fill d_p, its coverage and, if they have rows, what decides it for any mesh; False if no face is solid."""
     n = len(z)
     # Samples by cell of the unit square, about two in each.
     side = max(int(np.sqrt(n / 2)), 1)
@@ -757,7 +844,11 @@ def _mesh_deviation(
                     wa = 1.0 - wb - wc
                     if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
                         d = abs(wa * height[a] + wb * height[b] + wc * height[c] - z[i])
-                        deviation[i] = min(deviation[i], d)
+                        if d < deviation[i]:
+                            deviation[i] = d
+                            if len(gap) > 0:
+                                sites[i, 0], sites[i, 1], sites[i, 2] = a, b, c
+                                shares[i, 0], shares[i, 1], shares[i, 2] = wa, wb, wc
                         covered[i] = True
     if m == 0:
         return False
@@ -783,4 +874,8 @@ def _mesh_deviation(
         guess, t, d = nearest_segment(xy, ends, key, m, boxes, stack, samples[2 * i], samples[2 * i + 1], guess)
         dz = (1.0 - t) * height[ends[guess, 0]] + t * height[ends[guess, 1]] - z[i]
         deviation[i] = np.sqrt(d * unit * unit + dz * dz)
+        if len(gap) > 0:
+            sites[i, 0], sites[i, 1], sites[i, 2] = ends[guess, 0], ends[guess, 1], ends[guess, 1]
+            shares[i, 0], shares[i, 1] = 1.0 - t, t
+            gap[i] = np.sqrt(d) * unit
     return True

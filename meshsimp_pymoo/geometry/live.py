@@ -20,14 +20,16 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
+from meshsimp_pymoo.geometry.borrow import borrowed
 from meshsimp_pymoo.geometry.error import (
     COVER_TOLERANCE,
     _is_sliver,
+    _require_measure,
     _rules,
     _sum_of_three,
 )
@@ -43,6 +45,9 @@ NONE = 0xFFFFFFFF
 # What a triangle is, as bits of ``kind``; a plain one is inside the footprint and emitted.
 EMITTED, THIN, PEELED, INSIDE, VISITED = 1, 2, 4, 8, 16
 PLAIN = EMITTED | INSIDE
+
+# A tentative change that touches more triangles than this is done and undone instead.
+MOST = 48
 
 # Entries of ``tally``.
 (
@@ -79,6 +84,9 @@ class Ground(NamedTuple):
     items: np.ndarray
     faces: np.ndarray
     nearest: bool
+    weighed: bool  # whether the cost of a vertex is not d_p itself, but what _cost makes of it
+    weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
+    squared: bool  # whether the cost is the square of d_p
 
 
 class Live(NamedTuple):
@@ -90,7 +98,7 @@ class Live(NamedTuple):
     subtotal: np.ndarray  # (2 N,) sum of the costs in each emitted triangle
     following: np.ndarray  # (N,) next vertex in the same list
     place: np.ndarray  # (N,) the triangle a dropped vertex lies in; some triangle of a site
-    cost: np.ndarray  # (N,) d_p of the bare vertices
+    cost: np.ndarray  # (N,) cost of the bare vertices
     used: np.ndarray  # (N,) number of emitted triangles at each site
     site: np.ndarray  # (N,) whether the vertex is in the triangulation
     free: np.ndarray  # (2 N,) unused records
@@ -115,6 +123,9 @@ class Live(NamedTuple):
     edge: np.ndarray
     ears: np.ndarray  # (2 N, 3)
     ear_edges: np.ndarray  # (2 N, 3)
+    gone: np.ndarray  # (2 MOST,) triangles that a tentative change takes away
+    forms: np.ndarray  # (2 MOST, 12) sides and planes of those that would come, see _enter_form
+    saved: np.ndarray  # (10 MOST,) what the records held before
     tally: np.ndarray  # numbers of things, see the names above
     amount: np.ndarray  # errors, see the names above
 
@@ -291,6 +302,14 @@ def _fill(
         ears[n, k] = ring[k]
         ear_edges[n, k] = edge[k]
     return n + 1
+
+
+@njit(cache=True, nogil=True)
+def _cost(g: Ground, d: float, i: int) -> float:
+    """Return what vertex i adds to the total where d_p = d, if that is not d itself (``g.weighed``)."""
+    if g.squared:
+        d *= d
+    return d * g.weight[i] if len(g.weight) > 0 else d
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -505,6 +524,8 @@ def _settle_bare(g: Ground, live: Live) -> None:
             bare_segment[i] = best
             bare_gap[i] = gap
             cost = _bare_cost(xy, g.z, mesh, segment[best], i, g.unit, g.nearest) if best >= 0 else 0.0
+            if g.weighed:
+                cost = _cost(g, cost, i)
             live.amount[BARE_ERROR] += cost - live.cost[i]
             live.cost[i] = cost
 
@@ -598,8 +619,11 @@ def _settle_thin(g: Ground, live: Live, seed: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _settle(g: Ground, live: Live) -> None:
-    """Enter the triangles of the region into the books and place the pooled vertices."""
+def _settle(g: Ground, live: Live, half: bool) -> None:
+    """Enter the triangles of the region into the books and place the pooled vertices.
+
+    With ``half`` a second operation follows at once, which settles the bare vertices of both.
+    """
     xy = g.xy
     z = g.z
     mesh = live.mesh
@@ -615,6 +639,7 @@ def _settle(g: Ground, live: Live) -> None:
     pool = live.pool
     following = live.following
     amount = live.amount
+    weighed = g.weighed
     any_thin = False
     for q in range(count[N_REGION]):
         t = region[q]
@@ -692,6 +717,8 @@ def _settle(g: Ground, live: Live) -> None:
         head[r] = i
         if kind[r] & EMITTED:
             d = _cost_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            if weighed:
+                d = _cost(g, d, i)
             subtotal[r] += d
             amount[COVERED_ERROR] += d
         else:
@@ -703,15 +730,17 @@ def _settle(g: Ground, live: Live) -> None:
                 _note_bare(live, v)
             else:
                 _forget_bare(live, v)
+    count[N_REGION] = 0
+    count[N_POOL] = 0
+    count[N_TOUCHED] = 0
+    if half:
+        return
     _settle_bare(g, live)
     for n in range(count[N_DEAD]):
         live.free_segment[count[N_FREE_SEGMENTS]] = live.dead[n]
         count[N_FREE_SEGMENTS] += 1
     count[N_DEAD] = 0
     count[N_ADDED] = 0
-    count[N_REGION] = 0
-    count[N_POOL] = 0
-    count[N_TOUCHED] = 0
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -726,8 +755,8 @@ def _new_record(live: Live) -> int:
 
 
 @njit(cache=True, nogil=True)
-def insert(g: Ground, live: Live, p: int) -> None:
-    """Insert vertex p, which is no site; its position must be free."""
+def _insert(g: Ground, live: Live, p: int, half: bool) -> None:
+    """Insert vertex p; ``half`` as in :func:`_settle`."""
     mesh = live.mesh
     count = live.tally
     t0 = live.place[p]
@@ -764,12 +793,12 @@ def insert(g: Ground, live: Live, p: int) -> None:
         mesh[h + 4] = t
         mesh[t + 5] = after + 2
         mesh[after + 6] = t + 1
-    _settle(g, live)
+    _settle(g, live, half)
 
 
 @njit(cache=True, nogil=True)
-def remove(g: Ground, live: Live, p: int) -> bool:
-    """Remove site p; return False, with nothing changed, if the others would span no triangle."""
+def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
+    """Remove site p; ``half`` as in :func:`_settle`."""
     mesh = live.mesh
     count = live.tally
     m = _star(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
@@ -815,183 +844,276 @@ def remove(g: Ground, live: Live, p: int) -> bool:
                 h = live.region[side - m] + 2
                 mesh[t + e + 4] = h
                 mesh[h + 4] = t + e
-    _settle(g, live)
+    _settle(g, live, half)
     return True
 
 
 @njit(cache=True, nogil=True, forceinline=True)
 def _total(live: Live) -> float:
-    """Error of the mesh; inf where there is none."""
+    """Sum of the costs; inf where there is no mesh."""
     if live.tally[N_EMITTED] == 0:
         return np.inf
     return live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
 
 
-@njit(cache=True, nogil=True)
-def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
-    """Return the change of error and of the number of triangles if site p were removed; inf where it cannot be."""
-    xy = g.xy
-    z = g.z
-    mesh = live.mesh
-    kind = live.kind
-    head = live.head
-    subtotal = live.subtotal
-    following = live.following
-    segment_of = live.segment_of
-    cavity = live.cavity
-    ring = live.ring
-    n_bare = live.tally[N_BARE]
-    m = _star(mesh, live.place[p], p, cavity, live.rim, ring)
-    plain = True
-    for k in range(m):
-        t = cavity[k]
-        plain = plain and kind[t >> 3] == PLAIN
-        if n_bare > 0:
-            for e in range(3):
-                plain = plain and segment_of[_slot(t + e)] < 0
-    ears = live.ears
-    n = 0
-    if plain:
-        n = _fill(xy, ring, m, live.edge, ears, live.ear_edges, g.exact_area, g.exact_lift)
-        plain = n > 0
-        for k in range(n):
-            a, b, c = ears[k, 0], ears[k, 1], ears[k, 2]
-            plain = plain and _is_inside(g, a, b, c) and not _is_thin(g, a, b, c)
-    if not plain:
-        return _done_and_undone(g, live, p)
-    change = 0.0
-    best = 0
-    for k in range(-1, m):
-        # The vertices of the star's triangles, and p itself.
-        i = np.int64(p)
-        if k >= 0:
-            r = cavity[k] >> 3
-            change -= subtotal[r]
-            i = np.int64(head[r])
-        while i >= 0:
-            for q in range(-1, n):
-                e = best if q < 0 else q
-                if (
-                    _side_area(xy, ears[e, 0], ears[e, 1], i) >= 0.0
-                    and _side_area(xy, ears[e, 1], ears[e, 2], i) >= 0.0
-                    and _side_area(xy, ears[e, 2], ears[e, 0], i) >= 0.0
-                ):
-                    best = e
-                    break
-                if q == n - 1:
-                    best = _nearest_ear(xy, ears, n, i)
-            change += _cost_in(xy, z, ears[best, 0], ears[best, 1], ears[best, 2], i)
-            i = np.int64(following[i]) if k >= 0 else np.int64(-1)
-    return change, -2
+@njit(cache=True, nogil=True, forceinline=True)
+def insert(g: Ground, live: Live, p: int) -> None:
+    """Insert vertex p, which is no site; its position must be free."""
+    _insert(g, live, p, False)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def remove(g: Ground, live: Live, p: int) -> bool:
+    """Remove site p; return False, with nothing changed, if the others would span no triangle."""
+    return _remove(g, live, p, False)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
+    """Remove site v and insert vertex w, either of them -1 for none; return False if v cannot go, with nothing changed.
+
+    The position of w must be free. Cheaper than the two operations where vertices are bare.
+    """
+    if v >= 0 and not _remove(g, live, v, w >= 0):
+        return False
+    if w >= 0:
+        _insert(g, live, w, False)
+    return True
 
 
 @njit(cache=True, nogil=True)
-def _nearest_ear(xy: np.ndarray, ears: np.ndarray, n: int, i: int) -> int:
-    """Find the triangle that vertex i lies least outside of: on an edge, where rounding decides."""
-    best = 0
-    least = -np.inf
-    for e in range(n):
-        a, b, c = ears[e, 0], ears[e, 1], ears[e, 2]
-        out = min(_side_area(xy, a, b, i), min(_side_area(xy, b, c, i), _side_area(xy, c, a, i)))
-        if out > least:
-            least = out
-            best = e
-    return best
-
-
-@njit(cache=True, nogil=True)
-def _done_and_undone(g: Ground, live: Live, p: int) -> tuple[float, int]:
+def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
     before = _total(live)
     n = live.tally[N_EMITTED]
-    if live.site[p]:
-        if not remove(g, live, p):
-            return np.inf, 0
-        change = _total(live) - before
-        n = live.tally[N_EMITTED] - n
-        insert(g, live, p)
-    else:
-        insert(g, live, p)
-        change = _total(live) - before
-        n = live.tally[N_EMITTED] - n
-        remove(g, live, p)
+    if not exchange(g, live, v, w):
+        return np.inf, 0
+    change = _total(live) - before
+    n = live.tally[N_EMITTED] - n
+    exchange(g, live, w, v)
     return change, n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
+def try_exchange(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, int]:
+    """Return the change of error and of the number of triangles if site v went and vertex w came; -1 means none.
+
+    Infinite where v cannot go, and where the change is found to exceed ``limit`` before it is known.
+    """
+    change, triangles = _try_inside(g, live, v, w, limit)
+    if np.isnan(change):
+        return _done_and_undone(g, live, v, w)
+    return change, triangles
+
+
+@njit(cache=True, nogil=True, forceinline=True)
 def try_insert(g: Ground, live: Live, p: int) -> tuple[float, int]:
     """Return the change of error and of the number of triangles if vertex p, no site, were inserted."""
+    return try_exchange(g, live, -1, p, np.inf)
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
+    """Return the change of error and of the number of triangles if site p were removed; inf where it cannot be."""
+    return try_exchange(g, live, p, -1, np.inf)
+
+
+@njit(cache=True, nogil=True)
+def _enter_form(
+    xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, x0: float, y0: float, forms: np.ndarray, k: int
+) -> None:
+    """Write the sides of triangle (a, b, c), >= 0 inside, and its plane as linear forms in (x - x0, y - y0, 1)."""
+    ax, ay = xy[2 * a] - x0, xy[2 * a + 1] - y0
+    bx, by = xy[2 * b] - x0, xy[2 * b + 1] - y0
+    cx, cy = xy[2 * c] - x0, xy[2 * c + 1] - y0
+    forms[k, 0] = ay - by
+    forms[k, 1] = bx - ax
+    forms[k, 2] = ax * by - ay * bx
+    forms[k, 3] = by - cy
+    forms[k, 4] = cx - bx
+    forms[k, 5] = bx * cy - by * cx
+    forms[k, 6] = cy - ay
+    forms[k, 7] = ax - cx
+    forms[k, 8] = cx * ay - cy * ax
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    rise_b = (z[b] - z[a]) / area
+    rise_c = (z[c] - z[a]) / area
+    forms[k, 9] = forms[k, 6] * rise_b + forms[k, 0] * rise_c
+    forms[k, 10] = forms[k, 7] * rise_b + forms[k, 1] * rise_c
+    forms[k, 11] = z[a] + forms[k, 8] * rise_b + forms[k, 2] * rise_c
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _inward(forms: np.ndarray, k: int, x: float, y: float) -> float:
+    """How far inside triangle k (x, y) lies, twice the least area with a side; negative outside."""
+    return min(
+        forms[k, 0] * x + forms[k, 1] * y + forms[k, 2],
+        min(forms[k, 3] * x + forms[k, 4] * y + forms[k, 5], forms[k, 6] * x + forms[k, 7] * y + forms[k, 8]),
+    )
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _may_go(mesh: np.ndarray, kind: np.ndarray, segment_of: np.ndarray, t: int, n_bare: int) -> int:
+    """Say whether triangle t can be replaced without a look at the outline: 1 emitted, 0 a ghost, -1 no."""
+    if n_bare > 0:
+        for e in range(3):
+            if segment_of[_slot(t + e)] >= 0:
+                return -1
+    if kind[t >> 3] == PLAIN:
+        return 1
+    return 0 if n_bare == 0 and (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX else -1
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[int, int]:
+    """List the triangles in conflict with w once the ears have replaced the star; as :func:`_cavity`.
+
+    The ears stand in the star's records (``gone``) only meanwhile. ``ring`` gets the rim's vertices.
+    """
+    mesh = live.mesh
+    gone = live.gone
+    rim = live.rim
+    saved = live.saved
+    ears = live.ears
+    ear_edges = live.ear_edges
+    t0 = np.int64(live.place[w])
+    among = False
+    for k in range(n_star):
+        among = among or gone[k] == t0
+        saved[8 * MOST + k] = rim[k]
+        saved[9 * MOST + k] = mesh[rim[k] + 4]
+        for e in range(8):
+            saved[8 * k + e] = mesh[gone[k] + e]
+    for k in range(n_ears):
+        t = gone[k]
+        for e in range(3):
+            mesh[t + e] = ears[k, e]
+            side = ear_edges[k, e]
+            if side < n_star + k:
+                h = np.int64(rim[side]) if side < n_star else gone[side - n_star] + 2
+                mesh[t + e + 4] = h
+                mesh[h + 4] = t + e
+    if among:
+        for k in range(n_ears):
+            t0 = gone[k]
+            if _conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
+                break
+    n_cavity, n_rim = _cavity(g.xy, mesh, t0, w, live.cavity, rim, live.stack, g.exact_area, g.exact_lift)
+    for k in range(n_rim):
+        h = rim[k]
+        live.ring[k] = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
+    for k in range(n_star):
+        for e in range(8):
+            mesh[gone[k] + e] = saved[8 * k + e]
+    for k in range(n_star):
+        mesh[saved[8 * MOST + k] + 4] = saved[9 * MOST + k]
+    return n_cavity, n_rim
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, int]:
+    """As :func:`try_exchange`, but nan where the outline is touched so that bare vertices may change."""
+    unknown = (np.nan, 0)
     xy = g.xy
     z = g.z
     mesh = live.mesh
     kind = live.kind
-    head = live.head
-    subtotal = live.subtotal
-    following = live.following
     segment_of = live.segment_of
     cavity = live.cavity
+    ears = live.ears
     ring = live.ring
-    rim = live.rim
+    gone = live.gone
+    subtotal = live.subtotal
     n_bare = live.tally[N_BARE]
-    n_cavity, n_rim = _cavity(
-        xy, mesh, live.place[p], p, cavity, rim, live.stack, g.exact_area, g.exact_lift
-    )
-    plain = True
-    for k in range(n_cavity):
-        t = cavity[k]
-        plain = plain and kind[t >> 3] == PLAIN
-        if n_bare > 0:
-            for e in range(3):
-                plain = plain and segment_of[_slot(t + e)] < 0
-    if plain:
-        for k in range(n_rim):
-            h = rim[k]
-            a = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
-            b = mesh[h]
-            ring[k] = a
-            plain = plain and _is_inside(g, a, b, p) and not _is_thin(g, a, b, p)
-    if not plain:
-        return _done_and_undone(g, live, p)
+    n_star = 0
+    n_ears = 0
+    n_emitted = 0
     change = 0.0
+    if v >= 0:
+        n_star = _star(mesh, live.place[v], v, cavity, live.rim, ring)
+        if n_star > MOST:
+            return unknown
+        for k in range(n_star):
+            t = np.int64(cavity[k])
+            emitted = _may_go(mesh, kind, segment_of, t, n_bare)
+            if emitted < 0:
+                return unknown
+            gone[k] = t
+            if emitted:
+                n_emitted += 1
+                change -= subtotal[t >> 3]
+        n_ears = _fill(xy, ring, n_star, live.edge, ears, live.ear_edges, g.exact_area, g.exact_lift)
+        if n_ears == 0:
+            return unknown
+    n_gone = n_star
+    n_cavity = 0
+    n_rim = 0
+    if w >= 0:
+        n_cavity, n_rim = _replaced(live, n_star, n_ears, w, g)
+        if n_star + n_cavity > 2 * MOST or n_ears + n_rim > 2 * MOST:
+            return unknown
+        for k in range(n_cavity):
+            t = np.int64(cavity[k])
+            ear = -1
+            for q in range(n_star):
+                if gone[q] == t:
+                    ear = q
+            if ear >= 0:
+                # An ear that goes again; the mark is that two of its corners are one.
+                ears[ear, 1] = ears[ear, 0]
+                continue
+            emitted = _may_go(mesh, kind, segment_of, t, n_bare)
+            if emitted < 0:
+                return unknown
+            gone[n_gone] = t
+            n_gone += 1
+            if emitted:
+                n_emitted += 1
+                change -= subtotal[t >> 3]
+    forms = live.forms
+    x0 = xy[2 * max(v, w)]
+    y0 = xy[2 * max(v, w) + 1]
+    n = 0
+    for k in range(n_rim + n_ears):
+        if k < n_rim:
+            a, b, c = np.int64(ring[k]), np.int64(ring[k + 1 if k + 1 < n_rim else 0]), np.int64(w)
+        else:
+            a, b, c = np.int64(ears[k - n_rim, 0]), np.int64(ears[k - n_rim, 1]), np.int64(ears[k - n_rim, 2])
+        if a == b or (a | b | c) > LAST_INDEX:
+            continue
+        if _is_thin(g, a, b, c) or not _is_inside(g, a, b, c):
+            return unknown
+        _enter_form(xy, z, a, b, c, x0, y0, forms, n)
+        n += 1
+    if n == 0:
+        return unknown
+    head = live.head
+    following = live.following
+    weighed = g.weighed
     best = 0
-    for k in range(n_cavity):
-        r = cavity[k] >> 3
-        change -= subtotal[r]
-        i = np.int64(head[r])
+    for k in range(-1, n_gone):
+        # The vertices of the triangles that go, and v itself.
+        i = np.int64(v) if k < 0 else np.int64(head[gone[k] >> 3])
         while i >= 0:
-            if i != p:
-                # The fan's triangle whose two spokes have i between them; within half a turn there is just one.
-                for q in range(-1, n_rim):
-                    e = best if q < 0 else q
-                    a = ring[e]
-                    b = ring[e + 1 if e + 1 < n_rim else 0]
-                    if (
-                        _side_area(xy, p, a, i) >= 0.0
-                        and _side_area(xy, b, p, i) >= 0.0
-                        and _side_area(xy, a, b, i) >= -1e-15
-                    ):
-                        best = e
-                        break
-                    if q == n_rim - 1:
-                        best = _nearest_spoke(xy, ring, n_rim, p, i)
-                a = ring[best]
-                b = ring[best + 1 if best + 1 < n_rim else 0]
-                change += _cost_in(xy, z, a, b, p, i)
-            i = np.int64(following[i])
-    return change, n_rim - n_cavity
-
-
-@njit(cache=True, nogil=True)
-def _nearest_spoke(xy: np.ndarray, ring: np.ndarray, n: int, p: int, i: int) -> int:
-    best = 0
-    least = -np.inf
-    for e in range(n):
-        a = ring[e]
-        b = ring[e + 1 if e + 1 < n else 0]
-        out = min(_side_area(xy, a, b, i), min(_side_area(xy, p, a, i), _side_area(xy, b, p, i)))
-        if out > least:
-            least = out
-            best = e
-    return best
+            if i != w:
+                x = xy[2 * i] - x0
+                y = xy[2 * i + 1] - y0
+                most = _inward(forms, best, x, y)
+                if most < 0.0:
+                    for q in range(n):
+                        amount = _inward(forms, q, x, y)
+                        if amount > most:
+                            most = amount
+                            best = q
+                            if most >= 0.0:
+                                break
+                    if most < -1e-15:
+                        return unknown
+                d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
+                change += _cost(g, d, i) if weighed else d
+            i = np.int64(following[i]) if k >= 0 else np.int64(-1)
+        if change > limit:
+            return np.inf, 0
+    return change, n - n_emitted
 
 
 @njit(cache=True, nogil=True)
@@ -999,6 +1121,8 @@ def _build(
     g: Ground, live: Live, sites: np.ndarray, site_xy: np.ndarray, first: np.ndarray, inserted: np.ndarray
 ) -> bool:
     """Triangulate the sites from scratch and enter everything into the books."""
+    g = borrowed(g)
+    live = borrowed(live)
     mesh = live.mesh
     count = live.tally
     end = triangulate(
@@ -1026,7 +1150,7 @@ def _build(
         live.segment_of[s] = -1
     live.kind[:] = 0
     # All triangles are the region; the vertices are placed by walking along the curve, faster than by looking at all.
-    _settle(g, live)
+    _settle(g, live, False)
     t = 0
     for i in range(len(g.z)):
         if live.site[i]:
@@ -1039,6 +1163,8 @@ def _build(
         live.head[r] = i
         if live.kind[r] & EMITTED:
             d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            if g.weighed:
+                d = _cost(g, d, i)
             live.subtotal[r] += d
             live.amount[COVERED_ERROR] += d
         else:
@@ -1061,11 +1187,13 @@ class LiveTriangulation:
         The subset to begin with; it must span a triangle.
     footprint, outside : str
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
+    measure : {"error", "rms_error"}
+        What ``error`` and all changes of it are: the sum of w_p d_p or the root mean square of d_p.
 
     Raises
     ------
     ValueError
-        If ``kept`` has the wrong shape or spans no triangle.
+        If ``kept`` has the wrong shape or spans no triangle, or the measure is no sum.
 
     Examples
     --------
@@ -1081,7 +1209,13 @@ class LiveTriangulation:
     """
 
     def __init__(
-        self, model: OpenModel, kept: np.ndarray, *, footprint: str = "model", outside: str = "nearest"
+        self,
+        model: OpenModel,
+        kept: np.ndarray,
+        *,
+        footprint: str = "model",
+        outside: str = "nearest",
+        measure: str = "error",
     ) -> None:
         kept = np.asarray(kept)
         if kept.shape != (model.n_vertices,) or kept.dtype != np.bool_:
@@ -1090,7 +1224,7 @@ class LiveTriangulation:
                 f"not {kept.dtype} of shape {kept.shape}"
             )
         self.model = model
-        self.ground = make_ground(model, footprint=footprint, outside=outside)
+        self.ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
         self.live = make_live(model.n_vertices)
         self._kept = kept.copy()
         # Of several vertices at one position the first kept one is the site; `_group` numbers the positions.
@@ -1113,8 +1247,8 @@ class LiveTriangulation:
 
     @property
     def error(self) -> float:
-        """The sum of d_p over all N vertices [model units]."""
-        return float(_total(self.live))
+        """The error in the chosen measure [model units]."""
+        return float(summed_error(_total(self.live), self.ground, self.model))
 
     @property
     def triangles(self) -> int:
@@ -1169,20 +1303,27 @@ class LiveTriangulation:
         v = self._index(vertex, kept=False)
         if self._site_at(v) is not None:
             return self._tried(lambda: self.insert(v), lambda: self.remove(v))
-        change, triangles = try_insert(self.ground, self.live, v)
-        return float(change), int(triangles)
+        return self._measured(*try_insert(self.ground, self.live, v))
 
     def try_remove(self, vertex: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if the vertex were dropped (inf: it cannot)."""
         v = self._index(vertex, kept=True)
         if self._has_twins:
             return self._tried(lambda: self.remove(v), lambda: self.insert(v))
-        change, triangles = try_remove(self.ground, self.live, v)
-        return float(change), int(triangles)
+        return self._measured(*try_remove(self.ground, self.live, v))
 
     def try_move(self, vertex: int, to: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if one vertex were dropped for another."""
-        return self._tried(lambda: self.move(vertex, to), lambda: self.move(to, vertex))
+        if self._has_twins:
+            return self._tried(lambda: self.move(vertex, to), lambda: self.move(to, vertex))
+        v, w = self._index(vertex, kept=True), self._index(to, kept=False)
+        return self._measured(*try_exchange(self.ground, self.live, v, w, np.inf))
+
+    def _measured(self, change: float, triangles: int) -> tuple[float, int]:
+        """Turn a change of the sum of costs into one of the error."""
+        if self.ground.squared:
+            change = summed_error(_total(self.live) + change, self.ground, self.model) - self.error
+        return float(change), int(triangles)
 
     def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
         before, triangles = self.error, self.triangles
@@ -1216,10 +1357,29 @@ class LiveTriangulation:
         return v
 
 
-def make_ground(model: OpenModel, *, footprint: str = "model", outside: str = "nearest") -> Ground:
-    """Return the arrays and rules of a model for the compiled functions of this module."""
+def make_ground(
+    model: OpenModel, *, footprint: str = "model", outside: str = "nearest", measure: str = "error"
+) -> Ground:
+    """Return the arrays and rules of a model for the compiled functions of this module.
+
+    The live triangulation adds costs up: w_p d_p for ``measure="error"``, and for ``"rms_error"`` w_p times the square
+    of d_p, which has the same order; a maximum is no sum.
+
+    Raises
+    ------
+    ValueError
+        If the measure is unknown or the maximum.
+    """
     use_footprint, nearest = _rules(footprint, outside)
-    xy, z, _, _, unit, min_height, exact_area, exact_lift, side, state, start, items, faces = model.kernel_arguments
+    _require_measure(measure)
+    if measure == "max_error":
+        raise ValueError(
+            "measure='max_error' is no sum over the vertices, which thinning, insertion and relocation need; "
+            "use 'error' or 'rms_error' for them"
+        )
+    xy, z, _, _, unit, min_height, exact_area, exact_lift, side, state, start, items, faces, weight = (
+        model.kernel_arguments
+    )
     return Ground(
         xy,
         z,
@@ -1233,7 +1393,16 @@ def make_ground(model: OpenModel, *, footprint: str = "model", outside: str = "n
         items,
         faces,
         nearest,
+        measure == "rms_error" or len(weight) > 0,
+        weight,
+        measure == "rms_error",
     )
+
+
+def summed_error(cost: Any, ground: Ground, model: OpenModel) -> Any:
+    """Return the error for sums of costs: the sum itself, or the root of their weighted mean where they are squares."""
+    # Sums that live can end a little below 0, where nothing deviates.
+    return np.sqrt(np.maximum(cost, 0.0) / model.total_weight) if ground.squared else cost
 
 
 def make_live(n_vertices: int) -> Live:
@@ -1271,6 +1440,9 @@ def make_live(n_vertices: int) -> Live:
         edge=np.empty(2 * n, np.int32),
         ears=np.empty((2 * n, 3), np.uint32),
         ear_edges=np.empty((2 * n, 3), np.int32),
+        gone=np.empty(2 * MOST, np.int64),
+        forms=np.empty((2 * MOST, 12), np.float64),
+        saved=np.empty(10 * MOST, np.uint32),
         tally=np.zeros(13, np.int64),
         amount=np.zeros(2, np.float64),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import warnings
 from collections.abc import Mapping
@@ -25,6 +26,8 @@ from meshsimp_pymoo.geometry.predicates import exact_ranges
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
+# Lazy attributes of a model that do not depend on its weights.
+GEOMETRY_ONLY = ("neighbours", "footprint", "hull")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,8 @@ class OpenModel:
         Side of the unit square, a power of two [file units].
     facts : dict
         What was found while checking the surface (see :func:`meshsimp_pymoo.geometry.orient.check_open_surface`).
+    weights : (N,) float array, optional
+        How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
     """
 
     name: str
@@ -83,11 +88,17 @@ class OpenModel:
     xy: FloatArray
     unit: float
     facts: Any = field(default=None, repr=False)
+    weights: FloatArray | None = None
 
     @property
     def n_vertices(self) -> int:
         """Number N of original vertices."""
         return len(self.points)
+
+    @property
+    def total_weight(self) -> float:
+        """Sum of the weights; N without any."""
+        return float(self.n_vertices if self.weights is None else self.weights.sum())
 
     @property
     def diagonal(self) -> float:
@@ -101,10 +112,11 @@ class OpenModel:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of the geometry: the same for the same vertices and faces in the same file order."""
+        """SHA-256 of the geometry and weights: the same for the same vertices and faces in the same file order."""
         digest = hashlib.sha256()
-        for array in (self.points, self.faces, self.source_index):
-            digest.update(np.ascontiguousarray(array).tobytes())
+        for array in (self.points, self.faces, self.source_index, self.weights):
+            if array is not None:
+                digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
     @cached_property
@@ -142,7 +154,64 @@ class OpenModel:
             area,
             lift,
             *self.footprint,
+            np.empty(0) if self.weights is None else self.weights,
         )
+
+    def with_weights(self, weights: str | npt.ArrayLike) -> OpenModel:
+        """Return the same model with another weight for each vertex: its share in the error.
+
+        Parameters
+        ----------
+        weights : str or array
+            The name of a numeric per-vertex attribute of the file, or one number for each row of the file (a grid's
+            rows and columns are accepted too): finite, at least 0, not all of them 0. A weight of 0 means that a vertex
+            does not count; it may be kept all the same.
+
+        Raises
+        ------
+        ModelError
+            If there is no such attribute, or the numbers cannot be weights.
+
+        Examples
+        --------
+        >>> from meshsimp_pymoo.datasets import load
+        >>> roof = load_model(load("roof:3"))
+        >>> roof.with_weights(np.full(9, 2.0)).total_weight
+        18.0
+        """
+        if isinstance(weights, str):
+            if weights not in self.attributes:
+                known = ", ".join(sorted(self.attributes)) or "none"
+                raise ModelError(f"{self.name}: has no per-vertex attribute {weights!r} to weigh by; it has: {known}")
+            label, values = f"weights {weights!r}", np.asarray(self.attributes[weights])
+            if values.ndim != 1 or values.dtype.kind not in "biuf":
+                raise ModelError(
+                    f"{self.name}: {label} are of type {values.dtype} and shape {values.shape}; a weight is one number"
+                )
+        else:
+            label, values = "weights", np.asarray(weights)
+            if values.dtype.kind not in "biuf":
+                raise ModelError(f"{self.name}: {label} are of type {values.dtype}; give one number for each vertex")
+            values = values.ravel()
+            n_rows = int(self.source_index.max()) + 1
+            if len(values) < n_rows:
+                raise ModelError(
+                    f"{self.name}: there are {len(values)} {label} for {n_rows} rows of the file; give one for each row"
+                )
+            values = values[self.source_index]
+        values = np.ascontiguousarray(values, float)
+        wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0)))
+        if len(wrong):
+            raise ModelError(
+                f"{self.name}: {len(wrong)} of {len(values)} {label} are negative or not finite (first: row "
+                f"{self.source_index[wrong[0]]}, {values[wrong[0]]}); give finite numbers of at least 0"
+            )
+        if not values.any():
+            raise ModelError(f"{self.name}: all {len(values)} {label} are 0; nothing would count")
+        weighted = dataclasses.replace(self, weights=values)
+        # What was found out about the geometry holds for this one too.
+        weighted.__dict__.update({key: self.__dict__[key] for key in GEOMETRY_ONLY if key in self.__dict__})
+        return weighted
 
     def to_local(self, points: npt.ArrayLike) -> FloatArray:
         """Turn points (M, 3) of the file's frame into this model's upright local frame [file units]."""
@@ -155,7 +224,7 @@ class OpenModel:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        lazy = ("neighbours", "footprint", "kernel_arguments", "hull", "hash")
+        lazy = (*GEOMETRY_ONLY, "kernel_arguments", "hash")
         return {name: value for name, value in self.__dict__.items() if name not in lazy}
 
 

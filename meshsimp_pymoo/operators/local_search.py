@@ -27,6 +27,7 @@ from meshsimp_pymoo.geometry.live import (
     try_insert,
     try_remove,
 )
+from meshsimp_pymoo.operators.requirements import summed_measure
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.geometry.model import OpenModel
@@ -187,6 +188,7 @@ def relocate(
     temperature: float = 0.2,
     footprint: str = "model",
     outside: str = "nearest",
+    measure: str = "error",
 ) -> NDArray[np.bool_]:
     """Return a subset of the same size with less error, or ``kept`` itself: annealed moves, the best state seen.
 
@@ -208,6 +210,8 @@ def relocate(
         Initial temperature, in units of the error per kept vertex. 0 accepts improvements only.
     footprint, outside : str
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
+    measure : {"error", "rms_error"}
+        What is lowered: the sum of w_p d_p, or of w_p times the square of d_p.
 
     Returns
     -------
@@ -220,7 +224,7 @@ def relocate(
         held = (n, make_live(n))
         _local.live = held
     live = held[1]
-    ground = make_ground(model, footprint=footprint, outside=outside)
+    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
     kept = kept | pinned
     sites = np.flatnonzero(kept)
     if model.kernel_arguments[3]:
@@ -251,6 +255,7 @@ def relocate_all(
     temperature: float = 0.2,
 ) -> NDArray[np.bool_]:
     """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number."""
+    measure = summed_measure(problem)
     seeds = random_state.integers(1, 2**63 - 1, size=len(X))
 
     def one(k: int) -> NDArray[np.bool_]:
@@ -264,6 +269,7 @@ def relocate_all(
             temperature=temperature,
             footprint=problem.footprint,
             outside=problem.outside,
+            measure=measure,
         )
 
     rows = list(thread_pool().map(one, range(len(X))))

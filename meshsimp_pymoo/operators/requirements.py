@@ -55,6 +55,24 @@ def plane_coordinates(problem: Any, operator: object) -> NDArray[np.float64]:
     return xy
 
 
+def summed_measure(problem: Any) -> str:
+    """Return the first objective's measure, which local search and thinning lower: "error" or "rms_error".
+
+    Raises
+    ------
+    ValueError
+        If it is the maximum, which is no sum over the vertices.
+    """
+    measure = str(problem.objectives[0])
+    if measure == "max_error":
+        raise ValueError(
+            "thinning and relocation lower a sum over the vertices, and the first objective is the maximum, "
+            "'max_error'; use objectives=('error', ...) or ('rms_error', ...), or operators that only evaluate, "
+            "as in nsga2_v1() and nsga2_v2()"
+        )
+    return measure
+
+
 def require_bool(X: NDArray[Any], operator: object) -> None:
     """Refuse chromosomes that are not bool.
 

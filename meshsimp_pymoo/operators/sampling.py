@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from pymoo.core.sampling import Sampling
 
 from meshsimp_pymoo.baselines.greedy import NestedFront, thinning
-from meshsimp_pymoo.operators.requirements import mesh_neighbours, pinned_vertices, require_probability
+from meshsimp_pymoo.operators.requirements import (
+    mesh_neighbours,
+    pinned_vertices,
+    require_probability,
+    summed_measure,
+)
 
 
 class RandomSubset(Sampling):
@@ -103,7 +108,11 @@ def nested_front(problem: Any, operator: object) -> NestedFront:
     front = _FRONTS.get(problem)
     if front is None:
         front = thinning(
-            problem.model, problem.pinned, footprint=problem.footprint, outside=problem.outside
+            problem.model,
+            problem.pinned,
+            footprint=problem.footprint,
+            outside=problem.outside,
+            measure=summed_measure(problem),
         )
         _FRONTS[problem] = front
     return front

@@ -13,15 +13,18 @@ from meshsimp_pymoo.datasets import load, names
 from meshsimp_pymoo.geometry.error import (
     ERROR,
     FOOTPRINTS,
+    MEASURES,
     OUTSIDES,
     TRIANGLES,
     UNCOVERED,
     evaluate_subsets,
+    measured,
     mesh_deviation,
     mesh_quality,
+    mesh_samples,
     simplify,
 )
-from meshsimp_pymoo.geometry.load import ModelWarning, SourceMesh, grid_source
+from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, grid_source
 from meshsimp_pymoo.geometry.model import build_model, load_model
 
 RULES = [(f, o) for f in FOOTPRINTS for o in OUTSIDES]
@@ -361,6 +364,110 @@ def test_meshes_without_area_or_with_wrong_indices_are_refused():
         mesh_quality(plane, np.zeros((3, 3)), [[0, 1, 3]])
     with pytest.raises(ValueError, match="not finite"):
         mesh_quality(plane, [[0, 0, np.nan], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+
+
+def test_each_vertex_s_deviation_follows_from_the_heights_that_carry_it(model):
+    """Any heights of the mesh's vertices: d_p = hypot(gap, shares . heights - z), covered or not."""
+    for outside in OUTSIDES:
+        faces = simplify(model, subset(model, 0.15), outside=outside).faces
+        moved = model.points + np.random.default_rng(0).normal(0, 5, (model.n_vertices, 1)) * [0, 0, 1]
+        samples = mesh_samples(model, moved, faces, outside=outside, frame="local")
+        height = (samples.shares * moved[samples.sites, 2]).sum(axis=1)
+        deviation, covered, _ = mesh_deviation(model, moved, faces, outside=outside, frame="local")
+        charged = samples.shares.any(axis=1)
+        np.testing.assert_array_equal(samples.covered, covered)
+        np.testing.assert_array_equal(charged, covered | (outside == "nearest"))
+        np.testing.assert_allclose(
+            np.where(charged, np.hypot(samples.gap, height - model.points[:, 2]), 0.0), deviation, atol=1e-9
+        )
+        np.testing.assert_allclose(samples.shares[charged].sum(axis=1), 1.0)
+
+
+# ------------------------------------------------------------------------------------------------- weights
+
+
+def weights_of(model, seed=3):
+    """One weight for each row of the file, a fifth of them 0."""
+    rng = np.random.default_rng(seed)
+    n_rows = model.source_index.max() + 1
+    return rng.uniform(0.1, 3.0, n_rows) * (rng.random(n_rows) < 0.8)
+
+
+@pytest.mark.parametrize(("footprint", "outside"), RULES)
+def test_weighted_numbers_are_the_weighted_sum_means_and_maximum_of_the_deviation(model, footprint, outside):
+    weighted = model.with_weights(weights_of(model))
+    w = weights_of(model)[model.source_index]
+    kept = subset(model, 0.2)
+    plain = simplify(model, kept, footprint=footprint, outside=outside)
+    d = plain.deviation
+    result = simplify(weighted, kept, footprint=footprint, outside=outside)
+    np.testing.assert_array_equal(result.faces, plain.faces)
+    np.testing.assert_array_equal(result.deviation, d)
+    q = result.quality
+    assert q.error == pytest.approx((w * d).sum())
+    assert q.mean_error == pytest.approx(np.average(d, weights=w))
+    assert q.rms_error == pytest.approx(np.sqrt(np.average(d**2, weights=w)))
+    assert q.max_error == d[w > 0].max()
+    assert q.uncovered == plain.quality.uncovered
+    row = evaluate_subsets(weighted, kept, footprint=footprint, outside=outside)[0]
+    for name in MEASURES:
+        assert measured(row, name, weighted.total_weight) == getattr(q, name)
+    if footprint == "model":
+        again = mesh_quality(weighted, model.file_points, result.faces, outside=outside)
+        assert again.error == pytest.approx(q.error)
+        assert again.rms_error == pytest.approx(q.rms_error)
+        assert again.max_error == pytest.approx(q.max_error)
+
+
+def test_weights_of_one_change_nothing_and_twice_the_weight_is_twice_the_error(model):
+    X = np.array([subset(model, share) for share in (0.05, 0.3, 0.8)])
+    table = evaluate_subsets(model, X)
+    n_rows = model.source_index.max() + 1
+    np.testing.assert_array_equal(evaluate_subsets(model.with_weights(np.ones(n_rows)), X), table)
+    np.testing.assert_array_equal(evaluate_subsets(model.with_weights(np.ones(n_rows, int)), X), table)
+    double = evaluate_subsets(model.with_weights(np.full(n_rows, 2.0)), X)
+    np.testing.assert_array_equal(double, table * np.array([2, 1, 1, 2, 1, 1]))
+
+
+def test_weights_follow_the_rows_of_the_file_or_come_from_it():
+    grid = np.arange(12.0).reshape(3, 4)
+    elevation = np.random.default_rng(0).random((3, 4))
+    elevation[0, 3] = np.nan
+    plain = load_model(grid_source(elevation, 1.0, 1.0), up="z")
+    model = plain.with_weights(grid)
+    np.testing.assert_array_equal(model.weights, plain.source_index)
+    source = load("face:150")
+    named = SourceMesh(source.points, source.faces, {"importance": np.arange(150, dtype=np.uint16)}, "named")
+    model = load_model(named, up="z").with_weights("importance")
+    np.testing.assert_array_equal(model.weights, model.source_index)
+    assert model.hash != load_model(named, up="z").hash
+    assert model.neighbours is not None
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        (np.ones(149), "149 weights for 150 rows"),
+        (np.full(150, -1.0), r"150 of 150 weights are negative or not finite \(first: row"),
+        (np.r_[np.ones(149), np.nan], "row 149, nan"),
+        (np.zeros(150), "all 150 weights are 0"),
+        (np.array(["x"] * 150), "give one number"),
+        ("colour", "no per-vertex attribute 'colour' to weigh by; it has: color, label"),
+        ("color", "a weight is one number"),
+        ("label", "a weight is one number"),
+    ],
+)
+def test_what_cannot_be_weights_is_refused(weights, message):
+    source = load("face:150")
+    attributes = {"color": np.zeros((150, 4), np.uint8), "label": np.array(["a"] * 150)}
+    model = load_model(SourceMesh(source.points, source.faces, attributes, "labelled"), up="z")
+    with pytest.raises(ModelError, match=message):
+        model.with_weights(weights)
+
+
+def test_an_unknown_measure_is_refused():
+    with pytest.raises(ValueError, match="measure='mean' is unknown; choose one of 'error'"):
+        measured(np.zeros(6), "mean", 1.0)
 
 
 # ------------------------------------------------------------------------------------- the independent referee
