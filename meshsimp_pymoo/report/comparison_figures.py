@@ -16,7 +16,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.analysis import attainment_surfaces, selected_solutions
 from meshsimp_pymoo.geometry.error import mesh_deviation, simplify
 from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.report.figures import LEAST_RELIEF, plot_mesh
+from meshsimp_pymoo.report.figures import front_axes, plot_error, plot_mesh, relief_exaggeration
 from meshsimp_pymoo.report.study import SCORINGS, Case, Study
 from meshsimp_pymoo.report.tables import WEIGHTS_SEED
 from meshsimp_pymoo.runs import classic_mesh
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from meshsimp_pymoo.geometry.model import OpenModel
 
-__all__ = ["box_figure", "fronts_figure", "meshes_figure", "selected_figure"]
+__all__ = ["box_figure", "fronts_figure", "meshes_figure", "method_look", "selected_figure"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -45,7 +45,6 @@ FRONT, SIDE = (90.0, 0.0), (20.0, -60.0)
 # The error's colour ends at this share of the largest deviation of any mesh shown, so that a few spikes do not
 # pale all the rest.
 COLOUR_END = 0.98
-UNCOVERED = "#0072B2"
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def fronts_figure(study: Study, case: Case) -> Figure:
     optimal = case.optimal.front
     ax.step(optimal[:, 1], optimal[:, 0], where="post", color="0.75", linewidth=5, label="pseudo-optimal", zorder=1)
     for method, runs in case.runs.items():
-        colour, mark = _look(study, case, method)
+        colour, mark = method_look(study, case, method)
         merged = np.vstack(list(runs.values()))
         front = non_dominated(merged)
         style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "zorder": 3}
@@ -79,7 +78,8 @@ def fronts_figure(study: Study, case: Case) -> Figure:
         if len(runs) > 1:
             half = attainment_surfaces(runs, [50])[50]
             ax.step(half[:, 1], half[:, 0], where="post", color=colour, linewidth=0.9, alpha=0.7, zorder=2)
-    _axes(ax, np.vstack([np.vstack(list(runs.values())) for runs in case.runs.values()]))
+    drawn = np.vstack([np.vstack(list(runs.values())) for runs in case.runs.values()])
+    front_axes(ax, drawn, label="error [file units]")
     ax.set_title(f"{case.problem.name}: fronts merged over runs", loc="left")
     ax.set_title(f"{case.budget}, error {SCORINGS[case.scoring]}", loc="right", fontsize=9, color="0.4")
     ax.legend(
@@ -109,19 +109,20 @@ def box_figure(study: Study, cases: Sequence[Case], indicator: str) -> Figure:
         methods = list(case.runs)
         values = [np.asarray(getattr(case.scores[m], indicator), dtype=float) for m in methods]
         several = [k for k, runs in enumerate(values) if len(runs) > 1]
-        boxes = panel.boxplot(
-            [values[k] for k in several],
-            positions=[k + 1 for k in several],
-            widths=0.65,
-            patch_artist=True,
-            medianprops={"color": "black"},
-            flierprops={"markersize": 3},
-        )
-        for box, k in zip(boxes["boxes"], several, strict=True):
-            colour, _ = _look(study, case, methods[k])
-            box.set(facecolor=colour, alpha=0.45, edgecolor=colour)
+        if several:
+            boxes = panel.boxplot(
+                [values[k] for k in several],
+                positions=[k + 1 for k in several],
+                widths=0.65,
+                patch_artist=True,
+                medianprops={"color": "black"},
+                flierprops={"markersize": 3},
+            )
+            for box, k in zip(boxes["boxes"], several, strict=True):
+                colour, _ = method_look(study, case, methods[k])
+                box.set(facecolor=colour, alpha=0.45, edgecolor=colour)
         for place, (method, runs) in enumerate(zip(methods, values, strict=True), start=1):
-            colour, mark = _look(study, case, method)
+            colour, mark = method_look(study, case, method)
             if len(runs) == 1:
                 panel.plot([place], runs, marker=mark, color=colour, markersize=8, linestyle="none")
         panel.set_xticks(range(1, len(methods) + 1), methods, rotation=40, ha="right", fontsize=8)
@@ -144,7 +145,7 @@ def selected_figure(study: Study, cases: Sequence[Case]) -> Figure:
         chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
         points = []
         for method, solutions in chosen.items():
-            colour, mark = _look(study, case, method)
+            colour, mark = method_look(study, case, method)
             three = sorted([s for s in solutions if s.kind in KINDS], key=lambda s: s.triangles)
             xy = np.array([[s.triangles, s.error] for s in three])
             points.append(xy[:, ::-1])
@@ -152,7 +153,7 @@ def selected_figure(study: Study, cases: Sequence[Case]) -> Figure:
                 xy[:, 0], xy[:, 1], color=colour, marker=mark, markersize=6, linestyle="none", zorder=3
             )
             seen.setdefault(method, line)
-        _axes(panel, np.vstack([optimal, *points]))
+        front_axes(panel, np.vstack([optimal, *points]), label="error [file units]")
         panel.set_title(case.problem.name, loc="left", fontsize=10)
     figure.suptitle(
         f"fewest triangles, best trade-off and least error of every method's merged front; {cases[0].budget}, "
@@ -172,7 +173,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
 
     model = study.model(case.problem)
     shown = _meshes(study, case, model)
-    flat = model.points * [1.0, 1.0, _exaggeration(model)]
+    exaggeration = relief_exaggeration(model)
+    flat = model.points * [1.0, 1.0, exaggeration]
     n = 1 + len(shown)
     width, depth = np.ptp(flat[:, :2], axis=0)
     figure = Figure(figsize=(2.6 * n + 0.9, 2.6 * (2.0 * depth / width + 0.9)), dpi=110, layout="constrained")
@@ -180,7 +182,6 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     engine.set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)
     panels = figure.subplots(3, n, squeeze=False, height_ratios=(depth / width, 0.75, depth / width))
     end = max(float(np.quantile(surface.deviation, COLOUR_END)) for surface in shown) or 1.0
-    exaggeration = _exaggeration(model)
     nothing = np.zeros(model.n_vertices)
     title = f"original\n{len(model.faces):,} triangles"
     original = _Surface(title, model.points, model.faces, nothing, nothing == 0)
@@ -188,7 +189,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     for column, surface in enumerate([original, *shown]):
         for row, view in enumerate((FRONT, SIDE)):
             panel = panels[row, column]
-            plot_mesh(panel, surface.points, surface.faces, view=view, exaggeration=exaggeration, edges=column > 0)
+            shape = (surface.points, surface.faces)
+            plot_mesh(shape, panel, view=view, exaggeration=exaggeration, edges=column > 0)
             panel.set(xlim=panels[row, 0].get_xlim(), ylim=panels[row, 0].get_ylim())
         panels[0, column].set_title(surface.title, fontsize=8.5)
         below = panels[2, column]
@@ -198,13 +200,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
             text = "error at every\nvertex of the original\n\nblue: vertices that\nno triangle covers"
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
-        x, y = (model.points - model.points.mean(axis=0))[:, :2].T
-        drawn = below.tripcolor(
-            x, y, model.faces, surface.deviation, shading="gouraud", cmap="magma_r", vmin=0, vmax=end
-        )
-        drawn.set_rasterized(True)
-        bare = ~surface.covered
-        below.plot(x[bare], y[bare], ".", color=UNCOVERED, markersize=2.5)
+        plot_error(model, surface.deviation, below, covered=surface.covered, largest=end, bar=False)
+        drawn = below.collections[0]
         below.set(xlim=panels[0, 0].get_xlim(), ylim=panels[0, 0].get_ylim())
     bar = figure.colorbar(drawn, ax=panels[2, :].tolist(), shrink=0.8, pad=0.01, extend="max")
     bar.set_label("error [file units]", fontsize=9)
@@ -251,48 +248,13 @@ def _outside(case: Case) -> str:
     return "nearest" if case.scoring == "nearest" else case.problem.outside
 
 
-def _exaggeration(model: OpenModel) -> float:
-    extent = np.ptp(model.points, axis=0)
-    return max(1.0, LEAST_RELIEF * float(extent[:2].max()) / float(extent[2])) if extent[2] > 0 else 1.0
-
-
-def _look(study: Study, case: Case, method: str) -> tuple[str, str]:
-    """Return a method's colour and mark."""
+def method_look(study: Study, case: Case, method: str) -> tuple[str, str]:
+    """Return a method's colour and its mark in matplotlib's spelling, the same in all pictures."""
     if method in study.methods:
         place = study.methods.index(method)
         return (COLOURS[place], MARKS[place]) if place < len(COLOURS) else ("0.5", ".")
     place = case.classic.index(method) if method in case.classic else 0
     return CLASSIC_COLOURS[place % 4], CLASSIC_MARKS[place % 4]
-
-
-def _axes(ax: Axes, F: FloatArray) -> None:
-    """Prepare the axes of a front: the triangles logarithmic, the error too where it spans much."""
-    error, triangles = F[:, 0], F[:, 1]
-    if triangles.max() >= 10 * triangles.min():
-        ax.set_xscale("log")
-        _plain(ax.xaxis)
-    positive = error[error > 0]
-    if len(positive) and error.max() >= 100 * np.quantile(positive, 0.05):
-        if len(positive) < len(error):
-            ax.set_yscale("symlog", linthresh=float(np.quantile(positive, 0.02)), linscale=0.4)
-            ax.set_ylim(bottom=0)
-        else:
-            ax.set_yscale("log")
-        ax.set_ylim(top=1.4 * float(error.max()))
-    else:
-        ax.set_ylim(bottom=0)
-    ax.set_xlabel("triangles")
-    ax.set_ylabel("error [file units]")
-    ax.grid(color="0.92", linewidth=0.6)
-    ax.set_axisbelow(True)
-
-
-def _plain(axis: Any) -> None:
-    """Write 2000, not 2 x 10^3."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
-
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _grid(n: int, width: float, height: float) -> tuple[Figure, list[Axes]]:

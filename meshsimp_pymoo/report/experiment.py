@@ -7,6 +7,7 @@
     OUT/tables/runs.csv, findings.csv            all runs, all verdicts
     OUT/figures/BUDGET/SCORING/*.png             fronts_MODEL, hvr, cardinality, selected, meshes_MODEL
     OUT/times.csv, times.md                      measured seconds, kept apart: never the same twice
+    OUT/report.html                              all of it on one page that needs no other file
 
 Tables and findings are the same bytes for the same runs. Each folder is made complete beside the old one, and
 then takes its place.
@@ -26,6 +27,7 @@ from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.report import findings as verdicts
 from meshsimp_pymoo.report import tables
+from meshsimp_pymoo.report.experiment_page import experiment_page
 from meshsimp_pymoo.report.study import Study, slug
 from meshsimp_pymoo.runs import ExperimentWarning, put_text
 
@@ -36,7 +38,7 @@ __all__ = ["write_report", "write_tables"]
 
 
 def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, float, str], None] | None = None) -> Study:
-    """Write all tables, figures and findings of an experiment.
+    """Write all tables, figures and findings of an experiment, and its page.
 
     Parameters
     ----------
@@ -55,26 +57,31 @@ def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, floa
     ResultError
         If there is no experiment, or none of its runs is finished.
     """
-    study = write_tables(out)
+    study, found = _write_tables(out)
     _write_figures(study, progress)
+    put_text(study.out / "report.html", experiment_page(study, found))
     return study
 
 
 def write_tables(out: str | os.PathLike[str]) -> Study:
-    """Write the tables and findings of an experiment, without figures."""
+    """Write the tables and findings of an experiment, without figures and without its page."""
+    return _write_tables(out)[0]
+
+
+def _write_tables(out: str | os.PathLike[str]) -> tuple[Study, list[verdicts.Finding]]:
     study = Study(out)
     for what, items in (("missing", study.missing), ("damaged", study.damaged), ("without a mesh", study.empty)):
         if items:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
-            warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=2)
-    found = []
+            warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=3)
+    found: list[verdicts.Finding] = []
     with _replaced(study.out / "tables") as folder:
         for budget in study.budgets:
             for scoring in study.scorings:
                 if not study.compared(budget, scoring):
                     continue
                 place = folder / slug(budget) / slug(scoring)
-                for make in (tables.scores, tables.coverage, tables.epsilon, tables.wilcoxon, tables.selected):
+                for make in tables.COMPARISONS:
                     tables.write_table(place, make(study, budget, scoring))
                 found += verdicts.findings(study, budget, scoring)
             meshlab = tables.meshlab(study, budget)
@@ -85,7 +92,7 @@ def write_tables(out: str | os.PathLike[str]) -> Study:
     put_text(study.out / "findings.md", verdicts.page(study, found))
     put_text(study.out / "times.csv", tables.times(study).csv())
     put_text(study.out / "times.md", verdicts.times_page(study))
-    return study
+    return study, found
 
 
 def _write_figures(study: Study, progress: Callable[[float, float, str], None] | None) -> None:

@@ -1,12 +1,17 @@
 """Pictures of fronts and meshes, drawn on the axes they are given.
 
 ``plot_front``, ``plot_mesh`` and ``plot_error`` each fill one matplotlib axes, so that they fit into
-anybody's figure; ``front_figure`` puts them together as the ``front.png`` of a simplification. Meshes are
-shaded from their face normals and drawn back to front, which needs no graphics hardware and no display.
+anybody's figure; without one they make a figure of their own. ``front_figure`` puts them together as the
+``front.png`` of a simplification, ``error_figure`` is the picture of one mesh's error. Meshes are shaded from
+their face normals and drawn back to front, which needs no graphics hardware and no display.
+
+Both axes of a front are logarithmic, always, and say so: sizes and errors are compared by their ratio. The
+lowest line is 0 where a solution is exact.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,13 +19,25 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.geometry.error import simplify
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from meshsimp_pymoo.geometry.model import OpenModel
 
-__all__ = ["front_figure", "hillshade", "plot_error", "plot_front", "plot_mesh"]
+__all__ = [
+    "error_figure",
+    "front_axes",
+    "front_figure",
+    "hillshade",
+    "panel_rows",
+    "plot_error",
+    "plot_front",
+    "plot_mesh",
+    "relief_exaggeration",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.integer[Any]]
@@ -31,10 +48,12 @@ VIEWS = {
     "side": (35.0, -35.0),
 }  # elevation of the viewer above the plane, turn about z [degrees]
 LIGHT = (-0.5, 0.6, 0.75)  # to the light, in the frame of the picture: from the upper left, in front of it
-AMBIENT = 0.25  # share of the light that comes from everywhere
+AMBIENT = 0.22  # brightness of what faces away from the light
 CLAY = (0.90, 0.84, 0.77)  # colour of a mesh that has none of its own
 LINE, MARK = "#2b5c8a", "#c8452f"
-LOG_FROM = 10  # ratio of values from which an axis is logarithmic
+UNCOVERED = "#0072B2"  # vertices that no triangle covers, on the yellow to black of the error
+PANELS = 3  # meshes beside a front
+ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
 # From this many triangles on, edges are not outlined: in a panel of some 400 pixels they would cover the
 # shading.
 OUTLINED_TRIANGLES = 2500
@@ -44,81 +63,122 @@ LEAST_RELIEF = 0.12
 
 
 def plot_front(
-    ax: Axes,
-    F: npt.ArrayLike,
+    front: Any,
+    ax: Axes | None = None,
     *,
     knee: int | None = None,
     chosen: int | None = None,
     marked: Sequence[int] = (),
-    n_points: int | None = None,
+    n_points: float | None = None,
+    measure: str = "error",
 ) -> Axes:
     """Draw a front: error against triangles.
 
     Parameters
     ----------
-    ax : matplotlib axes
-        Where to draw.
-    F : (S, 2) float array
-        Error [model units] and triangles of each solution.
+    front : (S, 2) float array, or anything whose ``F`` is one
+        Error [model units] and triangles of each solution: a Front, a pymoo result, or the numbers.
+    ax : matplotlib axes, optional
+        Where to draw; by default in a new figure.
     knee, chosen : int, optional
-        Rows of ``F`` to mark as the best compromise and as the solution that was asked for.
+        Rows to mark as the best compromise and as the solution that was asked for.
     marked : sequence of int
         Rows that stand as meshes beside the front; lettered a, b, c ...
-    n_points : int, optional
-        Vertices of the model; if given, the mean error per vertex is drawn instead of the sum.
+    n_points : float, optional
+        Vertices of the model (their weights in all, if it has some); if given, the mean error per vertex is
+        drawn instead of the sum.
+    measure : str
+        What the first column of F is: "error" (a sum), "rms_error" or "max_error".
 
     Returns
     -------
     matplotlib axes
-        ``ax``. The triangles are on a logarithmic axis if they span a factor of LOG_FROM, the errors if half
-        of them are that much below the largest (linear near 0 where a solution is exact).
+        The axes, both logarithmic; see :func:`front_axes`.
     """
-    F = np.asarray(F, dtype=np.float64)
-    error = F[:, 0] / (n_points or 1)
+    F = np.asarray(getattr(front, "F", front), dtype=np.float64)
+    if F.ndim != 2 or F.shape[1] != 2 or len(F) == 0:
+        raise ValueError(f"a front has the shape (solutions, 2): error and triangles; this one has {F.shape}")
+    ax = ax if ax is not None else _new_axes((6.4, 4.8))
+    as_mean = measure == "error" and n_points is not None
+    error = F[:, 0] / (n_points if as_mean and n_points else 1.0)
     triangles = F[:, 1]
     order = np.lexsort((error, triangles))
     # A solution holds until the next larger one: between two points the better of both is the left one.
     ax.step(triangles[order], error[order], where="post", color=LINE, linewidth=1, alpha=0.45)
-    ax.plot(triangles, error, "o", color=LINE, markersize=4, label=f"{len(F)} solutions")
+    ax.plot(triangles, error, "o", color=LINE, markersize=4, label=f"{len(F)} solution{'s' * (len(F) != 1)}")
+    letters = dict(zip(marked, "abcdefgh", strict=False))
     if knee is not None:
-        ax.plot(triangles[knee], error[knee], "D", color=MARK, markersize=9, fillstyle="none", label="knee")
+        size = 19 if knee in letters else 10  # around its letter
+        ax.plot(triangles[knee], error[knee], "D", color=MARK, markersize=size, fillstyle="none", label="knee")
     if chosen is not None:
-        ax.plot(triangles[chosen], error[chosen], "*", color=MARK, markersize=13, label="chosen")
-    for letter, row in zip("abcdefgh", marked, strict=False):
+        ax.plot(triangles[chosen], error[chosen], "o", color=MARK, markersize=9, label="chosen", zorder=4)
+    for row, letter in letters.items():
+        full = row == chosen
         ax.annotate(
             letter,
             (triangles[row], error[row]),
-            xytext=(7, 6),
-            textcoords="offset points",
+            ha="center",
+            va="center_baseline",
             weight="bold",
-            color=MARK,
+            fontsize=9,
+            color="white" if full else MARK,
+            bbox={"boxstyle": "circle,pad=0.2", "facecolor": MARK if full else "white", "edgecolor": MARK},
+            zorder=5,
         )
-    if triangles.max() >= LOG_FROM * triangles.min() > 0:
-        ax.set_xscale("log")
-    positive = error[error > 0]
-    if positive.size and np.median(error) < error.max() / LOG_FROM:
-        if positive.size < error.size:
-            ax.set_yscale("symlog", linthresh=positive.min(), linscale=0.3)
-            ax.set_ylim(bottom=0)
-        else:
-            ax.set_yscale("log")
-    else:
-        ax.set_ylim(bottom=0)
-    _plain_numbers(ax)
-    ax.set_xlabel("triangles")
-    ax.set_ylabel("error [model units]" if n_points is None else "mean error per vertex [model units]")
-    ax.grid(which="both", color="0.92", linewidth=0.6)
-    ax.set_axisbelow(True)
-    if len(ax.get_lines()) > 2:
-        ax.legend(frameon=False)
+    what = "mean error per vertex" if as_mean else measure.replace("_", " ")
+    front_axes(ax, np.column_stack([error, triangles]), label=f"{what} [model units]")
+    if knee is not None or chosen is not None:
+        for handle in ax.legend(frameon=False).get_lines():
+            handle.set_markersize(min(handle.get_markersize(), 9))
     return ax
 
 
+def front_axes(ax: Axes, F: npt.ArrayLike, *, label: str = "error [model units]") -> None:
+    """Prepare the axes of a front: both logarithmic, readable numbers, and 0 where a solution is exact.
+
+    Parameters
+    ----------
+    ax : matplotlib axes
+        The axes.
+    F : (S, 2) float array
+        Everything that is drawn: errors and triangles.
+    label : str
+        What the errors are; "log scale" is added where it is one.
+    """
+    error, triangles = np.asarray(F, dtype=np.float64).T
+    scale = ", log scale"
+    if triangles.min() > 0:
+        ax.set_xscale("log")
+        # a margin on both sides, wide enough for a front of one size
+        ax.set_xlim(triangles.min() / 1.25, triangles.max() * 1.25)
+    top = float(error.max())
+    if top == 0:  # nothing but exact solutions
+        scale = ""
+        ax.set_ylim(-0.05, 1.0)
+    else:
+        lowest = max(float(error[error > 0].min()), ROUNDING * top)
+        if error.min() < lowest:
+            decade = math.floor(math.log10(lowest))
+            ax.set_yscale("symlog", linthresh=10.0**decade, linscale=0.5)
+            ax.set_ylim(-0.25 * 10.0**decade, 1.5 * top)
+            decades = range(decade, math.ceil(math.log10(1.5 * top)))
+            steps = (1, 2, 5) if len(decades) < 3 else (1,)
+            ax.set_yticks([0.0, *(step * 10.0**k for k in decades for step in steps)])
+        else:
+            ax.set_yscale("log")
+            ax.set_ylim(lowest / 1.4, 1.5 * top)
+    _plain_numbers(ax)
+    ax.set_xlabel("triangles, log scale")
+    ax.set_ylabel(label + scale)
+    ax.grid(which="both", color="0.92", linewidth=0.6)
+    ax.set_axisbelow(True)
+
+
 def plot_mesh(
-    ax: Axes,
-    points: npt.ArrayLike,
-    faces: npt.ArrayLike,
+    mesh: Any,
+    ax: Axes | None = None,
     *,
+    kept: npt.ArrayLike | None = None,
     view: View = "above",
     colour: npt.ArrayLike | None = None,
     edges: bool | None = None,
@@ -128,17 +188,18 @@ def plot_mesh(
 
     Parameters
     ----------
-    ax : matplotlib axes
-        Where to draw; its frame and ticks are removed.
-    points : (V, 3) float array
-        Vertices, height along z.
-    faces : (M, 3) int array
-        Triangles, counter-clockwise from above.
+    mesh : OpenModel, solution of a front, trimesh.Trimesh, or (points, faces)
+        Vertices (V, 3), height along z, and triangles (M, 3), counter-clockwise from above. A ``Trimesh`` is
+        drawn in its own frame; a model and a solution stand upright.
+    ax : matplotlib axes, optional
+        Where to draw, by default in a new figure; its frame and ticks are removed.
+    kept : (N,) bool array, optional
+        With an OpenModel: draw the mesh of these vertices instead of the whole model.
     view : "above", "side" or (elevation, turn)
         Where it is seen from; as a pair, the elevation above the (x, y) plane and the turn about z, in
         degrees.
     colour : (V, 3), (V, 4) uint8 array or (3,) float array, optional
-        Colour per vertex, or one for all (0 to 1).
+        Colour per vertex, or one for all (0 to 1); by default the mesh's own, if it has some.
     edges : bool, optional
         Whether to outline the triangles; by default only in small meshes.
     exaggeration : float
@@ -147,19 +208,20 @@ def plot_mesh(
     Returns
     -------
     matplotlib axes
-        ``ax``.
+        The axes.
     """
     from matplotlib.collections import PolyCollection
 
-    faces = np.asarray(faces)
+    points, faces, own = _surface(mesh, kept)
+    colour = own if colour is None else np.asarray(colour)
+    ax = ax if ax is not None else _new_axes((6.4, 6.4))
     elevation, turn = VIEWS[view] if isinstance(view, str) else view
-    seen = _turned(np.asarray(points, dtype=np.float64) * [1.0, 1.0, exaggeration], elevation, turn)
-    triangles = seen[faces]
+    seen = _turned(points * [1.0, 1.0, exaggeration], elevation, turn)
+    triangles: Any = seen[faces]
     shade = hillshade(triangles)
     if colour is None:
         base = np.broadcast_to(CLAY, (len(faces), 3))
     else:
-        colour = np.asarray(colour)
         base = (
             np.broadcast_to(colour[:3], (len(faces), 3))
             if colour.ndim == 1
@@ -183,44 +245,55 @@ def plot_mesh(
     return ax
 
 
-def plot_error(ax: Axes, model: OpenModel, deviation: npt.ArrayLike, *, largest: float | None = None) -> Axes:
+def plot_error(
+    model: OpenModel,
+    deviation: npt.ArrayLike,
+    ax: Axes | None = None,
+    *,
+    covered: npt.ArrayLike | None = None,
+    largest: float | None = None,
+    bar: bool = True,
+) -> Axes:
     """Draw the deviation of a simplified surface at every vertex of the model as a map.
 
     Parameters
     ----------
-    ax : matplotlib axes
-        Where to draw; a colour bar is added beside it.
     model : OpenModel
         The original mesh.
     deviation : (N,) float array
         Deviation at each vertex in vector order [model units]; its size is drawn, not its sign.
+    ax : matplotlib axes, optional
+        Where to draw; by default in a new figure.
+    covered : (N,) bool array, optional
+        Whether a triangle covers each vertex; those that none covers are marked blue.
     largest : float, optional
         End of the colour scale, to compare several maps; by default the largest deviation.
+    bar : bool
+        Whether to add a colour bar beside the map.
 
     Returns
     -------
     matplotlib axes
-        ``ax``.
+        The axes.
     """
     size = np.abs(np.asarray(deviation, dtype=np.float64))
     if size.shape != (model.n_vertices,):
         raise ValueError(f"deviation has the shape {size.shape}; the model has {model.n_vertices} vertices")
-    end = float(size.max()) if largest is None else largest
+    ax = ax if ax is not None else _new_axes((7.0, 6.0))
+    greatest = float(size.max())
+    end = greatest if largest is None else largest
+    x, y = (model.points - model.points.mean(axis=0))[:, :2].T  # as plot_mesh places them
     drawn = ax.tripcolor(
-        model.points[:, 0],
-        model.points[:, 1],
-        model.faces,
-        size,
-        shading="gouraud",
-        cmap="magma_r",
-        vmin=0.0,
-        vmax=end or 1.0,
-        rasterized=True,
+        x, y, model.faces, size, shading="gouraud", cmap="magma_r", vmin=0.0, vmax=end or 1.0, rasterized=True
     )
-    _frame(ax, model.points)
-    bar = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02)
-    bar.set_label("error [model units]")
-    bar.outline.set_visible(False)
+    if covered is not None:
+        bare = ~np.asarray(covered, dtype=bool)
+        ax.plot(x[bare], y[bare], ".", color=UNCOVERED, markersize=2.5)
+    _frame(ax, np.column_stack([x, y]))
+    if bar:
+        shown = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02, extend="max" if greatest > end else "neither")
+        shown.set_label("error [model units]")
+        shown.outline.set_visible(False)
     return ax
 
 
@@ -231,6 +304,7 @@ def front_figure(
     *,
     knee: int | None = None,
     chosen: int | None = None,
+    measure: str = "error",
     title: str | None = None,
 ) -> Figure:
     """Draw the front of a simplification beside the original and a few of the simplified meshes.
@@ -242,9 +316,11 @@ def front_figure(
     F : (S, 2) float array
         The front: error [model units] and triangles.
     meshes : sequence of (row of F, (M, 3) faces in vector order)
-        At most three solutions to show, in the order of the panels.
+        At most PANELS solutions to show, in the order of the panels; see :func:`panel_rows`.
     knee, chosen : int, optional
         Rows of ``F`` to mark.
+    measure : str
+        What the first column of F is; see :func:`plot_front`.
     title : str, optional
         By default the model's name and size.
 
@@ -262,27 +338,92 @@ def front_figure(
     halves = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.8 if tall else 1.35), wspace=0.02)
     left, right = halves[0]
     front = left.subplots()
-    plot_front(
-        front, F, knee=knee, chosen=chosen, marked=[row for row, _ in meshes], n_points=model.n_vertices
-    )
+    letters = [row for row, _ in meshes]
+    plot_front(F, front, knee=knee, chosen=chosen, marked=letters, n_points=model.total_weight, measure=measure)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
     front.set_title(title or f"{PurePath(model.name).name}: {size}", loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
-    height = float(np.ptp(model.points[:, 2]))
-    exaggeration = max(1.0, LEAST_RELIEF * float(max(width, depth)) / height) if height > 0 else 1.0
-    colour = model.attributes.get("color")
-    look: dict[str, Any] = {"exaggeration": exaggeration, "colour": colour}
-    plot_mesh(panels[0], model.points, model.faces, **look)
+    look: dict[str, Any] = {"exaggeration": relief_exaggeration(model), "colour": model.attributes.get("color")}
+    plot_mesh(model, panels[0], **look)
     panels[0].set_title(f"original\n{len(model.faces):,} triangles", fontsize=10)
     for letter, panel, (row, faces) in zip("abc", panels[1:], meshes, strict=False):
-        plot_mesh(panel, model.points, faces, **look)
-        mean = F[row, 0] / model.n_vertices
-        panel.set_title(f"{letter}: {int(F[row, 1]):,} triangles\nmean error {mean:.3g}", fontsize=10)
+        plot_mesh((model.points, faces), panel, **look)
+        error = f"mean error {F[row, 0] / model.total_weight:.3g}"
+        if measure != "error":
+            error = f"{measure.replace('_', ' ')} {F[row, 0]:.3g}"
+        names = [name for name, marked in (("knee", knee), ("chosen", chosen)) if marked == row]
+        label = f" ({', '.join(names)})" if names else ""
+        size = f"{int(F[row, 1]):,} triangle{'' if F[row, 1] == 1 else 's'}"
+        panel.set_title(f"{letter}: {size}{label}\n{error}", fontsize=10)
         panel.set(xlim=panels[0].get_xlim(), ylim=panels[0].get_ylim())
     for panel in panels[1 + len(meshes) :]:
         panel.axis("off")
     return figure
+
+
+def panel_rows(count: int, *wanted: int | None) -> list[int]:
+    """Return the rows of a front to draw as meshes: PANELS of them, spread over the front, the wanted among them.
+
+    Parameters
+    ----------
+    count : int
+        How many solutions it has.
+    *wanted : int or None
+        Rows that must be shown, such as the chosen one and the knee, the most important first.
+
+    Examples
+    --------
+    >>> panel_rows(11), panel_rows(11, 10, None, 7), panel_rows(2)
+    ([2, 5, 8], [2, 7, 10], [0, 1])
+    """
+    even = [round((count - 1) * share) for share in np.linspace(0.2, 0.8, PANELS)]
+    rows = list(dict.fromkeys(row for row in wanted if row is not None))[:PANELS]
+    for row in rows:  # each takes the place of the nearest
+        even.remove(min(even, key=lambda other: abs(other - row)))
+    found = {*rows, *even}
+    while len(found) < min(PANELS, count):  # a short front
+        found.add(max(range(count), key=lambda row: min(abs(row - other) for other in found)))
+    return sorted(found)
+
+
+def error_figure(
+    model: OpenModel, deviation: npt.ArrayLike, covered: npt.ArrayLike, *, title: str | None = None
+) -> Figure:
+    """Draw the error of one mesh at every vertex of the model, with its largest values and uncovered vertices.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh.
+    deviation, covered : (N,) arrays
+        Of :func:`meshsimp_pymoo.geometry.error.mesh_deviation`.
+    title : str, optional
+        What stands above the map.
+
+    Returns
+    -------
+    matplotlib Figure
+        Not bound to any window or backend.
+    """
+    from matplotlib.figure import Figure
+
+    width, depth = np.ptp(model.points[:, :2], axis=0)
+    share = float(np.clip(depth / width, 0.4, 1.6)) if width > 0 else 1.0
+    figure = Figure(figsize=(7.2, 6.0 * share + 0.9), dpi=110, layout="constrained")
+    ax = figure.subplots()
+    size = np.abs(np.asarray(deviation, dtype=np.float64))
+    # a few spikes shall not pale all the rest
+    plot_error(model, size, ax, covered=covered, largest=float(np.quantile(size, 0.995)) or None)
+    bare = int((~np.asarray(covered, dtype=bool)).sum())
+    ax.set_title("\n".join(filter(None, [title, f"blue: {bare:,} uncovered vertices" if bare else ""])), fontsize=10)
+    return figure
+
+
+def relief_exaggeration(model: OpenModel) -> float:
+    """Return the factor by which heights are drawn higher, so that a flat terrain shows its relief."""
+    width, depth, height = np.ptp(model.points, axis=0)
+    return max(1.0, LEAST_RELIEF * float(max(width, depth)) / float(height)) if height > 0 else 1.0
 
 
 def hillshade(triangles: FloatArray) -> FloatArray:
@@ -296,8 +437,9 @@ def hillshade(triangles: FloatArray) -> FloatArray:
     Returns
     -------
     (M,) float array
-        Between AMBIENT and 1 (Lambert's cosine law above the ambient light); AMBIENT for a triangle without
-        area.
+        Between AMBIENT (facing away from the light, or without area) and 1. Light wraps around: brightness is
+        linear in the cosine down to the opposite direction, so that steep slopes in the shade keep their shape.
+        Both sides are lit alike.
 
     Examples
     --------
@@ -309,9 +451,34 @@ def hillshade(triangles: FloatArray) -> FloatArray:
     """
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     length = np.linalg.norm(normal, axis=1)
+    normal *= np.where(normal[:, 2] < 0, -1.0, 1.0)[:, None]  # what is seen from behind
     cosine = normal @ (np.array(LIGHT) / np.linalg.norm(LIGHT))
-    lit = np.divide(cosine, length, out=np.zeros_like(length), where=length > 0)
-    return AMBIENT + (1 - AMBIENT) * np.clip(lit, 0.0, 1.0)
+    lit = np.divide(cosine, length, out=np.full_like(length, -1.0), where=length > 0)
+    return AMBIENT + (1 - AMBIENT) * (0.5 + 0.5 * np.clip(lit, -1.0, 1.0))
+
+
+def _new_axes(size: tuple[float, float]) -> Axes:
+    """Return axes in a figure that a notebook or a window shows."""
+    from matplotlib import pyplot
+
+    return pyplot.subplots(figsize=size, layout="constrained")[1]
+
+
+def _surface(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:
+    """Return points, faces and vertex colours of whatever is a mesh."""
+    if kept is not None:
+        if not hasattr(mesh, "kernel_arguments"):
+            raise TypeError(f"kept chooses vertices of an OpenModel, not of a {type(mesh).__name__}")
+        return mesh.points, simplify(mesh, np.asarray(kept)).faces, mesh.attributes.get("color")
+    if isinstance(mesh, tuple):
+        return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1]), None
+    if hasattr(mesh, "points") and hasattr(mesh, "faces"):  # a model, or a solution of a front
+        return mesh.points, mesh.faces, mesh.attributes.get("color")
+    if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
+        visual: Any = getattr(mesh, "visual", None)
+        own = np.asarray(visual.vertex_colors) if getattr(visual, "kind", None) == "vertex" else None
+        return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces), own
+    raise TypeError(f"a {type(mesh).__name__} is no mesh; give an OpenModel, a trimesh.Trimesh or (points, faces)")
 
 
 def _turned(points: FloatArray, elevation: float, turn: float) -> FloatArray:

@@ -28,7 +28,20 @@ from meshsimp_pymoo.analysis import ALPHA, holm
 from meshsimp_pymoo.report.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.report.tables import INDICATOR_NAMES, Table
 
-__all__ = ["DOES_NOT_HOLD", "HOLDS", "UNDECIDED", "Claim", "Comparisons", "Finding", "findings", "page", "times_page"]
+__all__ = [
+    "CLAIMS",
+    "DOES_NOT_HOLD",
+    "HOLDS",
+    "UNDECIDED",
+    "Claim",
+    "Comparisons",
+    "Finding",
+    "findings",
+    "page",
+    "reservations",
+    "times_page",
+    "what_was_run",
+]
 
 HOLDS, DOES_NOT_HOLD, UNDECIDED = "holds", "does not hold", "not decided here"
 
@@ -270,8 +283,10 @@ def findings(study: Study, budget: str, scoring: str) -> list[Finding]:
 def page(study: Study, all_findings: Sequence[Finding]) -> str:
     """Return the page of findings in Markdown; the same bytes for the same runs."""
     settings = list(dict.fromkeys((f.budget, f.scoring) for f in all_findings))
-    lines = [f"# Findings: {study.title}", "", _what_was_run(study), ""]
-    lines += _warnings(study)
+    lines = [f"# Findings: {study.title}", "", what_was_run(study), ""]
+    known = reservations(study)
+    if known:
+        lines += ["**To know before reading on**", "", *(f"* {line}" for line in known), ""]
     lines += [
         "How a verdict comes about: every pair of methods is compared on every model at the level of 0.05, after "
         "Holm's correction over the models. *Better* holds if it is so significantly in more "
@@ -280,6 +295,7 @@ def page(study: Study, all_findings: Sequence[Finding]) -> str:
         "here. The tables hold every comparison.",
         "",
     ]
+    lines += [f"{text}\n" for text in _other_errors(study)]
     if "searched" in study.scorings:
         lines += [
             "*Error as searched* is the paper's reading: a vertex that no triangle covers costs nothing. MeshLab's "
@@ -316,6 +332,20 @@ def page(study: Study, all_findings: Sequence[Finding]) -> str:
                     background = f.background
             lines += ["", background, ""] if background else [""]
     return "\n".join(lines).rstrip() + "\n"
+
+
+
+def _other_errors(study: Study) -> list[str]:
+    """Return what *error* means where it is not the sum of the deviations."""
+    names = {"rms_error": "the root mean square of the deviations", "max_error": "the largest deviation"}
+    said = []
+    for measure in dict.fromkeys(problem.measure for problem in study.problems if problem.measure != "error"):
+        models = ", ".join(problem.name for problem in study.problems if problem.measure == measure)
+        said.append(f"On {models} the *error* is {names[measure]}, not their sum.")
+    for weights in dict.fromkeys(problem.weights for problem in study.problems if problem.weights):
+        models = ", ".join(problem.name for problem in study.problems if problem.weights == weights)
+        said.append(f"On {models} each vertex counts by its attribute *{weights}*.")
+    return said
 
 
 def table(all_findings: Sequence[Finding]) -> Table:
@@ -607,7 +637,8 @@ def _time_reason(cases: Sequence[Case], moead: str, rivals: Sequence[str]) -> st
     )
 
 
-def _what_was_run(study: Study) -> str:
+def what_was_run(study: Study) -> str:
+    """Return the size of the experiment in one line."""
     content = study.content
     return (
         f"{len(study.problems)} models, {len(study.methods)} algorithms "
@@ -616,16 +647,17 @@ def _what_was_run(study: Study) -> str:
     )
 
 
-def _warnings(study: Study) -> list[str]:
-    lines = [f"* {line}" for line in study.skipped]
+def reservations(study: Study) -> list[str]:
+    """Return what is to be known before reading on: what was skipped, is missing, damaged or mixed."""
+    lines = list(study.skipped)
     for what, items in (("missing", study.missing), ("damaged, left out", study.damaged), ("empty", study.empty)):
         if items:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
-            lines.append(f"* {what}: {items[0]}{more}")
+            lines.append(f"{what}: {items[0]}{more}")
     if len(study.versions) > 1:
         differing = sorted({k for v in study.versions for k in v if any(v.get(k) != o.get(k) for o in study.versions)})
-        lines.append(f"* the runs were made with different versions of {_listed(differing)}")
-    return ["**To know before reading on**", "", *lines, ""] if lines else []
+        lines.append(f"the runs were made with different versions of {_listed(differing)}")
+    return lines
 
 
 def _mean(values: Iterable[float]) -> str:

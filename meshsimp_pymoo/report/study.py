@@ -89,6 +89,8 @@ class Problem:
     footprint: str
     stored: str
     hash: str
+    measure: str = "error"
+    weights: str = ""
 
 
 @dataclass(frozen=True)
@@ -260,6 +262,8 @@ class Study:
                 footprint=item["options"].get("footprint", "model"),
                 stored=item["stored"],
                 hash=item["hash"],
+                measure=item["options"].get("objectives", ("error",))[0],
+                weights=item["options"].get("weights", ""),
             )
             for item in self.content["problems"]
         ]

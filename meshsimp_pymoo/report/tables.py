@@ -31,6 +31,7 @@ from meshsimp_pymoo.analysis import PairTable, Summary, magnitude, selected_solu
 from meshsimp_pymoo.report.study import CLASSIC_NAMES, EPSILON_SHIFT, SCORINGS, Case, Study
 
 __all__ = [
+    "COMPARISONS",
     "INDICATOR_NAMES",
     "Table",
     "coverage",
@@ -96,17 +97,16 @@ class Table:
         """Return the table for people, in GitHub's Markdown."""
         if self.shown is not None:
             return self.shown.markdown()
-        numeric = self._numeric()
         lines = [f"**{self.title}**", "", _piped(self.columns)]
-        lines.append("|" + "|".join("---:" if right else "---" for right in numeric) + "|")
-        lines += [_piped([_rounded(cell) for cell in row]) for row in self.rows]
+        lines.append("|" + "|".join("---:" if right else "---" for right in self.right_aligned) + "|")
+        lines += [_piped(row) for row in self.rounded_rows]
         return "\n".join(lines) + "\n"
 
     def latex(self) -> str:
         """Return the table for papers; needs the package booktabs."""
         if self.shown is not None:
             return self.shown.latex()
-        alignment = "".join("r" if right else "l" for right in self._numeric())
+        alignment = "".join("r" if right else "l" for right in self.right_aligned)
         lines = [
             r"\begin{table}",
             r"\centering",
@@ -117,12 +117,18 @@ class Table:
             " & ".join(_escaped(header) for header in self.columns) + r" \\",
             r"\midrule",
         ]
-        lines += [" & ".join(_escaped(_rounded(cell)) for cell in row) + r" \\" for row in self.rows]
+        lines += [" & ".join(_escaped(cell) for cell in row) + r" \\" for row in self.rounded_rows]
         lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
         return "\n".join(lines) + "\n"
 
-    def _numeric(self) -> list[bool]:
-        """Return which columns are right-aligned: those without a word."""
+    @property
+    def rounded_rows(self) -> list[list[str]]:
+        """The cells as people read them."""
+        return [[_rounded(cell) for cell in row] for row in self.rows]
+
+    @property
+    def right_aligned(self) -> list[bool]:
+        """Which columns are right-aligned: those without a word."""
         return [
             all(not isinstance(row[k], str) or row[k][:1].isdigit() for row in self.rows)  # type: ignore[index]
             for k in range(len(self.columns))
@@ -239,6 +245,10 @@ def selected(study: Study, budget: str, scoring: str) -> Table:
     )  # fmt: skip
     shown = tuple((*row[:3], row[4], row[7], row[11], row[6], row[12]) for row in rows if row[2] != "knee")
     return Table("selected", title, columns, tuple(rows), Table("selected", title, shown_columns, shown))
+
+
+COMPARISONS: tuple[Callable[[Study, str, str], Table], ...] = (scores, coverage, epsilon, wilcoxon, selected)
+"""The tables of one budget and scoring."""
 
 
 def meshlab(study: Study, budget: str) -> Table | None:

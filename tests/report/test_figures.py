@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
@@ -13,8 +14,10 @@ from meshsimp_pymoo.geometry.model import load_model
 from meshsimp_pymoo.report.figures import (
     AMBIENT,
     LIGHT,
+    error_figure,
     front_figure,
     hillshade,
+    panel_rows,
     plot_error,
     plot_front,
     plot_mesh,
@@ -43,47 +46,107 @@ def points_drawn(ax):
 
 def test_every_solution_of_a_front_is_drawn(ax):
     F = np.array([[3.0, 2], [1.0, 9], [2.0, 4]])
-    assert plot_front(ax, F) is ax
+    assert plot_front(F, ax) is ax
     assert points_drawn(ax).tolist() == [[2, 3], [9, 1], [4, 2]]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("triangles", "error [model units]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("triangles, log scale", "error [model units], log scale")
 
 
 def test_the_mean_error_is_drawn_when_the_number_of_vertices_is_known(ax):
-    plot_front(ax, [[30.0, 2], [10.0, 9]], n_points=10)
+    plot_front([[30.0, 2], [10.0, 9]], ax, n_points=10)
     assert points_drawn(ax)[:, 1].tolist() == [3, 1]
-    assert ax.get_ylabel() == "mean error per vertex [model units]"
+    assert ax.get_ylabel() == "mean error per vertex [model units], log scale"
 
 
 def test_knee_and_chosen_are_marked_where_they_are(ax):
-    plot_front(ax, [[9.0, 2], [2.0, 4], [1.0, 9]], knee=1, chosen=2, marked=[0, 1])
+    plot_front([[9.0, 2], [2.0, 4], [1.0, 9]], ax, knee=1, chosen=2, marked=[0, 1])
     labelled = {line.get_label(): np.column_stack(line.get_data()).tolist() for line in ax.get_lines()}
     assert labelled["knee"] == [[4, 2]]
     assert labelled["chosen"] == [[9, 1]]
-    assert [text.get_text() for text in ax.texts] == ["a", "b"]
-    assert ax.get_legend() is not None
+    assert {text.get_text(): text.xy for text in ax.texts} == {"a": (2, 9), "b": (4, 2)}  # on their points
+    assert all(text.get_position() == text.xy for text in ax.texts)
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["3 solutions", "knee", "chosen"]
 
 
 @pytest.mark.parametrize(
-    ("F", "scales"),
+    ("F", "scale"),
     [
-        ([[3.0, 10], [2.0, 20], [1.0, 30]], ("linear", "linear")),
-        ([[3.0, 10], [2.0, 20], [1.0, 300]], ("log", "linear")),
-        ([[300.0, 10], [2.0, 20], [1.0, 300]], ("log", "log")),
-        ([[300.0, 10], [2.0, 20], [0.0, 300]], ("log", "symlog")),
-        ([[0.0, 2]], ("linear", "linear")),
+        ([[3.0, 10], [2.0, 20], [1.0, 30]], "log"),
+        ([[3.0, 10]], "log"),
+        ([[300.0, 10], [2.0, 20], [1e-3, 300]], "log"),
+        ([[300.0, 10], [2.0, 20], [0.0, 300]], "symlog"),
+        ([[300.0, 10], [2.0, 20], [1e-9, 300]], "symlog"),
+        ([[0.0, 2]], "linear"),
     ],
 )
-def test_axes_are_logarithmic_where_the_values_spread(ax, F, scales):
-    plot_front(ax, F)
-    assert (ax.get_xscale(), ax.get_yscale()) == scales
-    low, high = ax.get_ylim()
-    assert low <= min(error for error, _ in F)
-    assert high >= max(error for error, _ in F)
+def test_both_axes_are_logarithmic_and_say_so(ax, F, scale):
+    plot_front(F, ax)
     ax.figure.canvas.draw()
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", scale)
+    assert ("log scale" in ax.get_ylabel()) == (scale != "linear")
+    for at, (low, high) in enumerate((ax.get_ylim(), ax.get_xlim())):
+        assert low < min(row[at] for row in F) <= max(row[at] for row in F) < high
+    if scale == "symlog":
+        ticks = ax.get_yticks()
+        assert ticks[0] == 0
+        exact, next_one = ax.transData.transform([[10, 0], [10, ticks[1]]])[:, 1]
+        assert next_one - exact > 20  # pixels: the labels do not touch
+
+
+def test_small_ranges_have_readable_ticks(ax):
+    plot_front([[36.0, 2], [13.0, 3], [0.0, 4]], ax, n_points=81)
+    ax.figure.canvas.draw()
+    shown = [label.get_text() for label in ax.get_yticklabels() if label.get_text()]
+    assert shown[:4] == ["0", "0.1", "0.2", "0.5"]
+
+
+def test_whatever_has_objectives_is_a_front_and_nothing_else(ax):
+    class Result:
+        F = np.array([[3.0, 2], [1.0, 9]])
+
+    plot_front(Result(), ax, measure="max_error")
+    assert points_drawn(ax).tolist() == [[2, 3], [9, 1]]
+    assert ax.get_ylabel() == "max error [model units], log scale"
+    with pytest.raises(ValueError, match=r"a front has the shape \(solutions, 2\).*this one has \(3,\)"):
+        plot_front([1.0, 2.0, 3.0], ax)
+
+
+def test_without_axes_a_figure_is_made(roof):
+    from matplotlib import pyplot
+
+    drawn = [plot_front([[3.0, 2]]), plot_mesh(roof), plot_error(roof, np.ones(roof.n_vertices))]
+    assert len({ax.figure for ax in drawn}) == 3
+    assert {ax.figure.number for ax in drawn} <= set(pyplot.get_fignums())
+    pyplot.close("all")
+
+
+def test_a_model_a_trimesh_and_arrays_are_drawn_alike(roof):
+    mesh = trimesh.Trimesh(roof.points, roof.faces, process=False)
+    drawn = []
+    for shape in (roof, mesh, (roof.points, roof.faces)):
+        ax = Figure().subplots()
+        plot_mesh(shape, ax)
+        drawn.append((polygons(ax).get_facecolors().tolist(), ax.get_xlim(), ax.get_ylim()))
+    assert drawn[0] == drawn[1] == drawn[2]
+    with pytest.raises(TypeError, match="a str is no mesh; give an OpenModel"):
+        plot_mesh("roof", Figure().subplots())
+
+
+def test_the_kept_vertices_of_a_model_are_drawn_as_their_mesh(ax, roof):
+    kept = np.isin(np.arange(roof.n_vertices), roof.corners)
+    plot_mesh(roof, ax, kept=kept)
+    assert len(polygons(ax).get_paths()) == 2
+    with pytest.raises(TypeError, match="kept chooses vertices of an OpenModel, not of a tuple"):
+        plot_mesh((roof.points, roof.faces), ax, kept=kept)
+
+
+def test_the_colours_of_a_trimesh_show(ax, roof):
+    colours = np.tile(np.array([255, 0, 0, 255], dtype=np.uint8), (roof.n_vertices, 1))
+    plot_mesh(trimesh.Trimesh(roof.points, roof.faces, vertex_colors=colours, process=False), ax)
+    assert (polygons(ax).get_facecolors()[:, 1:3] == 0).all()
 
 
 def test_a_mesh_is_drawn_with_all_its_triangles_at_their_place(ax, roof):
-    plot_mesh(ax, roof.points, roof.faces)
+    plot_mesh(roof, ax)
     drawn = np.array([path.vertices[:3] for path in polygons(ax).get_paths()])
     assert len(drawn) == len(roof.faces)
     expected = roof.points[roof.faces][:, :, :2] - roof.points[:, :2].mean(axis=0)
@@ -93,13 +156,13 @@ def test_a_mesh_is_drawn_with_all_its_triangles_at_their_place(ax, roof):
 
 def test_the_nearest_triangles_are_drawn_last(ax):
     points = np.array([[0, 0, 5], [1, 0, 5], [0, 1, 5], [0, 0, 1], [1, 0, 1], [0, 2, 1]], dtype=float)
-    plot_mesh(ax, points, [[0, 1, 2], [3, 4, 5]])
+    plot_mesh((points, [[0, 1, 2], [3, 4, 5]]), ax)
     heights = [np.ptp(path.vertices[:3, 1]) for path in polygons(ax).get_paths()]
     assert heights == [2, 1]
 
 
 def test_from_the_side_a_roof_shows_its_height(ax, roof):
-    plot_mesh(ax, roof.points, roof.faces, view=(0, 0))
+    plot_mesh(roof, ax, view=(0, 0))
     drawn = np.concatenate([path.vertices[:3] for path in polygons(ax).get_paths()])
     assert np.ptp(drawn[:, 0]) == pytest.approx(np.ptp(roof.points[:, 0]))
     assert np.ptp(drawn[:, 1]) == pytest.approx(1.0)
@@ -109,29 +172,49 @@ def test_from_the_side_a_roof_shows_its_height(ax, roof):
 def test_a_flat_roof_is_exaggerated_only_when_asked(roof):
     low, high = Figure().subplots(1, 2)
     for ax, factor in ((low, 1.0), (high, 4.0)):
-        plot_mesh(ax, roof.points, roof.faces, view=(0, 0), exaggeration=factor)
+        plot_mesh(roof, ax, view=(0, 0), exaggeration=factor)
     assert np.ptp(high.get_ylim()) > 3 * np.ptp(low.get_ylim())
 
 
 def test_a_slope_towards_the_light_is_brighter_than_one_away_from_it(ax, roof):
-    plot_mesh(ax, roof.points, roof.faces)
+    plot_mesh(roof, ax)
     colours = polygons(ax).get_facecolors()
     left = np.array([path.vertices[:3, 0].mean() < 0 for path in polygons(ax).get_paths()])
     assert colours[left, :3].mean() > colours[~left, :3].mean() + 0.2
 
 
+def test_steep_slopes_in_the_shade_keep_their_shape():
+    """Faces that turn away from the light are darker the more they do, but none is black."""
+    axis = np.array([LIGHT[1], -LIGHT[0], 0.0])
+    down = np.array([-LIGHT[0], -LIGHT[1], 0.0]) / np.hypot(*LIGHT[:2])
+    steepness = np.radians([20, 40, 60, 80])
+    slopes = [np.array([0 * axis, axis, np.cos(t) * down - [0, 0, np.sin(t)]])[[0, 2, 1]] for t in steepness]
+    normals = [np.cross(s[1] - s[0], s[2] - s[0]) for s in slopes]
+    assert all(normal[2] > 0 for normal in normals)
+    shades = hillshade(np.array(slopes))
+    assert (np.diff(shades) < -0.05).all()
+    assert shades[-1] > 1.2 * AMBIENT
+
+
+def test_a_face_seen_from_behind_is_lit_like_one_from_the_front():
+    triangle = np.array([[0.0, 0, 0], [1, 0, 0.3], [0, 1, 0.2]])
+    front, back = hillshade(np.array([triangle, triangle[::-1]]))
+    assert front == pytest.approx(back)
+
+
 def test_shading_follows_the_cosine_and_survives_a_triangle_without_area():
     u = np.cross(LIGHT, [0, 0, 1.0])
     v = np.cross(LIGHT, u)
-    towards, away = np.array([0 * u, u, v]), np.array([0 * u, v, u])
-    shades = hillshade(np.array([towards, away, np.zeros((3, 3))]))
-    np.testing.assert_allclose(shades, [1.0, AMBIENT, AMBIENT], atol=1e-12)
+    towards = np.array([0 * u, u, v])
+    beside = np.array([[0.0, 0, 0], LIGHT, [LIGHT[1], -LIGHT[0], 0]])[[0, 2, 1]]  # the light grazes it
+    shades = hillshade(np.array([towards, beside, np.zeros((3, 3))]))
+    np.testing.assert_allclose(shades, [1.0, (1 + AMBIENT) / 2, AMBIENT], atol=1e-12)
 
 
 def test_vertex_colours_show(ax, roof):
     colour = np.zeros((roof.n_vertices, 4), dtype=np.uint8)
     colour[:, 0] = 255
-    plot_mesh(ax, roof.points, roof.faces, colour=colour)
+    plot_mesh(roof, ax, colour=colour)
     drawn = polygons(ax).get_facecolors()
     assert (drawn[:, 0] > 0.2).all()
     assert (drawn[:, 1:3] == 0).all()
@@ -139,16 +222,29 @@ def test_vertex_colours_show(ax, roof):
 
 def test_an_error_map_shows_the_size_of_each_deviation(ax, roof):
     deviation = np.linspace(-2, 1, roof.n_vertices)
-    plot_error(ax, roof, deviation)
+    plot_error(roof, deviation, ax)
     (drawn,) = [c for c in ax.collections if c.get_array() is not None]
     assert drawn.get_array().tolist() == np.abs(deviation).tolist()
     assert drawn.get_clim() == (0, 2)
+    assert [text for text in (axes.get_ylabel() for axes in ax.figure.axes) if text] == ["error [model units]"]
     with pytest.raises(ValueError, match=r"deviation has the shape \(3,\); the model has 25 vertices"):
-        plot_error(ax, roof, deviation[:3])
+        plot_error(roof, deviation[:3], ax)
+
+
+def test_uncovered_vertices_are_marked_where_they_are(ax, roof):
+    covered = np.ones(roof.n_vertices, dtype=bool)
+    covered[[3, 7]] = False
+    assert plot_error(roof, np.ones(roof.n_vertices), ax, covered=covered, largest=0.5, bar=False) is ax
+    (marks,) = ax.get_lines()
+    expected = (roof.points - roof.points.mean(axis=0))[[3, 7], :2]
+    np.testing.assert_allclose(np.column_stack(marks.get_data()), expected)
+    assert ax.figure.axes == [ax]
+    figure = error_figure(roof, np.ones(roof.n_vertices), covered, title="mine")
+    assert figure.axes[0].get_title() == "mine\nblue: 2 uncovered vertices"
 
 
 def test_an_exact_mesh_has_an_error_map_too(ax, roof):
-    plot_error(ax, roof, np.zeros(roof.n_vertices))
+    plot_error(roof, np.zeros(roof.n_vertices), ax)
     ax.figure.canvas.draw()
 
 
@@ -169,6 +265,18 @@ def test_the_front_stands_beside_the_original_and_its_meshes(tmp_path, name):
     counts = [len(polygons(panel).get_paths()) for panel in panels]
     assert counts == [len(model.faces), *(s.quality.triangles for s in simplified)]
     assert len({(panel.get_xlim(), panel.get_ylim()) for panel in panels}) == 1
+    assert [("knee" in panel.get_title()) for panel in panels] == [False, False, True, False]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 102])
+def test_the_knee_and_the_chosen_mesh_are_always_among_the_panels(count):
+    for knee in {0, count // 2, count - 1}:
+        for chosen in {0, count // 3, count - 1}:
+            rows = panel_rows(count, chosen, knee)
+            assert {knee, chosen} <= set(rows)
+            assert rows == sorted(set(rows))
+            assert len(rows) == min(3, count)
+            assert 0 <= rows[0] <= rows[-1] < count
 
 
 def test_missing_meshes_leave_empty_panels(roof):

@@ -1,0 +1,295 @@
+// The page of a simplification: pick a solution of the front, see its mesh beside the original, take it home.
+
+const data = JSON.parse(document.getElementById("data").textContent);
+const { columns, model } = data;
+const count = columns.triangles.length;
+const embedded = data.solutions.map((solution, row) => (solution ? row : -1)).filter((row) => row >= 0);
+const part = (id) => document.getElementById(id);
+const sixDigits = d3.format(",.6~g");
+
+function spell(value) {
+  const size = Math.abs(value);
+  if (Number.isInteger(value) || (size >= 1e5 && size < 1e9)) return plainNumber(Math.round(value));
+  return size >= 1e9 || size < 1e-4 ? d3.format(".6~e")(value) : sixDigits(value);
+}
+
+function describe(row) {
+  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles, mean error ${readable(columns.mean_error[row])}`;
+}
+
+const named = (column) => column.replace("_", " ").replace("rms", "RMS");
+const percent = (share) => `${d3.format(share < 0.0995 ? ".2~f" : ".1~f")(100 * share)} %`;
+
+// -------------------------------------------------------------------------------------------------------- picking
+
+const MEASURES = {
+  error: "error: sum over all vertices [model units]",
+  rms_error: "RMS error [model units]",
+  max_error: "max error [model units]",
+};
+const state = { row: null, mesh: null, viewer: null, geometry: null };
+
+const chart = new FrontChart(part("chart"), {
+  name: "The front: error against triangles. Each point is a simplified mesh.",
+  front: { x: columns.triangles, y: columns[data.measure], hollow: data.solutions.map((solution) => !solution) },
+  series: data.series.map((one) => ({ ...one, faint: true, line: "thin", mark: "circle" })),
+  special: [
+    { row: data.knee, mark: "diamond", name: "knee: the best compromise" },
+    ...(data.chosen === null ? [] : [{ row: data.chosen, mark: "star", name: "chosen when the front was made" }]),
+  ],
+  labels: { x: "triangles", y: MEASURES[data.measure] },
+  log: { x: part("log-x").checked, y: part("log-y").checked },
+  describe,
+  onPick: pick,
+});
+for (const axis of ["x", "y"]) part(`log-${axis}`).addEventListener("change", (event) => chart.setLog(axis, event.target.checked));
+
+const slider = part("slider");
+slider.max = embedded.length - 1;
+slider.addEventListener("input", () => pick(embedded[slider.valueAsNumber]));
+
+function step(by) {
+  const place = embedded.findLastIndex((row) => row <= state.row);
+  const next = by > 0 || embedded[place] === state.row ? place + by : place;
+  pick(embedded[Math.max(0, Math.min(embedded.length - 1, next))]);
+}
+
+document.addEventListener("keydown", (event) => {
+  const onChart = part("chart").contains(event.target);
+  if (event.target !== document.body && !onChart) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
+  const moves = { ArrowRight: 1, ArrowLeft: -1 };
+  if (onChart) Object.assign(moves, { ArrowUp: -1, ArrowDown: 1, Home: -count, End: count });
+  if (!(event.key in moves)) return;
+  step(moves[event.key]);
+  event.preventDefault();
+});
+
+async function pick(row) {
+  state.row = row;
+  chart.pick(row);
+  const place = embedded.findLastIndex((other) => other <= row);
+  slider.value = Math.max(0, place);
+  slider.setAttribute("aria-valuetext", describe(row));
+  part("picked").textContent = `solution ${row} of 0 to ${count - 1}`;
+  numbers(row);
+  const file = `${data.stem}_${columns.triangles[row]}.ply`;
+  part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
+  const solution = data.solutions[row];
+  part("simplified-title").textContent =
+    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}`;
+  part("not-embedded").hidden = Boolean(solution);
+  for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
+  const [faces, levels] = solution ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation)]) : [null, null];
+  if (state.row !== row) return; // another one was picked meanwhile
+  state.mesh = faces && { row, faces, levels };
+  document.documentElement.dataset.shown = row;
+  if (state.viewer) {
+    state.viewer.show(faces);
+    paintErrors();
+  }
+}
+
+function refitted(row) {
+  const error = columns.refitted_error && columns.refitted_error[row];
+  if (error === undefined || error === null) return [];
+  return [["refitted_error", error, `of its triangles with the best heights: ${data.refitted_meshes[row]}`]];
+}
+
+function numbers(row) {
+  const rows = [
+    ["triangles", columns.triangles[row], `${percent(columns.triangles[row] / model.triangles)} of ${plainNumber(model.triangles)}`],
+    ["vertices", columns.vertices[row], `${percent(columns.vertices[row] / model.vertices)} of ${plainNumber(model.vertices)} kept`],
+    ["error", columns.error[row], "sum over all original vertices [model units]"],
+    ["mean_error", columns.mean_error[row], `${percent(columns.mean_error[row] / model.diagonal)} of the model's diagonal`],
+    ["rms_error", columns.rms_error[row], "root mean square"],
+    ["max_error", columns.max_error[row], "the largest at any original vertex"],
+    ["uncovered", columns.uncovered[row], "original vertices that no triangle covers"],
+    ...refitted(row),
+    ["solution", columns.solution[row], data.meshes[row] ? `stored as ${data.meshes[row]}` : "not stored as a mesh"],
+  ];
+  const body = part("numbers");
+  body.replaceChildren();
+  for (const [name, value, note] of rows) {
+    const line = body.insertRow();
+    const head = document.createElement("th");
+    head.scope = "row";
+    head.textContent = named(name);
+    const cell = document.createElement("td");
+    const shown = document.createElement("data");
+    shown.value = value;
+    shown.id = `number-${name}`;
+    shown.textContent = spell(value);
+    cell.append(shown);
+    const remark = document.createElement("td");
+    remark.textContent = note;
+    line.append(head, cell, remark);
+  }
+}
+
+// ------------------------------------------------------------------------------------------------------ searching
+
+function answer(row, wish) {
+  const text = part("answer");
+  if (row === null) {
+    text.textContent = `No solution has ${wish}.`;
+    text.className = "missed";
+    return;
+  }
+  text.textContent = `${describe(row)}.`;
+  text.className = "";
+  pick(row);
+}
+
+part("by-triangles").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const most = part("most-triangles").valueAsNumber;
+  let best = null;
+  columns.triangles.forEach((triangles, row) => {
+    if (triangles <= most && (best === null || columns.error[row] < columns.error[best])) best = row;
+  });
+  answer(best, `at most ${plainNumber(most)} triangles; the smallest has ${plainNumber(Math.min(...columns.triangles))}`);
+});
+
+part("by-error").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const most = Number(part("most-error").value.replace(",", "."));
+  const measure = part("measure").value;
+  const name = named(measure);
+  if (!(most >= 0)) return answer(null, `an error of “${part("most-error").value}”; give a number`);
+  const best = columns[measure].findIndex((error) => error <= most); // sorted by triangles
+  answer(best < 0 ? null : best, `a ${name} of at most ${spell(most)}; the least is ${spell(Math.min(...columns[measure]))}`);
+});
+
+// ---------------------------------------------------------------------------------------------------- taking home
+
+for (const button of document.querySelectorAll("#downloads button")) {
+  button.addEventListener("click", () => {
+    const kind = button.value;
+    const mesh = compactMesh(state.geometry.points, state.geometry.paint, state.mesh.faces);
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(MESH_FILES[kind](mesh));
+    link.download = `${data.stem}_${columns.triangles[state.mesh.row]}.${kind}`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+  });
+}
+
+part("copy").addEventListener("click", async () => {
+  try {
+    await navigator.clipboard.writeText(part("command").textContent);
+    part("copied").textContent = "copied";
+  } catch {
+    getSelection().selectAllChildren(part("command"));
+    part("copied").textContent = "selected; copy it with Ctrl+C";
+  }
+});
+
+// ---------------------------------------------------------------------------------------------------- the two meshes
+
+const UNCOVERED_LEVEL = 255; // other levels q mean an error of (q / 254)^2 times the largest of the solution
+const errorAt = (row, level) => data.solutions[row].largest * (level / 254) ** 2;
+
+// The end of the scale: the same for all solutions, or fitted to the shown one; a few spikes do not pale all the rest.
+function scaleEnd() {
+  if (part("scale").value === "all") return data.scale_end;
+  const { row, levels } = state.mesh;
+  const covered = levels.filter((level) => level !== UNCOVERED_LEVEL).sort();
+  const level = covered.length ? covered[Math.floor(data.scale_quantile * (covered.length - 1))] : 0;
+  return errorAt(row, level) || data.solutions[row].largest || 1;
+}
+
+function paintErrors() {
+  if (!state.mesh) return;
+  const { row, levels } = state.mesh;
+  const end = scaleEnd();
+  const table = Array.from({ length: 256 }, (_, level) => {
+    if (level === UNCOVERED_LEVEL) return data.uncovered_colour;
+    const share = Math.min(1, errorAt(row, level) / end);
+    return data.colours[Math.round(share * (data.colours.length - 1))];
+  });
+  const { points, measured } = state.geometry;
+  const colours = new Float32Array(points.length);
+  levels.forEach((level, i) => {
+    for (let k = 0; k < 3; k++) colours[3 * measured[i] + k] = table[level][k] / 255;
+  });
+  state.viewer.setErrors(colours);
+  part("scale-middle").textContent = readable(end / 2);
+  part("scale-end").textContent = data.solutions.some((solution) => solution && solution.largest > end) ? `≥ ${readable(end)}` : readable(end);
+  part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
+}
+
+function colourBar() {
+  const bar = part("bar");
+  const pen = bar.getContext("2d");
+  data.colours.forEach((rgb, k) => {
+    pen.fillStyle = `rgb(${rgb.join(",")})`;
+    pen.fillRect((k * bar.width) / data.colours.length, 0, bar.width / data.colours.length + 1, bar.height);
+  });
+}
+
+async function openViewer() {
+  const [points, faces, paint] = await Promise.all([
+    unpackArray(data.points),
+    unpackFaces(data.faces),
+    data.paint && unpackArray(data.paint),
+  ]);
+  state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
+  const { pivot, rotation } = model;
+  const upright = new Float64Array(points.length);
+  for (let i = 0; i < points.length; i += 3) {
+    for (let k = 0; k < 3; k++) {
+      let sum = 0;
+      for (let j = 0; j < 3; j++) sum += rotation[k][j] * (points[i + j] - pivot[j]);
+      upright[i + k] = sum;
+    }
+  }
+  const canvas = part("canvas");
+  const windows = [part("original-window"), part("simplified-window")];
+  const heights = part("heights");
+  let first = true;
+  try {
+    state.viewer = new MeshPair(canvas, windows, {
+      positions: upright,
+      faces,
+      paint,
+      channels: data.paint ? data.paint.channels : 0,
+      exaggeration: heights.valueAsNumber,
+      relief: model.relief,
+      onDraw() {
+        if (!first || !state.mesh) return;
+        first = false;
+        performance.mark("first picture");
+        document.documentElement.dataset.ready = "yes";
+      },
+    });
+  } catch (problem) {
+    part("no-3d").hidden = false;
+    part("no-3d").textContent = `The meshes cannot be shown: this browser gives no WebGL (${problem.message}). All else works.`;
+    document.documentElement.dataset.ready = "without WebGL";
+    return;
+  }
+  const viewer = state.viewer;
+  for (const radio of document.querySelectorAll("input[name=look]")) {
+    radio.addEventListener("change", () => {
+      viewer.setMode(radio.value);
+      part("error-key").hidden = radio.value !== "error";
+    });
+  }
+  part("scale").addEventListener("change", paintErrors);
+  heights.addEventListener("input", () => {
+    part("heights-value").textContent = `× ${readable(heights.valueAsNumber)}`;
+    viewer.setExaggeration(heights.valueAsNumber);
+  });
+  part("from-above").addEventListener("click", () => viewer.look(0, 0));
+  part("from-side").addEventListener("click", () => viewer.look(0.6, 1.2));
+  part("reset").addEventListener("click", () => viewer.reset());
+  if (state.mesh) {
+    viewer.show(state.mesh.faces);
+    paintErrors();
+  }
+}
+
+colourBar();
+pick(data.chosen === null ? data.knee : data.chosen);
+openViewer();

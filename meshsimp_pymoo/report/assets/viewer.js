@@ -1,0 +1,250 @@
+// Original and simplified mesh side by side: two windows of one WebGL canvas, seen by one camera, so that they turn together.
+
+THREE.ColorManagement.enabled = false; // colours go to the screen as they are given
+
+const CLAY = [0.9, 0.84, 0.77];
+const NO_VERTEX = "#9aa0a6"; // simplified surface where the original has none
+const TURN_STEP = Math.PI / 36;
+const TEXTURE_SIZE = 1024;
+
+class MeshPair {
+  // positions: (V, 3) upright from a local origin; extent: [low, high] of the original; paint: (V, k) uint8 or null
+  constructor(canvas, windows, { positions, faces, paint, channels, exaggeration, relief, onDraw }) {
+    Object.assign(this, { canvas, windows, paint, onDraw });
+    const count = positions.length / 3;
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (const row of faces) {
+      for (let k = 0; k < 3; k++) {
+        low[k] = Math.min(low[k], positions[3 * row + k]);
+        high[k] = Math.max(high[k], positions[3 * row + k]);
+      }
+    }
+    const size = Math.max(high[0] - low[0], high[1] - low[1]);
+    this.extent = [0, 1, 2].map((k) => (high[k] - low[k]) / size);
+    const local = new Float32Array(3 * count);
+    const uv = new Float32Array(2 * count);
+    for (let i = 0; i < count; i++) {
+      for (let k = 0; k < 3; k++) local[3 * i + k] = (positions[3 * i + k] - (low[k] + high[k]) / 2) / size;
+      for (let k = 0; k < 2; k++) uv[2 * i + k] = (positions[3 * i + k] - low[k]) / (high[k] - low[k]);
+    }
+    const own = new Float32Array(3 * count);
+    for (let i = 0; i < count; i++) {
+      for (let k = 0; k < 3; k++) own[3 * i + k] = paint ? paint[channels * i + k] / 255 : CLAY[k];
+    }
+    this.arrays = { position: local, uv, color: own };
+    this.own = new THREE.BufferAttribute(own, 3);
+    this.errorColour = new THREE.BufferAttribute(new Float32Array(3 * count), 3);
+
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
+    this.renderer.setClearColor(0x000000, 0);
+    this.camera = new THREE.PerspectiveCamera(28, 1, 0.01, 100);
+    this.camera.up.set(0, 0, 1);
+    this.sun = new THREE.DirectionalLight(0xffffff, 1);
+    this.sun.position.set(-0.5, 0.6, 0.75); // from the upper left, in front of the picture
+    this.sun.target.position.set(0, 0, 0); // the camera
+    this.camera.add(this.sun, this.sun.target);
+    this.sky = new THREE.AmbientLight(0xffffff, 1);
+
+    const side = THREE.DoubleSide;
+    const lifted = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+    this.materials = {
+      shaded: new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side }),
+      texture: new THREE.MeshLambertMaterial({ flatShading: true, side }),
+      paper: new THREE.MeshBasicMaterial({ side, ...lifted }),
+      wire: new THREE.MeshBasicMaterial({ wireframe: true, side }),
+    };
+    const longest = Math.max(this.extent[0], this.extent[1]);
+    const pixels = [0, 1].map((k) => Math.max(16, Math.round((TEXTURE_SIZE * this.extent[k]) / longest)));
+    this.target = new THREE.WebGLRenderTarget(pixels[0], pixels[1], { minFilter: THREE.LinearFilter });
+    this.materials.texture.map = this.target.texture;
+    this.original = this.scene(faces);
+    this.simplified = null;
+    this.flat = new THREE.Scene();
+    const coloured = this.geometry(faces);
+    coloured.setAttribute("color", this.errorColour);
+    const map = new THREE.Mesh(coloured, new THREE.MeshBasicMaterial({ vertexColors: true, side }));
+    this.flat.add(map);
+    this.above = new THREE.OrthographicCamera(-this.extent[0] / 2, this.extent[0] / 2, this.extent[1] / 2, -this.extent[1] / 2, -10, 10);
+    this.mode = "shaded";
+    this.exaggeration = exaggeration;
+    this.relief = relief;
+
+    this.controls = new THREE.OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", () => this.request());
+    this.controls.maxDistance = 20;
+    this.controls.minDistance = 0.05;
+    // the wheel scrolls the page until the view has the focus
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        if (document.activeElement !== canvas) event.stopImmediatePropagation();
+      },
+      { capture: true },
+    );
+    canvas.addEventListener("pointerdown", () => canvas.focus({ preventScroll: true }));
+    canvas.addEventListener("keydown", (event) => this.key(event));
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.theme();
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.theme());
+    this.resize();
+    this.reset();
+  }
+
+  // Every geometry has attributes of its own: disposing of one deletes its buffers on the graphics card.
+  geometry(faces) {
+    const geometry = new THREE.BufferGeometry();
+    for (const [name, array] of Object.entries(this.arrays)) {
+      geometry.setAttribute(name, new THREE.BufferAttribute(array, name === "uv" ? 2 : 3));
+    }
+    geometry.setIndex(new THREE.BufferAttribute(faces, 1));
+    return geometry;
+  }
+
+  scene(faces) {
+    const scene = new THREE.Scene();
+    const mesh = new THREE.Mesh(this.geometry(faces), this.materials.shaded);
+    const wire = new THREE.Mesh(mesh.geometry, this.materials.wire);
+    mesh.frustumCulled = wire.frustumCulled = false;
+    scene.add(mesh, wire);
+    return { scene, mesh, wire };
+  }
+
+  // faces: Uint32Array or null for no mesh
+  show(faces) {
+    if (this.simplified) this.simplified.mesh.geometry.dispose();
+    this.simplified = faces ? this.scene(faces) : null;
+    this.request();
+  }
+
+  // colours: (V, 3) float, of the error at every vertex
+  setErrors(colours) {
+    this.errorColour.array.set(colours);
+    this.errorColour.needsUpdate = true;
+    this.renderer.setRenderTarget(this.target);
+    this.renderer.setClearColor(NO_VERTEX, 1);
+    this.renderer.clear();
+    this.renderer.render(this.flat, this.above);
+    this.renderer.setRenderTarget(null);
+    this.renderer.setClearColor(0x000000, 0);
+    this.request();
+  }
+
+  setMode(mode) {
+    this.mode = mode;
+    this.request();
+  }
+
+  setExaggeration(factor) {
+    this.exaggeration = factor;
+    this.request();
+  }
+
+  theme() {
+    const style = getComputedStyle(document.documentElement);
+    this.materials.paper.color.set(style.getPropertyValue("--card").trim());
+    this.materials.wire.color.set(style.getPropertyValue("--wire").trim());
+    this.request();
+  }
+
+  resize() {
+    const ratio = Math.min(2, window.devicePixelRatio || 1);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(this.canvas.clientWidth, this.canvas.clientHeight, false);
+    this.request();
+  }
+
+  // Look from the direction (azimuth from the south, polar angle from above).
+  look(azimuth, polar) {
+    const [width, height] = this.window(0).slice(2);
+    const fitted = Math.tan((this.camera.fov * Math.PI) / 360);
+    const deep = this.extent[1] * Math.cos(polar) + this.extent[2] * this.exaggeration * Math.sin(polar);
+    const distance = (0.55 * Math.max(deep, (this.extent[0] * height) / width)) / fitted + 0.5 * this.extent[1] * Math.sin(polar);
+    this.controls.target.set(0, 0, 0);
+    this.place(azimuth, polar, distance);
+  }
+
+  place(azimuth, polar, distance) {
+    const tilt = Math.min(Math.PI - 1e-3, Math.max(1e-3, polar));
+    const across = distance * Math.sin(tilt);
+    this.camera.position
+      .set(across * Math.sin(azimuth), -across * Math.cos(azimuth), distance * Math.cos(tilt))
+      .add(this.controls.target);
+    this.controls.update();
+    this.request();
+  }
+
+  turn(azimuth, polar, zoom) {
+    const arm = this.camera.position.clone().sub(this.controls.target);
+    const distance = arm.length();
+    const tilt = Math.acos(arm.z / distance);
+    this.place(Math.atan2(arm.x, -arm.y) + azimuth, tilt + polar, distance * zoom);
+  }
+
+  // A relief as high as a face is seen nearly from the front, terrain from a hill beside it.
+  reset() {
+    this.look(0, this.relief > 0.2 ? 0.25 : 0.85);
+  }
+
+  key(event) {
+    const moves = {
+      ArrowLeft: [-TURN_STEP, 0, 1],
+      ArrowRight: [TURN_STEP, 0, 1],
+      ArrowUp: [0, -TURN_STEP, 1],
+      ArrowDown: [0, TURN_STEP, 1],
+      "+": [0, 0, 1 / 1.1],
+      "=": [0, 0, 1 / 1.1],
+      "-": [0, 0, 1.1],
+    };
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    if (event.key in moves) this.turn(...moves[event.key]);
+    else if (event.key === "Home") this.reset();
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  window(which) {
+    const canvas = this.canvas.getBoundingClientRect();
+    const frame = this.windows[which].getBoundingClientRect();
+    return [frame.left - canvas.left, canvas.bottom - frame.bottom, frame.width, frame.height].map(Math.round);
+  }
+
+  request() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.draw();
+    });
+  }
+
+  draw() {
+    const renderer = this.renderer;
+    const bright = this.mode === "error" ? 0.72 : 0.3; // colours of the error must be told from the light
+    this.sky.intensity = Math.PI * bright;
+    this.sun.intensity = Math.PI * (this.mode === "error" ? 0.36 : 0.78);
+    renderer.setScissorTest(false);
+    renderer.clear();
+    renderer.setScissorTest(true);
+    [this.original, this.simplified].forEach((part, which) => {
+      if (!part) return;
+      const rectangle = this.window(which);
+      if (rectangle[2] < 1 || rectangle[3] < 1) return;
+      renderer.setViewport(...rectangle);
+      renderer.setScissor(...rectangle);
+      this.camera.aspect = rectangle[2] / rectangle[3];
+      this.camera.updateProjectionMatrix();
+      part.wire.visible = this.mode === "wireframe";
+      if (which === 0) part.mesh.geometry.setAttribute("color", this.mode === "error" ? this.errorColour : this.own);
+      if (this.mode === "wireframe") part.mesh.material = this.materials.paper;
+      else if (this.mode === "error" && which === 1) part.mesh.material = this.materials.texture;
+      else part.mesh.material = this.materials.shaded;
+      part.mesh.scale.z = part.wire.scale.z = this.exaggeration;
+      part.scene.add(this.camera, this.sky);
+      renderer.render(part.scene, this.camera);
+    });
+    this.onDraw();
+  }
+}

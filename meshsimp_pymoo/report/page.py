@@ -1,0 +1,298 @@
+"""The page of a simplification: one file in which to move along the front, look at each mesh and take one home.
+
+The page holds the vertices of the original once, and for each solution its triangles and the size of the deviation
+at every vertex, in 8 bits. What would make it larger than PAGE_BYTES is thinned, and the page says so: the meshes (all
+numbers stay in the chart, an even selection keeps its meshes), and above DRAWN_VERTICES the picture of the original.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma
+from meshsimp_pymoo.report.figures import UNCOVERED, relief_exaggeration
+from meshsimp_pymoo.report.study import slug
+from meshsimp_pymoo.results import FRONT_COLUMNS, ResultError, StoredFront, new_file
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.geometry.error import Simplified
+    from meshsimp_pymoo.geometry.model import OpenModel
+    from meshsimp_pymoo.problem import MeshProblem
+
+__all__ = ["PAGE_BYTES", "simplification_page", "write_page"]
+
+IntArray = npt.NDArray[np.integer[Any]]
+
+SCRIPTS = (
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "simplification.js",
+)  # fmt: skip
+PAGE_BYTES = 15_000_000
+# The libraries, the texts and the numbers of the solutions.
+FIXED_BYTES = 700_000
+# Vertices of the original that are drawn; a browser without a graphics card turns no more of them smoothly.
+DRAWN_VERTICES = 50_000
+# What one triangle, one deviation and one vertex take, embedded; measured on scans and terrain. Too low an estimate is
+# put right afterwards, too high a one leaves out meshes that would have fitted.
+TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES = 4.0, 1.2, 26.0
+# A deviation d is embedded as the level 254 sqrt(d / largest), which keeps small ones apart.
+LEVELS, UNCOVERED_LEVEL = 254, 255
+# The colours of the error end where this share of the knee's vertices are below: a few spikes do not pale all the rest.
+SCALE_QUANTILE = 0.98
+# Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
+RECORDED = ("algorithm", "seed", "generations", "evaluations", "interrupted")
+
+
+@dataclass(frozen=True)
+class _Embedded:
+    """What the page holds of the meshes.
+
+    Attributes
+    ----------
+    vertices : (V,) int array
+        Rows of the model that are in the page, ascending.
+    original : dict
+        The triangles of the drawn original, as rows of ``vertices``.
+    solutions : list
+        Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, and the largest
+        of all deviations; None where its mesh is left out.
+    scale_end : float
+        End of the error's colours [model units].
+    drawn : int
+        Vertices of the drawn original.
+    """
+
+    vertices: IntArray
+    original: dict[str, str]
+    solutions: list[dict[str, Any] | None]
+    scale_end: float
+    drawn: int
+
+
+def write_page(
+    front: StoredFront,
+    problem: MeshProblem,
+    *,
+    folder: str | os.PathLike[str],
+    knee: int,
+    series: Mapping[str, npt.ArrayLike] | None = None,
+) -> Path:
+    """Write ``report.html`` to the folder of a front, whole or not at all; see :func:`simplification_page`."""
+    content = simplification_page(front, problem, folder=folder, knee=knee, series=series)
+    path = front.folder / "report.html"
+    with new_file(path) as unfinished:
+        unfinished.write_text(content, encoding="utf-8", newline="\n")
+    return path
+
+
+def simplification_page(
+    front: StoredFront,
+    problem: MeshProblem,
+    *,
+    folder: str | os.PathLike[str],
+    knee: int,
+    series: Mapping[str, npt.ArrayLike] | None = None,
+    limit: int = PAGE_BYTES,
+) -> str:
+    """Return the page of a front.
+
+    Parameters
+    ----------
+    front : StoredFront
+        The front as it was written. Its record (``run.json``) says which solution was chosen; the page opens with that
+        one, else with the knee.
+    problem : MeshProblem
+        What the solutions are solutions of; their meshes are made anew from it.
+    folder : path
+        The folder of the front, as a shell command shall name it.
+    knee : int
+        The row of the best compromise.
+    series : mapping of str to (n, 2) array, optional
+        Other fronts to draw faintly behind this one, (error, triangles) by name: seeds, baselines.
+    limit : int
+        Size of the page that is not exceeded if it can be helped, by leaving out meshes [bytes].
+
+    Returns
+    -------
+    str
+        The page; the same for the same front and folder.
+
+    Raises
+    ------
+    ResultError
+        If the numbers are not those of the problem's meshes: then it is another model, or has other settings.
+    """
+    model, chosen = problem.model, front.run.get("chosen")
+    count = len(front.kept)
+    whole = model.n_vertices <= DRAWN_VERTICES  # else the largest mesh would take the place of many
+    order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
+    held = _embedded(problem, front, order, knee, limit)
+    missing = sum(solution is None for solution in held.solutions)
+    columns: dict[str, list[Any]] = {name: front.quality[name].tolist() for name in FRONT_COLUMNS[:-1]}
+    if front.refitted_error is not None:
+        columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
+    paint = model.attributes.get("color")
+    exaggeration = float(f"{relief_exaggeration(model):.2g}")
+    source = str(front.run["model"]["name"])  # as it was called when the front was made
+    data = {
+        "stem": slug(PurePath(source).stem),
+        "folder": shlex.quote(os.fspath(folder)),
+        "measure": problem.objectives[0],
+        "columns": columns,
+        "meshes": front.meshes,
+        "refitted_meshes": front.refitted_meshes,
+        "knee": knee,
+        "chosen": chosen,
+        "series": [_series(label, other) for label, other in (series or {}).items()],
+        "model": {
+            "vertices": model.n_vertices,
+            "triangles": len(model.faces),
+            "diagonal": model.diagonal,
+            "relief": float(np.ptp(model.points[:, 2]) / np.ptp(model.points[:, :2], axis=0).max()),
+            "pivot": model.pivot.tolist(),
+            "rotation": model.rotation.tolist(),
+        },
+        "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
+        "paint": None if paint is None else embedded_array(paint[held.vertices]) | {"channels": paint.shape[1]},
+        "faces": held.original,
+        "solutions": held.solutions,
+        "colours": magma(),
+        "uncovered_colour": [int(UNCOVERED[k : k + 2], 16) for k in (1, 3, 5)],
+        "scale_end": held.scale_end,
+        "scale_quantile": SCALE_QUANTILE,
+    }
+    return html_document(
+        "simplification.html",
+        SCRIPTS,
+        data,
+        title=f"{PurePath(source).name}, simplified",
+        model={"vertices": model.n_vertices, "triangles": len(model.faces)},
+        solutions=count,
+        thinned=list(_what_is_thinned(model, held, missing)),
+        heights={"value": f"{exaggeration:g}", "step": f"{exaggeration / 20:g}", "most": f"{5 * exaggeration:g}"},
+        examples={
+            "triangles": columns["triangles"][count // 2],
+            "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
+        },
+        painted=paint is not None,
+        libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
+        settings=_settings(front.run),
+    )
+
+
+def _embedded(problem: MeshProblem, front: StoredFront, order: Sequence[int], knee: int, limit: int) -> _Embedded:
+    """Make the meshes that fit into the page, the most important ones first."""
+    model = problem.model
+    n = model.n_vertices
+    thinned = n > DRAWN_VERTICES
+    if thinned:
+        # the vertices lie along a curve that fills the plane, so every k-th is an even selection
+        drawn = problem.pinned.copy()
+        drawn[:: -(-n // DRAWN_VERTICES)] = True
+        original: IntArray = problem.simplify(drawn).faces
+    else:
+        drawn, original = np.ones(n, dtype=bool), model.faces
+    measured = np.unique(original)  # the others carry no colour
+    n_drawn = len(measured)
+    room = limit - FIXED_BYTES - TRIANGLE_BYTES * len(original) - VERTEX_BYTES * n_drawn
+    rows = []
+    used = drawn.copy()
+    for row in order:
+        more = front.kept[row] & ~used
+        cost = TRIANGLE_BYTES * front.quality["triangles"][row] + DEVIATION_BYTES * n_drawn + VERTEX_BYTES * more.sum()
+        if cost <= room:
+            room -= cost
+            rows.append(row)
+            used |= more
+    found = {row: _checked(problem, front, row) for row in rows}
+    used = drawn.copy()
+    for mesh in found.values():
+        used[mesh.faces.ravel()] = True
+    vertices = np.flatnonzero(used)
+    place = np.cumsum(used) - 1
+    solutions: list[dict[str, Any] | None] = [None] * len(front.kept)
+    sizes: dict[int, int] = {}
+    for row, mesh in found.items():
+        largest = float(mesh.deviation.max())
+        levels = np.rint(LEVELS * np.sqrt(mesh.deviation[measured] / (largest or 1.0))).astype(np.uint8)
+        levels[~mesh.covered[measured]] = UNCOVERED_LEVEL
+        triangles, deviation = embedded_faces(place[mesh.faces]), embedded_array(levels)
+        solutions[row] = {"faces": triangles, "deviation": deviation, "largest": largest}
+        sizes[row] = len(triangles["data"]) + len(deviation["data"])
+    faces = embedded_faces(place[original])
+    room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
+    while sizes and sum(sizes.values()) > room:
+        dropped = next(row for row in reversed(rows) if row in sizes)
+        solutions[dropped] = None
+        del sizes[dropped]
+    at_knee = found[knee] if knee in found else _checked(problem, front, knee)
+    end = float(np.quantile(at_knee.deviation, SCALE_QUANTILE)) or float(front.quality["max_error"].max()) or 1.0
+    return _Embedded(vertices, faces, solutions, end, n_drawn)
+
+
+def _checked(problem: MeshProblem, front: StoredFront, row: int) -> Simplified:
+    """Return the mesh of a solution, if it has the numbers that are said of it."""
+    mesh = problem.simplify(front.kept[row])
+    triangles, error, found = front.quality["triangles"][row], front.quality["error"][row], mesh.quality
+    if found.triangles != triangles or not np.isclose(
+        found.error, error, rtol=1e-6, atol=1e-12 * problem.model.diagonal
+    ):
+        raise ResultError(
+            f"{front.folder}: solution {row} is said to have {triangles} triangles and the error {error:.9g}, but its "
+            f"mesh on {problem.model.name} has {found.triangles} and {found.error:.9g}; the front is one of another "
+            "model, or was made with other settings"
+        )
+    return mesh
+
+
+def _by_importance(count: int, first: Sequence[int]) -> list[int]:
+    """Return all rows, those given first, then so that every beginning of the list is spread evenly over all.
+
+    >>> _by_importance(6, [4, 0])
+    [4, 0, 2, 1, 3, 5]
+    """
+    order = dict.fromkeys(first)
+    pieces = 2
+    while len(order) < count:
+        order |= dict.fromkeys(round(k * (count - 1) / pieces) for k in range(1, pieces, 2))
+        pieces *= 2
+        if pieces > 2 * count:
+            order |= dict.fromkeys(range(count))
+    return list(order)
+
+
+def _series(name: str, front: npt.ArrayLike) -> dict[str, Any]:
+    F = np.atleast_2d(np.asarray(front, dtype=np.float64))
+    F = F[np.lexsort((F[:, 0], F[:, 1]))]
+    return {"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()}
+
+
+def _what_is_thinned(model: OpenModel, held: _Embedded, missing: int) -> Iterator[str]:
+    if missing:
+        yield (
+            f"To keep this page small, {len(held.solutions) - missing} of {len(held.solutions)} meshes are in it, an "
+            "even selection; the others are hollow points in the chart, with all their numbers."
+        )
+    if held.drawn < model.n_vertices:
+        yield (
+            f"The original has {model.n_vertices:,} vertices; it is drawn here from an even selection of "
+            f"{held.drawn:,} of them. All numbers, and the meshes to download, are those of the full model."
+        )
+
+
+def _settings(run: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what is known of how the front was made, as rows of a table."""
+    rows = [("model", run["model"]["name"]), ("hash of the model", run["model"]["hash"])]
+    rows += [(key, str(run[key])) for key in RECORDED if run.get(key) is not None]
+    for key, value in (run.get("settings") or {}).items():
+        if value not in (None, False) and key not in (*run, "threads"):  # which change no result
+            rows.append((key.replace("_", " "), ", ".join(map(str, value)) if isinstance(value, list) else str(value)))
+    version = (run.get("versions") or {}).get("meshsimp-pymoo")
+    return rows + ([("meshsimp-pymoo", version)] if version else [])

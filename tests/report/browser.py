@@ -1,0 +1,64 @@
+"""A real browser for the tests of the pages: Debian's Chromium or whatever of its kind is installed."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Software graphics, and none of the browser's own calls to its makers. Its sandbox does not start for root.
+ARGUMENTS = (
+    "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--disable-quic", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+)  # fmt: skip
+
+
+@contextmanager
+def playwright_engine() -> Iterator[Any]:
+    """Yield Playwright; skip the test where it is not installed."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
+    with playwright.sync_playwright() as engine:
+        yield engine
+
+
+@contextmanager
+def launched(engine: Any, *more: str) -> Iterator[Any]:
+    """Yield a browser, started with more arguments; skip the test where there is none."""
+    program = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if program is None:
+        pytest.skip(f"no browser: none of {', '.join(BROWSERS)} is installed (Debian: apt install chromium)")
+    browser = engine.chromium.launch(executable_path=program, args=[*ARGUMENTS, *more])
+    try:
+        yield browser
+    finally:
+        browser.close()
+
+
+class Visit:
+    """A page from the disk, opened in a browser, with all that it said and asked for."""
+
+    def __init__(self, browser: Any, path: Path, **look: Any) -> None:
+        self.context = browser.new_context(accept_downloads=True, **look)
+        self.page = self.context.new_page()
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda problem: self.said.append(str(problem)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.url = path.resolve().as_uri()
+        self.page.goto(self.url)
+        self.page.wait_for_selector("html[data-ready]", timeout=20_000)
+
+    def close(self) -> None:
+        self.context.close()
+
+    def check(self) -> None:
+        """Fail if the page said anything on the console or asked for anything but itself."""
+        assert self.said == []
+        away = [url for url in self.asked if url != self.url and not url.startswith(("data:", "blob:"))]
+        assert away == []

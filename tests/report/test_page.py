@@ -1,0 +1,625 @@
+"""The page of a simplification: what a person sees, clicks and takes home is what the package computes."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import io
+import json
+import re
+import shlex
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import Visit, launched
+from scipy.spatial import Delaunay
+
+from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.geometry.error import mesh_quality
+from meshsimp_pymoo.geometry.load import read_source
+from meshsimp_pymoo.report import page as page_module
+from meshsimp_pymoo.report.document import ASSETS, embedded_array, embedded_faces, html_document
+from meshsimp_pymoo.report.page import FIXED_BYTES, PAGE_BYTES, simplification_page, write_page
+from meshsimp_pymoo.results import ResultError, mesh_arrays, read_front, write_mesh
+
+SIDE = 24  # samples along a side of the model
+
+
+def relief(side, rng):
+    """Return a rolling square: points (N, 3) with the height along z, their Delaunay triangles, colours."""
+    y, x = np.mgrid[:side, :side].astype(float)
+    inside = (x % (side - 1) > 0) & (y % (side - 1) > 0)
+    x, y = (part + 0.3 * inside * rng.uniform(-1, 1, x.shape) for part in (x, y))  # one Delaunay triangulation, no ties
+    z = 3 * np.sin(x / 4) * np.cos(y / 5) + rng.normal(scale=0.1, size=x.shape)
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    faces = Delaunay(points[:, :2]).simplices
+    colour = np.column_stack([120 + 30 * points[:, 2], 200 - 5 * points[:, 0], 80 + 5 * points[:, 1]])
+    return points, faces, colour.clip(0, 255).astype(np.uint8)
+
+
+def subsets(problem, count, rng):
+    """Return nested random subsets of all sizes."""
+    n = problem.n_var
+    place = rng.permutation(n)
+    return np.array([place < size for size in np.geomspace(8, 0.97 * n, count)]) | problem.pinned
+
+
+def spiral(problem, count):
+    """Return even subsets of all sizes, each size worth its triangles: every k-th vertex along the vector."""
+    n = problem.n_var
+    return np.array([np.arange(n) * size % n < size for size in np.geomspace(40, 0.97 * n, count).astype(int)])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A front, with its page, of a coloured model that stands upright and far away from the origin."""
+    rng = np.random.default_rng(7)
+    points, faces, colour = relief(SIDE, rng)
+    upright = points[:, [0, 2, 1]] * [1, 1, -1] + [500_000.25, 100.5, 4_600_000.75]  # height along y
+    place = tmp_path_factory.mktemp("page")
+    write_mesh(place / "hill side.ply", upright, faces, {"color": colour})
+    problem = MeshProblem(place / "hill side.ply", n_threads=1)
+    assert problem.model.up.round(6).tolist() == [0, 1, 0]
+    Front.from_subsets(problem, subsets(problem, 14, rng), ends=True).save(place / "out", chosen=2)
+    return place / "out"
+
+
+@pytest.fixture(scope="module")
+def front(folder):
+    return Front.load(folder)
+
+
+@pytest.fixture(scope="module")
+def opened(browser, folder):
+    visit = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+    yield visit
+    visit.close()
+
+
+@pytest.fixture
+def visit(opened):
+    """The page, as it was when it was opened; afterwards it must have kept quiet."""
+    opened.page.reload()
+    opened.page.wait_for_selector("html[data-ready]")
+    yield opened
+    opened.check()
+
+
+def shown(page):
+    """Return the number of the solution whose mesh is shown, when the numbers beside it are the same one's."""
+    row = number(page, "solution")
+    page.wait_for_selector(f"html[data-shown='{row:.0f}']")
+    return int(row)
+
+
+def number(page, name):
+    return float(page.locator(f"#number-{name}").get_attribute("value"))
+
+
+def pixels(page, window):
+    """Return what is drawn in one of the two windows, (height, width, 3)."""
+    from PIL import Image
+
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    with Image.open(io.BytesIO(page.locator(f"#{window}-window").screenshot())) as image:
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def unlike(a, b):
+    """Return the share of pixels that differ visibly."""
+    height, width = (min(s, t) for s, t in zip(a.shape[:2], b.shape[:2], strict=True))
+    return float((np.abs(a[:height, :width] - b[:height, :width]).max(axis=2) > 24).mean())
+
+
+# ----------------------------------------------------------------------------------------------------------- choosing
+
+
+def test_the_page_opens_with_the_chosen_solution_and_says_all_its_numbers(visit, front):
+    assert shown(visit.page) == 2
+    for name in ("error", "triangles", "vertices", "mean_error", "rms_error", "max_error", "uncovered"):
+        assert number(visit.page, name) == getattr(front[2], name)
+    text = visit.page.locator("#numbers").inner_text()
+    assert f"of {len(front.model.faces):,}" in text
+    assert f"{100 * front[2].vertices / front.model.n_vertices:.3g}" in text
+    assert f"meshes/002_{front[2].triangles}.ply" in text
+
+
+def test_a_click_picks_a_solution(visit, front):
+    for row in (5, 1, len(front) - 1):
+        visit.page.locator("#chart circle.front-dot").nth(row).click(force=True)
+        assert shown(visit.page) == row
+
+
+def test_the_slider_picks_a_solution(visit, front):
+    slider = visit.page.locator("#slider")
+    slider.fill("6")
+    assert shown(visit.page) == 6
+    slider.press("ArrowRight")
+    assert shown(visit.page) == 7
+    assert f"{front[7].triangles:,} triangles" in slider.get_attribute("aria-valuetext")
+
+
+def test_arrow_keys_pick_a_solution(visit, front):
+    visit.page.keyboard.press("ArrowRight")
+    assert shown(visit.page) == 3
+    visit.page.locator("#chart").focus()
+    visit.page.keyboard.press("ArrowLeft")
+    assert shown(visit.page) == 2
+    visit.page.keyboard.press("End")
+    assert shown(visit.page) == len(front) - 1
+    visit.page.keyboard.press("ArrowRight")
+    assert shown(visit.page) == len(front) - 1
+    visit.page.keyboard.press("Home")
+    assert shown(visit.page) == 0
+
+
+def test_a_search_by_triangles_finds_the_most_accurate(visit, front):
+    for limit in (front[7].triangles - 1, front[7].triangles):
+        visit.page.fill("#most-triangles", str(limit))
+        visit.page.press("#most-triangles", "Enter")
+        assert shown(visit.page) == front.best(triangles=limit).solution
+    assert f"solution {front.best(triangles=limit).solution}:" in visit.page.inner_text("#answer")
+    visit.page.fill("#most-triangles", "1")
+    visit.page.click("#by-triangles button")
+    assert visit.page.inner_text("#answer") == (
+        f"No solution has at most 1 triangles; the smallest has {front[0].triangles}."
+    )
+    assert shown(visit.page) == front.best(triangles=limit).solution
+
+
+@pytest.mark.parametrize("measure", ["mean_error", "max_error", "rms_error", "error"])
+def test_a_search_by_error_finds_the_smallest(visit, front, measure):
+    limit = getattr(front[5], measure) * 1.01
+    visit.page.select_option("#measure", measure)
+    visit.page.fill("#most-error", repr(limit))
+    visit.page.click("#by-error button")
+    assert shown(visit.page) == next(s.solution for s in front if getattr(s, measure) <= limit)
+
+
+def test_a_search_for_no_number_says_so(visit):
+    visit.page.fill("#most-error", "little")
+    visit.page.click("#by-error button")
+    assert "give a number" in visit.page.inner_text("#answer")
+
+
+def test_the_scales_of_the_chart_can_be_switched(visit):
+    def spread():
+        boxes = visit.page.locator("#chart circle.front-dot")
+        xs = [float(boxes.nth(k).get_attribute("cx")) for k in range(boxes.count())]
+        return (xs[4] - xs[0]) / (xs[-1] - xs[0])
+
+    logarithmic = spread()
+    visit.page.uncheck("#log-x")
+    assert spread() < 0.5 * logarithmic
+
+
+def test_knee_and_chosen_solution_are_marked(visit, front):
+    chart = visit.page.locator("#chart > svg")
+    for mark, row in (("diamond", front.knee().solution), ("star", 2)):
+        dot = chart.locator("circle.front-dot").nth(row)
+        place = f"translate({dot.get_attribute('cx')},{dot.get_attribute('cy')})"
+        assert chart.locator(f"path.special.{mark}").get_attribute("transform") == place
+
+
+# ------------------------------------------------------------------------------------------------------------ looking
+
+
+def test_both_meshes_turn_together(visit, front):
+    page = visit.page
+    page.locator("#slider").fill(str(len(front) - 1))  # all vertices are kept: both windows show the same surface
+    assert shown(page) == len(front) - 1
+    seen = [pixels(page, "original")]
+    assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) > 50
+    assert unlike(seen[0], pixels(page, "simplified")) < 0.01
+    for window in ("original", "simplified"):
+        box = page.locator(f"#{window}-window").bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.down()
+        page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 - 40, steps=3)
+        page.mouse.up()
+        seen.append(pixels(page, "original"))
+        assert unlike(seen[-1], seen[-2]) > 0.05
+        assert unlike(seen[-1], pixels(page, "simplified")) < 0.01
+    for key in ("ArrowLeft", "ArrowUp", "+"):
+        for _ in range(3):
+            page.locator("#canvas").press(key)
+        seen.append(pixels(page, "original"))
+        assert unlike(seen[-1], seen[-2]) > 0.02, key
+        assert unlike(seen[-1], pixels(page, "simplified")) < 0.01
+    assert shown(page) == len(front) - 1  # the arrow keys turned the meshes and picked nothing
+    page.click("#reset")
+    assert unlike(pixels(page, "original"), seen[0]) < 0.01
+
+
+def test_another_solution_changes_the_right_window_alone(visit):
+    before = [pixels(visit.page, window) for window in ("original", "simplified")]
+    visit.page.locator("#slider").fill("0")
+    assert shown(visit.page) == 0
+    assert unlike(pixels(visit.page, "original"), before[0]) < 0.001
+    assert unlike(pixels(visit.page, "simplified"), before[1]) > 0.05
+
+
+def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
+    page = visit.page
+    looks = {}
+    for look in ("shaded", "wireframe", "error"):
+        page.check(f"input[value={look}]", force=True)
+        looks[look] = [pixels(page, window) for window in ("original", "simplified")]
+        assert page.locator("#error-key").is_visible() == (look == "error")
+    for window in (0, 1):
+        assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
+        assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
+    # seen from above, both windows show the same map of the error, on the original and on the simplified surface
+    page.click("#from-above")
+    assert unlike(pixels(page, "original"), pixels(page, "simplified")) < 0.25
+    end = page.inner_text("#scale-end")
+    page.locator("#slider").fill("5")
+    assert shown(page) == 5
+    assert page.inner_text("#scale-end") == end
+    largest = np.quantile(front.knee().simplified.deviation, page_module.SCALE_QUANTILE)
+    assert float(end.removeprefix("≥ ")) == pytest.approx(largest, rel=1e-3)
+    page.select_option("#scale", "one")
+    fitted = np.quantile(front[5].simplified.deviation, page_module.SCALE_QUANTILE)
+    assert float(page.inner_text("#scale-end").removeprefix("≥ ")) == pytest.approx(fitted, rel=0.02)
+    # where nothing deviates, all is in the palest colour
+    page.locator("#slider").fill(str(len(front) - 1))
+    page.select_option("#scale", "all")
+    assert shown(page) == len(front) - 1
+    drawn = pixels(page, "simplified")
+    middle = drawn[drawn.shape[0] // 2 - 20 :, drawn.shape[1] // 2 - 20 :][:40, :40].reshape(-1, 3)
+    hue = middle / middle.max(axis=1, keepdims=True)
+    palest = np.array([252, 253, 191]) / 253
+    assert np.abs(hue - palest).max() < 0.05
+
+
+def test_heights_can_be_exaggerated(visit):
+    visit.page.click("#from-side")
+    before = pixels(visit.page, "original")
+    visit.page.locator("#heights").fill(visit.page.locator("#heights").get_attribute("max"))
+    assert unlike(pixels(visit.page, "original"), before) > 0.05
+
+
+# -------------------------------------------------------------------------------------------------------- taking home
+
+
+def parsed(path):
+    """Return vertices and faces of a downloaded file, read without the package or trimesh."""
+    if path.suffix == ".ply":
+        head, body = path.read_bytes().split(b"end_header\n", 1)
+        n, m = (int(count) for count in re.findall(rb"element \w+ (\d+)", head))
+        record = np.dtype([("xyz", "<f8", 3), ("rgb", "u1", head.count(b"property uchar"))])
+        vertices = np.frombuffer(body, record, n)["xyz"]
+        faces = np.frombuffer(body, np.dtype([("n", "u1"), ("at", "<i4", 3)]), m, n * record.itemsize)["at"]
+        return vertices, faces.astype(np.int64)
+    lines = [line.split() for line in path.read_text(encoding="ascii").splitlines()]
+    if path.suffix == ".obj":
+        vertices = np.array([words[1:] for words in lines if words[0] == "v"], dtype=float)
+        return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=np.int64) - 1
+    corners = np.array([words[1:] for words in lines if words[0] == "vertex"], dtype=float)
+    return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl"])
+def test_a_downloaded_mesh_has_the_triangles_and_the_error_that_the_page_says(visit, front, tmp_path, suffix):
+    visit.page.locator("#slider").fill("6")
+    assert shown(visit.page) == 6
+    with visit.page.expect_download() as download:
+        visit.page.click(f"#downloads button[value={suffix}]")
+    assert download.value.suggested_filename == f"hill-side_{front[6].triangles}.{suffix}"
+    path = tmp_path / f"small.{suffix}"
+    download.value.save_as(path)
+    vertices, faces = parsed(path)
+    found = mesh_quality(front.model, vertices, faces)
+    assert found.triangles == number(visit.page, "triangles") == front[6].triangles
+    assert found.error == pytest.approx(number(visit.page, "error"), rel=1e-9)
+    assert found.max_error == pytest.approx(number(visit.page, "max_error"), rel=1e-9)
+    assert len(read_source(path).faces) == front[6].triangles  # and the package opens it
+
+
+def test_a_downloaded_ply_is_the_file_that_the_package_writes(visit, front, tmp_path):
+    with visit.page.expect_download() as download:
+        visit.page.click("#downloads button[value=ply]")
+    download.value.save_as(tmp_path / "page.ply")
+    write_mesh(tmp_path / "package.ply", *mesh_arrays(front.model, front[2].faces))
+    ours, theirs = ((tmp_path / f"{name}.ply").read_bytes().split(b"end_header\n") for name in ("page", "package"))
+    assert ours[0] == theirs[0]
+    n, m = front[2].vertices, front[2].triangles
+    assert ours[1][: 27 * n] == theirs[1][: 27 * n]
+    triangles = [np.frombuffer(part, np.dtype("u1, 3<i4"), m, 27 * n)["f1"].tolist() for part in (ours[1], theirs[1])]
+    assert sorted(triangles[0]) == sorted(triangles[1])
+
+
+def test_the_command_on_the_page_writes_the_mesh_again(visit, front, tmp_path, monkeypatch, capsys):
+    visit.page.locator("#slider").fill("4")
+    assert shown(visit.page) == 4
+    command = shlex.split(visit.page.inner_text("#command"))
+    assert command[:2] == ["meshsimp", "pick"]
+    monkeypatch.chdir(tmp_path)
+    assert main(command[1:]) == 0
+    assert len(read_source(tmp_path / f"hill-side_{front[4].triangles}.ply").faces) == front[4].triangles
+
+
+# ----------------------------------------------------------------------------------------- everybody's, and harmless
+
+
+def test_everything_can_be_reached_with_the_keyboard_and_shows_its_focus(visit):
+    reached = {}
+    for _ in range(40):
+        visit.page.keyboard.press("Tab")
+        name, outlined, nothing = visit.page.evaluate(
+            """() => { const at = document.activeElement;
+            const seen = at.name === "look" ? at.nextElementSibling : at;
+            return [at.id || at.value || at.textContent, getComputedStyle(seen).outlineStyle !== "none",
+            at === document.body]; }"""
+        )
+        if not nothing:
+            reached[name] = outlined
+    assert {
+        "log-x", "log-y", "chart", "slider", "shaded", "canvas", "from-above", "from-side", "reset", "heights",
+        "most-triangles", "most-error", "measure", "ply", "obj", "stl", "command", "copy",
+    } <= set(reached)  # fmt: skip
+    assert all(reached.values()), reached
+
+
+def test_every_control_has_a_name(visit):
+    unnamed = visit.page.evaluate(
+        """() => [...document.querySelectorAll("input, select, button, canvas, svg[role], [tabindex]")]
+        .filter((at) => !(at.labels && at.labels.length) && !at.getAttribute("aria-label") && !at.textContent.trim())
+        .map((at) => at.outerHTML)"""
+    )
+    assert unnamed == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_is_readable_on_a_phone_by_day_and_night(browser, folder, scheme):
+    look = {"viewport": {"width": 360, "height": 740}, "color_scheme": scheme, "has_touch": True}
+    visit = Visit(browser, folder / "report.html", **look)
+    try:
+        assert visit.page.evaluate("document.documentElement.scrollWidth") == 360
+        ink, paper = visit.page.evaluate(
+            """['color', 'backgroundColor'].map(
+            (part) => getComputedStyle(document.body)[part].match(/[0-9]+/g).map(Number))"""
+        )
+        assert (sum(ink) < sum(paper)) == (scheme == "light")
+        assert abs(sum(ink) - sum(paper)) > 450
+        small = visit.page.evaluate(
+            "[...document.querySelectorAll('main *')].filter((at) => at.checkVisibility() && at.innerText && "
+            "parseFloat(getComputedStyle(at).fontSize) < 12).map((at) => at.outerHTML)"
+        )
+        assert small == []
+        assert visit.page.locator("#simplified-window").bounding_box()["width"] > 120
+        visit.check()
+    finally:
+        visit.close()
+
+
+EVIL = "</script><img src=http://127.0.0.1:9/x onerror=alert(1)><script>window.hurt = 1</script>"
+
+
+def test_names_cannot_run_anything_or_call_anyone(browser, folder, front, tmp_path):
+    stored = replace(read_front(folder), meshes=(EVIL,) * len(front))
+    stored.run["model"]["name"] = f"{EVIL}.ply"
+    stored.run["settings"] = {"patch": EVIL}
+    path = tmp_path / "report.html"
+    path.write_text(
+        simplification_page(stored, front.problem, folder=f"; rm -rf {EVIL}", knee=3, series={EVIL: front.F}),
+        encoding="utf-8",
+    )
+    visit = Visit(browser, path)
+    try:
+        visit.page.evaluate("document.querySelector('details').open = true")
+        assert visit.page.evaluate("window.hurt") is None
+        assert visit.page.locator("img").count() == 0
+        assert visit.page.title() == f"{Path(EVIL).name}.ply, simplified"
+        assert EVIL in visit.page.inner_text("footer")
+        assert EVIL in visit.page.inner_text("#numbers")
+        assert EVIL in visit.page.inner_text("#chart .legend")
+        assert shlex.split(visit.page.inner_text("#command"))[2] == f"; rm -rf {EVIL}"
+        visit.check()
+    finally:
+        visit.close()
+
+
+def test_the_policy_stops_a_script_that_got_in_and_any_call(browser, folder, tmp_path):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    path = tmp_path / "report.html"
+    path.write_text(text.replace("</footer>", "</footer><script>window.hurt = 1</script>"), encoding="utf-8")
+    visit = Visit(browser, path)
+    try:
+        assert visit.page.evaluate("window.hurt") is None
+        assert visit.page.evaluate("fetch('http://127.0.0.1:9/').then(() => 'called', () => 'stopped')") == "stopped"
+        assert len(visit.said) >= 2
+        assert all("Content Security Policy" in line for line in visit.said)
+    finally:
+        visit.close()
+
+
+def test_without_3d_the_rest_of_the_page_works(engine, folder, front, tmp_path):
+    with launched(engine, "--disable-3d-apis") as blind:
+        visit = Visit(blind, folder / "report.html")
+        assert "no WebGL" in visit.page.inner_text("#no-3d")
+        visit.page.locator("#slider").fill("6")
+        assert shown(visit.page) == 6
+        with visit.page.expect_download() as download:
+            visit.page.click("#downloads button[value=obj]")
+        download.value.save_as(tmp_path / "small.obj")
+        assert len(parsed(tmp_path / "small.obj")[1]) == front[6].triangles
+
+
+# --------------------------------------------------------------------------------------------------- size and content
+
+
+def data_of(page):
+    """Return the data that are embedded in a page."""
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)[1])
+
+
+def test_a_page_over_its_limit_leaves_out_meshes_and_says_so(browser, folder, front, tmp_path):
+    stored = read_front(folder)
+    limit = FIXED_BYTES + 35_000
+    page = simplification_page(stored, front.problem, folder=folder, knee=front.knee().solution, limit=limit)
+    assert len(page) <= limit
+    held = [row for row, solution in enumerate(data_of(page)["solutions"]) if solution]
+    assert 3 <= len(held) < len(front)
+    assert {2, front.knee().solution} <= set(held)
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    visit = Visit(browser, path)
+    try:
+        assert f"{len(held)} of {len(front)} meshes are in it" in visit.page.inner_text("header")
+        visited = [0]
+        visit.page.locator("#chart").focus()
+        visit.page.keyboard.press("Home")
+        for _ in held[1:]:
+            visit.page.keyboard.press("ArrowRight")
+            visited.append(shown(visit.page))
+        assert visited == held
+        absent = next(row for row in range(len(front)) if row not in held)
+        visit.page.locator("#chart circle.front-dot").nth(absent).click(force=True)
+        assert shown(visit.page) == absent
+        assert number(visit.page, "error") == front[absent].error
+        assert visit.page.locator("#not-embedded").is_visible()
+        assert visit.page.locator("#downloads button:enabled").count() == 0
+        assert f"--solution {absent} " in visit.page.inner_text("#command")
+        visit.check()
+    finally:
+        visit.close()
+
+
+def test_a_large_original_is_drawn_thinned_but_its_meshes_stay_exact(browser, folder, front, tmp_path, monkeypatch):
+    monkeypatch.setattr(page_module, "DRAWN_VERTICES", 60)
+    page = simplification_page(read_front(folder), front.problem, folder=folder, knee=3)
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    visit = Visit(browser, path)
+    try:
+        assert "drawn here from an even selection of 6" in visit.page.inner_text("header")
+        visit.page.locator("#slider").fill("6")
+        assert shown(visit.page) == 6
+        with visit.page.expect_download() as download:
+            visit.page.click("#downloads button[value=ply]")
+        download.value.save_as(tmp_path / "small.ply")
+        found = mesh_quality(front.model, *parsed(tmp_path / "small.ply"))
+        assert found.error == pytest.approx(front[6].error, rel=1e-9)
+        visit.check()
+    finally:
+        visit.close()
+
+
+def test_ten_thousand_vertices_and_a_hundred_solutions_are_small_and_quick(browser, tmp_path):
+    rng = np.random.default_rng(3)
+    points, faces, _ = relief(100, rng)
+    write_mesh(tmp_path / "big.ply", points, faces)
+    problem = MeshProblem(tmp_path / "big.ply")
+    front = Front.from_subsets(problem, spiral(problem, 160), ends=True)[-100:]
+    assert len(front) == 100
+    front.save(tmp_path / "out", meshes=0)
+    path = tmp_path / "out" / "report.html"
+    assert path.stat().st_size < PAGE_BYTES / 2
+    assert all(data_of(path.read_text(encoding="utf-8"))["solutions"])
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        visit = Visit(browser, path, viewport={"width": 1280, "height": 900})
+        picture = pixels(visit.page, "simplified")
+        seconds.append(time.perf_counter() - start)
+        visit.check()
+        visit.close()
+        assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
+        if seconds[-1] < 2:
+            break
+    assert min(seconds) < 2, seconds
+
+
+def unpacked(packed):
+    """Return an embedded array, unpacked as the format says."""
+    kind = np.dtype(f"<{packed['kind']}")
+    planes = np.frombuffer(gzip.decompress(base64.b64decode(packed["data"])), np.uint8)
+    return planes.reshape(kind.itemsize, -1).T.copy().view(kind).ravel()
+
+
+@pytest.mark.parametrize("kind", ["u1", "u2", "u4", "f8"])
+def test_embedded_arrays_come_back_exactly(kind):
+    rng = np.random.default_rng(1)
+    values = rng.integers(0, 256, 24, dtype=np.uint8).view(kind)
+    assert unpacked(embedded_array(values)).tobytes() == values.tobytes()
+
+
+def test_embedded_triangles_come_back_turned_to_their_smallest_vertex_and_sorted():
+    columns = unpacked(embedded_faces(np.array([[9, 4, 7], [2, 8, 3], [5, 2, 1]]))).reshape(3, -1)
+    a = columns[0].cumsum()
+    assert np.stack([a, a + columns[1], a + columns[2]], axis=1).tolist() == [[1, 5, 2], [2, 8, 3], [4, 7, 9]]
+
+
+def test_embedded_deviations_are_those_of_the_mesh_to_eight_bits(folder, front):
+    data = data_of((folder / "report.html").read_text(encoding="utf-8"))
+    for row in (0, 5, len(front) - 1):
+        solution, mesh = data["solutions"][row], front[row].simplified
+        levels = unpacked(solution["deviation"]).astype(float)
+        found = solution["largest"] * (levels / page_module.LEVELS) ** 2
+        assert (levels[~mesh.covered] == page_module.UNCOVERED_LEVEL).all()
+        step = solution["largest"] / page_module.LEVELS
+        np.testing.assert_allclose(found[mesh.covered], mesh.deviation[mesh.covered], atol=1.01 * step)
+
+
+def test_the_same_front_gives_the_same_bytes(folder, front):
+    pages = {simplification_page(read_front(folder), front.problem, folder="out", knee=3) for _ in range(2)}
+    assert len(pages) == 1
+
+
+def test_a_front_of_another_model_is_refused(folder, front):
+    other = MeshProblem(replace(front.model, points=front.model.points * [1, 1, 2]))
+    with pytest.raises(ResultError, match=r"is said to have \d+ triangles .* the front is one of another model"):
+        simplification_page(read_front(folder), other, folder=folder, knee=3)
+
+
+def test_report_makes_the_page_of_a_front_anew(folder, capsys):
+    path = folder / "report.html"
+    before = path.read_bytes()
+    path.unlink()
+    assert main(["report", str(folder)]) == 0
+    assert path.read_bytes() == before
+    assert f"written: {path}" in capsys.readouterr().out
+    assert sorted(p.name for p in folder.iterdir() if p.name.startswith(".")) == []
+
+
+def test_a_page_that_cannot_be_made_leaves_the_old_one(folder, front, monkeypatch):
+    before = (folder / "report.html").read_bytes()
+    monkeypatch.setattr(page_module, "embedded_array", lambda values: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_page(read_front(folder), front.problem, folder=folder, knee=3)
+    assert (folder / "report.html").read_bytes() == before
+
+
+def test_simplify_writes_the_page_unless_told_not_to(tmp_path, capsys):
+    command = ["simplify", "roof:5", "--evaluations", "60", "--population", "20"]
+    assert main([*command, "-o", str(tmp_path / "with")]) == 0
+    assert main([*command, "-o", str(tmp_path / "without"), "--no-page"]) == 0
+    assert (tmp_path / "with" / "report.html").is_file()
+    assert not (tmp_path / "without" / "report.html").exists()
+
+
+def test_data_cannot_end_their_element():
+    page = html_document(
+        "base.html", (), {"name": "</script><!-- & \u2028"}, title="<b>", libraries="none"
+    )
+    inside = page.partition('id="data">')[2].partition("</script>")[0]
+    assert not set("<>&\u2028") & set(inside)
+    assert json.loads(inside) == {"name": "</script><!-- & \u2028"}
+    assert "<title>&lt;b&gt;</title>" in page
+
+
+def test_the_libraries_are_the_ones_that_their_readme_names():
+    text = (ASSETS / "vendor" / "README.md").read_text(encoding="utf-8")
+    libraries = sorted((ASSETS / "vendor").glob("*.min.js"))
+    assert len(libraries) == 2
+    for path in libraries:
+        assert f"| `{path.name}` |" in text
+        assert hashlib.sha256(path.read_bytes()).hexdigest() in text
+        assert b"Permission" in path.read_bytes()[:600]  # its licence
