@@ -41,7 +41,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from meshsimp_pymoo.indicators import cardinality, coverage, epsilon, hypervolume_ratio, non_dominated
+from meshsimp_pymoo.indicators import (
+    cardinality,
+    checked_objectives,
+    coverage,
+    epsilon,
+    hypervolume_ratio,
+    non_dominated,
+)
 
 __all__ = [
     "ALPHA",
@@ -61,6 +68,7 @@ __all__ = [
     "dominance_rates",
     "epsilon_table",
     "holm",
+    "knee",
     "knees",
     "magnitude",
     "merged_front",
@@ -691,6 +699,37 @@ def trade_off(
     if rule == "votes":
         return int(np.bincount(value.argmin(axis=1), minlength=len(F)).argmax())
     raise ValueError(f"unknown rule {rule!r}: choose 'mean' or 'votes'")
+
+
+def knee(front: ArrayLike) -> int:
+    """Return the knee of a front: the solution farthest below the line between its ends, scaled to [0, 1].
+
+    Unlike the outliers of :func:`knees`, there is always exactly one [1]_; of equal ones, the first.
+
+    Parameters
+    ----------
+    front : (n, 2) array-like
+        (error, triangles), non-dominated, in any order.
+
+    Returns
+    -------
+    int
+        Row of ``front``.
+
+    References
+    ----------
+    .. [1] I. Das, "On characterizing the 'knee' of the Pareto curve based on normal-boundary intersection",
+       Structural Optimization 18, 1999.
+
+    Examples
+    --------
+    >>> knee([[10, 2], [1, 4], [0, 20]])
+    1
+    """
+    F = checked_objectives(front, "the front")
+    extent = np.ptp(F, axis=0)
+    scaled = (F - F.min(axis=0)) / np.where(extent > 0, extent, 1.0)
+    return int(np.argmin(scaled.sum(axis=1).round(12)))
 
 
 def knees(front: ArrayLike) -> IntArray:

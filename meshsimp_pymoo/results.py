@@ -5,10 +5,14 @@
     OUT/front.csv      one row per solution, sorted by triangles; the columns are FRONT_COLUMNS
     OUT/meshes/        007_412.ply is solution 7, of 412 triangles; see the column ``mesh``
     OUT/chosen.ply     the solution that was asked for, if one was
+    OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
+                       the columns REFIT_COLUMNS too
     OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
     OUT/run.json       settings, seed, package versions, evaluations, seconds, hash of the model
+    OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
 
-All but run.json (which holds the time taken) are the same bytes again for the same front. Floats are written
+All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
+the same front. Floats are written
 with the fewest digits that read back to the same number. Everything is written to a hidden folder beside OUT,
 flushed to the disk and then renamed, so that OUT is either complete or absent.
 """
@@ -25,7 +29,8 @@ import shutil
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path, PurePosixPath
@@ -39,17 +44,22 @@ from meshsimp_pymoo.geometry.load import ModelWarning
 if TYPE_CHECKING:
     from meshsimp_pymoo.geometry.error import Quality
     from meshsimp_pymoo.geometry.model import OpenModel
+    from meshsimp_pymoo.geometry.refit import Refitted
 
 __all__ = [
     "FRONT_COLUMNS",
     "MESHES_BY_DEFAULT",
     "MESH_FORMATS",
+    "REFIT_COLUMNS",
     "ResultError",
     "StoredFront",
+    "claim_file",
     "claim_output",
     "mesh_arrays",
+    "new_file",
     "package_versions",
     "read_front",
+    "warn_of_single_precision",
     "write_front",
     "write_mesh",
 ]
@@ -69,6 +79,7 @@ FRONT_COLUMNS = (
     "uncovered",
     "mesh",
 )
+REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
 MESH_FORMATS = ("ply", "obj", "stl", "off", "glb")
 SINGLE_PRECISION_FORMATS = ("stl", "glb")  # by their own definitions
@@ -76,8 +87,10 @@ SINGLE_PRECISION_LOSS = 1e-6  # share of the model's diagonal; a larger shift of
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 OWN_ENTRIES = (
     "front.csv", "front.npz", "front.png", "run.json", "meshes",
-    "report.html", "tables", "figures", "times.csv",
+    "report.html", "tables", "figures", "times.csv", "refitted",
+    "nested.npz", "tiles",
 )  # fmt: skip
+CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
 
 # PLY has no 64-bit integers, no half floats and no booleans: such attributes are written in the next type
@@ -112,6 +125,10 @@ class StoredFront:
         Path of each solution's mesh relative to the folder; empty where it was not written.
     run : dict
         The content of run.json.
+    refitted_error : (S,) float array, optional
+        The error with the best heights, NaN where it was not computed; None if heights were not fitted.
+    refitted_meshes : tuple of str
+        Path of each mesh with its best heights, relative to the folder; empty where there is none.
     """
 
     folder: Path
@@ -120,6 +137,8 @@ class StoredFront:
     source_index: IntArray
     meshes: tuple[str, ...]
     run: dict[str, Any] = field(default_factory=dict)
+    refitted_error: FloatArray | None = None
+    refitted_meshes: tuple[str, ...] = ()
 
     @property
     def F(self) -> FloatArray:
@@ -155,7 +174,7 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     if target.exists():
         if not overwrite:
             raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
-        foreign = sorted(e.name for e in target.iterdir() if e.name not in OWN_ENTRIES and e.stem != "chosen")
+        foreign = sorted(e.name for e in target.iterdir() if e.name not in OWN_ENTRIES and e.stem not in CHOSEN)
         if foreign:
             raise ResultError(
                 f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
@@ -183,6 +202,7 @@ def write_front(
     meshes: int | None = MESHES_BY_DEFAULT,
     mesh_format: str = "ply",
     chosen: int | None = None,
+    refit: Callable[[int], Refitted] | None = None,
     run: Mapping[str, Any] | None = None,
     extra: Callable[[Path], None] | None = None,
     overwrite: bool = False,
@@ -210,6 +230,10 @@ def write_front(
         precision; STL and GLB are single precision by definition.
     chosen : int, optional
         Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
+    refit : callable, optional
+        The best heights for the solution in this row of ``kept`` (see
+        :func:`~meshsimp_pymoo.geometry.refit.refit_heights`). Each mesh that is written is then written with them
+        too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
     run : mapping, optional
         What to record in run.json beside the package versions and the model.
     extra : callable, optional
@@ -243,7 +267,7 @@ def write_front(
     if not np.isfinite(F).all():
         raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
     order = np.lexsort((F[:, 0], F[:, 1]))
-    with_mesh = set(_even_selection(len(order), meshes))
+    with_mesh = set(even_selection(len(order), meshes))
     if (with_mesh or chosen is not None) and faces is None:
         raise ValueError("meshes are asked for but no faces are given; pass faces= or meshes=0")
 
@@ -253,35 +277,39 @@ def write_front(
     partial = _partial_folder(target)
     try:
         digits = max(3, len(str(len(order) - 1)))
-        rows, shift = [], 0.0
+        rows, single = [], 0.0
         if with_mesh:
             (partial / "meshes").mkdir()
+            if refit is not None:
+                (partial / "refitted").mkdir()
         for solution, row in enumerate(order):
-            path = ""
+            path, fitted = "", ["", ""]
             if faces is not None and (solution in with_mesh or row == chosen):
                 arrays = mesh_arrays(model, faces(int(row)))
-                shift = max(shift, _single_precision_shift(arrays[0]))
+                single = max(single, _single_precision_shift(arrays[0]))
                 if solution in with_mesh:
                     path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{mesh_format}"
                     write_mesh(partial / path, *arrays)
                 if row == chosen:
                     write_mesh(partial / f"chosen.{mesh_format}", *arrays)
+                if refit is not None:
+                    better = refit(int(row))
+                    raised = (better.vertices(model), *arrays[1:])
+                    fitted = [_spelled("error", better.error), path.replace("meshes/", "refitted/")]
+                    if solution in with_mesh:
+                        write_mesh(partial / fitted[1], *raised)
+                    if row == chosen:
+                        write_mesh(partial / f"chosen_refitted.{mesh_format}", *raised)
             numbers = [_spelled(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
-            rows.append([str(solution), *numbers, path])
-        diagonal = float(np.linalg.norm(np.ptp(model.points, axis=0)))
-        if mesh_format in SINGLE_PRECISION_FORMATS and shift > SINGLE_PRECISION_LOSS * diagonal:
-            warnings.warn(
-                f"{model.name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
-                "[file units]; ply, obj and off keep them exactly",
-                ModelWarning,
-                stacklevel=2,
-            )
-        _write_csv(partial / "front.csv", rows)
+            rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
+        _warn_of_shift(model, mesh_format, single)
+        _write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         packed = np.packbits(kept[order], axis=1)
         _write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
+                "file": _path_from(target, model.name),
                 "hash": model.hash,
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
@@ -320,7 +348,8 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     folder = Path(folder)
     if not folder.is_dir():
         raise ResultError(f"{folder}: no such folder")
-    quality, meshes = _read_csv(folder / "front.csv")
+    quality, meshes, refitted_meshes = _read_csv(folder / "front.csv")
+    refitted_error = quality.pop("refitted_error", None)
     count = len(meshes)
     F, packed, source_index = _read_npz(folder / "front.npz")
     n = len(source_index)
@@ -350,7 +379,7 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
         raise ResultError(f"{record}: cannot be read ({_short(problem)})") from None
     if not isinstance(run, dict) or run.get("solutions") != count:
         raise ResultError(f"{record}: is not the record of this front of {count} solutions")
-    return StoredFront(folder, quality, kept, source_index, meshes, run)
+    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes)
 
 
 def mesh_arrays(
@@ -423,6 +452,55 @@ def write_mesh(
     path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))
 
 
+def claim_file(path: str | os.PathLike[str], suffixes: Sequence[str], *, overwrite: bool = False) -> Path:
+    """Check, before any work, that a file of this name can be written.
+
+    Parameters
+    ----------
+    path : path
+        The file to be written; upper case in its suffix is as good as lower case.
+    suffixes : sequence of str
+        The suffixes that it may have, without the dot.
+    overwrite : bool
+        Whether a file that exists may be replaced.
+
+    Raises
+    ------
+    ResultError
+        If its suffix is another, it exists, or its folder does not.
+    """
+    path = Path(path)
+    if path.suffix.lower().lstrip(".") not in suffixes:
+        known = ", ".join(f".{suffix}" for suffix in suffixes)
+        raise ResultError(f"{path}: the suffix {path.suffix!r} says no format that can be written; use one of {known}")
+    if path.is_dir():
+        raise ResultError(f"{path}: is a folder; name a file")
+    if path.exists() and not overwrite:
+        raise ResultError(f"{path}: exists already; name another file or allow overwriting (--overwrite)")
+    if not path.parent.is_dir():
+        raise ResultError(f"{path}: there is no folder {path.parent}; make it first")
+    return path
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Yield a hidden name beside ``path`` to write to; afterwards it is renamed to ``path``, or removed on an error."""
+    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.partial{path.suffix}")
+    try:
+        yield partial
+        _flush(partial)
+        partial.replace(path)
+    except OSError as problem:
+        raise ResultError(f"{path}: cannot be written ({_short(problem)}); name another file") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def warn_of_single_precision(model: OpenModel, mesh_format: str, vertices: FloatArray) -> None:
+    """Warn if a format of single precision moves vertices (V, 3) of the model's file frame by more than rounding."""
+    _warn_of_shift(model, mesh_format, _single_precision_shift(vertices))
+
+
 def package_versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that decide the results; absent ones are left out."""
     versions = {"python": platform.python_version()}
@@ -434,10 +512,30 @@ def package_versions() -> dict[str, str]:
     return versions
 
 
-def _even_selection(count: int, most: int | None) -> list[int]:
+def _warn_of_shift(model: OpenModel, mesh_format: str, shift: float) -> None:
+    if mesh_format in SINGLE_PRECISION_FORMATS and shift > SINGLE_PRECISION_LOSS * model.diagonal:
+        warnings.warn(
+            f"{model.name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
+            "[file units]; ply, obj and off keep them exactly",
+            ModelWarning,
+            stacklevel=3,
+        )
+
+
+def _path_from(folder: Path, name: str) -> str | None:
+    """Return the path of the model's file relative to the results, so that both can move together; None: no file."""
+    if not Path(name).is_file():
+        return None
+    try:
+        return PurePosixPath(*Path(os.path.relpath(Path(name).resolve(), folder)).parts).as_posix()
+    except ValueError:  # on another drive of Windows
+        return str(Path(name).resolve())
+
+
+def even_selection(count: int, most: int | None) -> list[int]:
     """Return at most ``most`` of the rows 0 .. count - 1, evenly spread, the ends included.
 
-    >>> _even_selection(5, None), _even_selection(5, 3), _even_selection(5, 0)
+    >>> even_selection(5, None), even_selection(5, 3), even_selection(5, 0)
     ([0, 1, 2, 3, 4], [0, 2, 4], [])
     """
     if most is None or most >= count:
@@ -451,33 +549,37 @@ def _spelled(column: str, value: float) -> str:
     return str(int(value)) if column in INT_COLUMNS else repr(float(value))
 
 
-def _write_csv(path: Path, rows: Sequence[Sequence[str]]) -> None:
+def _write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(FRONT_COLUMNS)
+        writer.writerow(columns)
         writer.writerows(rows)
 
 
-def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]:
+def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file, strict=True))
     except (OSError, UnicodeDecodeError, csv.Error) as problem:
         raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
-    if not rows or tuple(rows[0]) != FRONT_COLUMNS:
+    header = tuple(rows[0]) if rows else ()
+    if header not in (FRONT_COLUMNS, FRONT_COLUMNS + REFIT_COLUMNS):
         raise ResultError(f"{path}: its first line must be {','.join(FRONT_COLUMNS)}")
     if len(rows) == 1:
         raise ResultError(f"{path}: holds no solution")
     columns: dict[str, npt.NDArray[Any]] = {}
     for line, row in enumerate(rows[1:], start=2):
-        if len(row) != len(FRONT_COLUMNS):
-            raise ResultError(
-                f"{path}, line {line}: {len(row)} values instead of {len(FRONT_COLUMNS)}; the file is cut off"
-            )
-    for at, column in enumerate(FRONT_COLUMNS[:-1]):
+        if len(row) != len(header):
+            raise ResultError(f"{path}, line {line}: {len(row)} values instead of {len(header)}; the file is cut off")
+    for at, column in enumerate(header):
+        if column in ("mesh", "refitted_mesh"):
+            continue
         kind = int if column in INT_COLUMNS else float
         values = []
         for line, row in enumerate(rows[1:], start=2):
+            if column == "refitted_error" and not row[at]:
+                values.append(float("nan"))
+                continue
             try:
                 value = kind(row[at])
                 if not 0 <= value < float("inf"):
@@ -491,11 +593,14 @@ def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...]]
     if (np.diff(columns["triangles"]) < 0).any():
         line = int(np.argmax(np.diff(columns["triangles"]) < 0)) + 3
         raise ResultError(f"{path}, line {line}: not sorted by triangles")
-    meshes = tuple(row[-1] for row in rows[1:])
-    for line, mesh in enumerate(meshes, start=2):
-        if mesh and (PurePosixPath(mesh).is_absolute() or ".." in PurePosixPath(mesh).parts):
-            raise ResultError(f"{path}, line {line}: mesh {mesh!r} is not inside the folder")
-    return columns, meshes
+    at = header.index("mesh")
+    meshes = tuple(row[at] for row in rows[1:])
+    refitted = tuple(row[-1] for row in rows[1:]) if header[-1] == "refitted_mesh" else ()
+    for line, paths in enumerate(zip(meshes, refitted or meshes, strict=True), start=2):
+        for mesh in paths:
+            if mesh and (PurePosixPath(mesh).is_absolute() or ".." in PurePosixPath(mesh).parts):
+                raise ResultError(f"{path}, line {line}: mesh {mesh!r} is not inside the folder")
+    return columns, meshes, refitted
 
 
 def _write_npz(path: Path, **arrays: npt.NDArray[Any]) -> None:

@@ -300,7 +300,8 @@ def write_model(out: Path, model: OpenModel) -> str:
         read_model(out, relative, model.hash)
         return relative
     content = io.BytesIO()
-    stored: dict[str, Any] = {name: np.asarray(getattr(model, name)) for name in _stored_fields()}
+    parts = {name: getattr(model, name) for name in _stored_fields()}
+    stored: dict[str, Any] = {name: np.asarray(part) for name, part in parts.items() if part is not None}
     np.savez_compressed(content, **stored)
     _put(path, content.getvalue())
     return relative
@@ -326,7 +327,8 @@ def read_model(out: Path, relative: str, expected: str) -> OpenModel:
     path = out / relative
     try:
         arrays = _arrays(path.read_bytes(), path)
-        stored: dict[str, Any] = {name: arrays[name] for name in _stored_fields()}
+        names = [name for name in _stored_fields() if name != "weights" or name in arrays]
+        stored: dict[str, Any] = {name: arrays[name] for name in names}
         plain = {name: values.item() for name, values in stored.items() if values.ndim == 0}
         model = OpenModel(**(stored | plain), attributes={})
     except (OSError, KeyError, ValueError, TypeError) as problem:

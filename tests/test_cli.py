@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import importlib.util
 import io
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,13 +22,16 @@ from pymoo.optimize import minimize
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 import meshsimp_pymoo
-from meshsimp_pymoo import MeshProblem, cli, nsga2_v1
+from meshsimp_pymoo import Front, MeshProblem, nsga2_v1
 from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.cli.arguments import ALGORITHMS, FORMATS, SHELLS, make_parser
+from meshsimp_pymoo.cli.simplify import _mesh_problem as mesh_problem
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.results import MESH_FORMATS, MESHES_BY_DEFAULT, read_front, write_mesh
 
 QUICK = ("--generations", "3", "--population", "12")
+COMMANDS = ("simplify", "pick", "score", "info", "run", "report", "completion")
 
 
 @pytest.fixture
@@ -87,12 +92,14 @@ def test_the_front_is_what_a_pymoo_user_gets(tmp_path):
 
 @pytest.mark.parametrize("budget", [("--generations", "4"), ("--evaluations", "40")])
 @pytest.mark.parametrize("algorithm", ["nsga2_v1", "nsga2_v2", "moead"])
-def test_one_seed_gives_the_same_bytes_with_one_and_two_threads(tmp_path, algorithm, budget):
+def test_one_seed_gives_the_same_bytes_with_one_and_two_threads(tmp_path, monkeypatch, algorithm, budget):
     written = []
     for name, threads in (("a", "1"), ("b", "2"), ("c", "1")):
         options = ("--population", "12", "--threads", threads, "--algorithm", algorithm, "--pick", "knee")
-        assert run("simplify", "face:150", "-o", tmp_path / name, *options, *budget) == 0
-        content = files(tmp_path / name)
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        assert run("simplify", "face:150", "-o", "out", *options, *budget) == 0  # the page names its folder
+        content = files(tmp_path / name / "out")
         del content["run.json"]  # it holds the time taken and the number of threads
         written.append(content)
     assert written[0] == written[1] == written[2]
@@ -110,7 +117,7 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
     options += ("--evaluations", "30", "--population", "12")
     assert run("simplify", "roof:5", "-o", tmp_path / "out", *options) == 0
     record = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert record["settings"] == {
+    expected = {
         "triangles": None,
         "max_error": None,
         "mean_error": None,
@@ -130,7 +137,9 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
         "pin": [3, 7],
         "format": "ply",
         "meshes": 100,
+        "objectives": ["error", "triangles"],
     }
+    assert {key: record["settings"][key] for key in expected} == expected
     assert record["model"]["name"] == "roof:5"
     assert record["seed"] == 1
     assert record["generations"] == 3
@@ -202,7 +211,8 @@ def test_a_target_that_was_not_reached_says_so_and_leaves_the_front(tmp_path, ca
     faces = np.vstack([roof.faces, [0, 1, 25]])
     write_mesh(tmp_path / "twin.ply", points, faces)
     assert run("simplify", tmp_path / "twin.ply", "-o", tmp_path / "out", "--max-error", "0.5", *QUICK) == 1
-    assert "and at most 0.5 was asked for; search longer" in capsys.readouterr().err
+    said = r"no chosen mesh: no solution of .*twin\.ply has a max error of at most 0\.5; the least is \d+.*; search"
+    assert re.search(said, capsys.readouterr().err)
     assert (tmp_path / "out" / "front.csv").is_file()
     assert not (tmp_path / "out" / "chosen.ply").exists()
 
@@ -238,13 +248,30 @@ def test_impossible_targets_are_refused_with_what_is_possible(tmp_path, capsys, 
 # ------------------------------------------------------------------------------------------------------------- options
 
 
-@pytest.mark.parametrize("suffix", cli.FORMATS)
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_meshes_are_written_in_the_wanted_format(tmp_path, suffix):
     assert run("simplify", "roof:5", "-o", tmp_path / "out", "--format", suffix, *QUICK) == 0
     with (tmp_path / "out" / "front.csv").open(newline="") as file:
         meshes = [row["mesh"] for row in csv.DictReader(file)]
     assert all(mesh.endswith(f".{suffix}") for mesh in meshes)
     assert all((tmp_path / "out" / mesh).is_file() for mesh in meshes)
+
+
+def test_formats_may_be_written_in_upper_case():
+    assert make_parser().parse_args(["simplify", "roof", "--format", "GLB"]).format == "glb"
+
+
+def test_an_experiment_can_be_summed_up_in_json(tmp_path, capsys):
+    (tmp_path / "tiny.yaml").write_text(
+        "title: tiny\nproblems: [{name: Roof, model: 'roof:5'}]\nseeds: [1]\nbudgets: [{generations: 2}]\n"
+        "algorithms: [{name: N1, preset: nsga2_v1, parameters: {pop_size: 8}}]\n"
+    )
+    again = ("run", tmp_path / "tiny.yaml", "-o", tmp_path / "out", "--jobs", 1)
+    for call, finished in ((again, 1), (again, 0), (("report", tmp_path / "out"), None)):
+        assert run(*call, "--json") == 0
+        summary = json.loads(capsys.readouterr().out)
+        assert (summary["folder"], summary["runs"], summary["missing"]) == (str(tmp_path / "out"), 1, 0)
+        assert summary.get("finished") == finished
 
 
 @pytest.mark.parametrize(("option", "count"), [("none", 0), ("2", 2), ("all", None)])
@@ -301,8 +328,8 @@ def test_the_front_of_a_closed_surface_is_cut_out_when_asked(tmp_path, capsys):
 
 
 def test_the_asked_number_of_threads_is_used():
-    args = cli._parser().parse_args(["simplify", "roof:5", "-o", "x", "--threads", "3"])
-    assert cli._mesh_problem(args).elementwise_runner.n_threads == 3
+    args = make_parser().parse_args(["simplify", "roof:5", "-o", "x", "--threads", "3"])
+    assert mesh_problem(args).elementwise_runner.n_threads == 3
 
 
 def test_results_are_replaced_only_when_asked(tmp_path, capsys):
@@ -337,15 +364,40 @@ def test_a_warning_is_one_line_and_no_failure(tmp_path, capsys):
     assert re.fullmatch(r"meshsimp: warning: .*loose\.ply: 1 of 26 vertices .*\n", one_line(capsys))
 
 
-def test_a_terminal_sees_progress(tmp_path, monkeypatch):
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
 
+
+def test_a_terminal_sees_progress_in_short_lines(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setenv("COLUMNS", "150")
+    deep = tmp_path / "a_folder_with_a_long_name"
+    deep.mkdir()
+    roof = load("roof:9")
+    write_mesh(deep / "roof.ply", roof.points, roof.faces)
+    assert run("simplify", deep / "roof.ply", "-o", tmp_path / "out", *QUICK) == 0
+    shown = re.sub(r"\x1b\[[0-9;]*m", "", sys.stderr.getvalue())
+    (last,) = {line.strip() for line in re.split(r"\x1b|[\r\n]", shown) if "36 evaluations" in line}
+    stored = read_front(tmp_path / "out")
+    least = stored.F[stored.F[:, 1] <= 26, 0].min()
+    assert re.fullmatch(rf"\[2Kroof\.ply \S+ +100 % +00:00 left; error .*{least:.3g}@26 after 36 evaluations", last)
+    assert "a_folder_with_a_long_name" not in shown
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_progress_is_cut_to_the_width_of_the_terminal(tmp_path, monkeypatch, width):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert run("simplify", "jacksboro:40,seed=123456789012", "-o", tmp_path / "out", *QUICK) == 0
+    lines = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "\n", sys.stderr.getvalue()).splitlines()
+    assert max(len(line.rstrip()) for line in lines) <= width
+    assert sum("%" in line for line in lines) > 1
+
+
+def test_without_a_terminal_there_is_no_progress(tmp_path, capsys):
     assert run("simplify", "roof:5", "-o", tmp_path / "out", *QUICK) == 0
-    assert "roof:5" in sys.stderr.getvalue()
-    assert "36 evaluations" in sys.stderr.getvalue()
+    assert capsys.readouterr().err == ""
 
 
 # -------------------------------------------------------------------------------------------------------------- Ctrl-C
@@ -516,8 +568,12 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(tmp_path, capsy
         (("--nodata", "x"), r"'x' is not a finite number"),
         (("--meshes", "some"), r"'some' is not a whole number of at least 0"),
         (("--format", "doc"), r"invalid choice: 'doc'"),
-        (("--gen", "3"), r"unrecognized arguments: --gen 3"),
-        (("--triangels", "3"), r"unrecognized arguments: --triangels 3"),
+        (("--gen", "3"), r"unrecognized arguments: --gen 3; did you mean --generations\? \(see meshsimp simplify --h"),
+        (("--triangels", "3"), r"unrecognized arguments: --triangels 3; did you mean --triangles\?"),
+        (("--max_error", "3"), r"did you mean --max-error\?"),
+        (("--algorithm", "nsga2v2"), r"did you mean nsga2_v2\? \(see meshsimp simplify --help\)"),
+        (("--format", "plyy"), r"did you mean ply\?"),
+        (("-x",), r"unrecognized arguments: -x \(see meshsimp simplify --help\)"),
     ],
 )
 def test_a_wrong_option_is_answered_in_one_line(tmp_path, capsys, options, message):
@@ -530,9 +586,11 @@ def test_a_wrong_option_is_answered_in_one_line(tmp_path, capsys, options, messa
     ("arguments", "message"),
     [
         ((), r"required: COMMAND"),
-        (("simplify", "roof"), r"required: -o/--output"),
         (("simplify", "-o", "out"), r"required: MODEL"),
-        (("melt", "roof"), r"invalid choice: 'melt'"),
+        (("melt", "roof"), r"invalid choice: 'melt' \(choose from simplify, pick, score, .*\) \(see meshsimp --help\)"),
+        (("simplyfy", "roof"), r"invalid choice: 'simplyfy' .*; did you mean simplify\?"),
+        (("scan.ply",), r"did you mean meshsimp simplify scan\.ply\?"),
+        (("report",), r"required: OUT \(see meshsimp report --help\)"),
     ],
 )
 def test_a_wrong_command_is_answered_in_one_line(capsys, arguments, message):
@@ -548,6 +606,225 @@ def test_anything_unexpected_keeps_its_traceback(tmp_path, monkeypatch):
     with pytest.raises(ZeroDivisionError, match="a bug"):
         run("simplify", "roof:5", "-o", tmp_path / "out", *QUICK)
     assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------------------------------------ pick and score
+
+
+@pytest.fixture(scope="module")
+def picked(tmp_path_factory):
+    """Return the folder of a front of face:200, 5 of its meshes written."""
+    folder = tmp_path_factory.mktemp("picked") / "out"
+    assert run("simplify", "face:200", "-o", folder, "--meshes", 5, "--quiet", *QUICK) == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("options", "limits"),
+    [
+        (("--triangles", 150), {"triangles": 150}),
+        (("--max-error", 12.5), {"max_error": 12.5}),
+        (("--mean-error", 2), {"mean_error": 2}),
+    ],
+)
+def test_pick_takes_the_mesh_that_was_asked_for(picked, tmp_path, capsys, options, limits):
+    expected = Front.load(picked).best(**limits)
+    assert run("pick", picked, *options, "-o", tmp_path / "small.ply") == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"solution {expected.solution} of {picked}: {expected.triangles} triangles, error ")
+    assert out.endswith(f"written: {tmp_path / 'small.ply'}\n")
+    mesh = trimesh.load(tmp_path / "small.ply", process=False)
+    assert np.array_equal(mesh.vertices, expected.mesh.vertices)
+    assert np.array_equal(mesh.faces, expected.mesh.faces)
+
+
+@pytest.mark.parametrize("suffix", [*FORMATS, "GLB", "Ply"])
+def test_pick_writes_the_format_of_the_suffix(picked, tmp_path, suffix):
+    path = tmp_path / f"knee.{suffix}"
+    assert run("pick", picked, "--knee", "-o", path) == 0
+    mesh = trimesh.load(path, file_type=suffix.lower(), force="mesh", process=False)
+    assert len(mesh.faces) == Front.load(picked).knee().triangles
+
+
+def test_pick_copies_what_is_stored_even_if_the_model_is_gone(tmp_path, roof_ply, capsys):
+    assert run("simplify", roof_ply, "-o", tmp_path / "out", "--meshes", 1, "--quiet", *QUICK) == 0
+    roof_ply.unlink()
+    front = read_front(tmp_path / "out")
+    stored = next(k for k, mesh in enumerate(front.meshes) if mesh)
+    assert run("pick", tmp_path / "out", "--solution", stored, "-o", tmp_path / "a.ply") == 0
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "out" / front.meshes[stored]).read_bytes()
+    capsys.readouterr()
+    assert run("pick", tmp_path / "out", "--solution", stored, "-o", tmp_path / "a.obj") == 2
+    assert re.search(r"out: its model cannot be read \(.*roof\.ply: no such file.*--model FILE", one_line(capsys))
+    assert not (tmp_path / "a.obj").exists()
+
+
+def test_pick_refuses_a_model_that_changed(tmp_path, roof_ply, capsys):
+    assert run("simplify", roof_ply, "-o", tmp_path / "out", "--meshes", "none", "--quiet", *QUICK) == 0
+    roof_ply.rename(tmp_path / "moved.ply")
+    roof = load("roof:5")
+    write_mesh(roof_ply, roof.points * [1, 1, 3], roof.faces)
+    assert run("pick", tmp_path / "out", "--knee", "-o", tmp_path / "a.ply") == 2
+    assert re.search(r"out: is the front of another model than .*roof\.ply is now.*--model FILE", one_line(capsys))
+    assert run("pick", tmp_path / "out", "--knee", "-o", tmp_path / "a.ply", "--model", tmp_path / "moved.ply") == 0
+    assert (tmp_path / "a.ply").is_file()
+
+
+def test_pick_overwrites_only_when_asked_and_leaves_nothing_behind(picked, tmp_path, capsys):
+    path = tmp_path / "a.obj"
+    path.write_text("mine")
+    assert run("pick", picked, "--knee", "-o", path) == 2
+    assert "a.obj: exists already; name another file or allow overwriting (--overwrite)" in one_line(capsys)
+    assert path.read_text() == "mine"
+    assert run("pick", picked, "--knee", "-o", path, "--overwrite", "--quiet") == 0
+    assert path.read_text() != "mine"
+    assert capsys.readouterr() == ("", "")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.obj"]
+
+
+def test_pick_without_a_file_says_what_it_would_be(picked, capsys):
+    assert run("pick", picked, "--knee") == 0
+    assert capsys.readouterr().out.endswith("nothing is written; name a file with -o\n")
+    assert run("pick", picked, "--knee", "--json") == 0
+    summary = json.loads(capsys.readouterr().out)
+    knee = Front.load(picked).knee()
+    assert summary["mesh"] is None
+    assert (summary["solution"], summary["error"], summary["triangles"]) == (knee.solution, knee.error, knee.triangles)
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "message"),
+    [
+        (("--triangles", "1"), 1, r"no solution of face:200 has at most 1 triangles; the smallest has 2; nothing is w"),
+        (("--solution", "99"), 2, r"has the solutions 0 to \d+; --solution 99 is none of them"),
+        ((), 2, r"one of the arguments --triangles .* is required \(see meshsimp pick --help\)"),
+        (("--knee", "-o", "a.doc"), 2, r"a\.doc: the suffix '\.doc' says no format that can be written; use one"),
+    ],
+)
+def test_pick_says_what_is_impossible(picked, capsys, options, code, message):
+    assert run("pick", picked, *options) == code
+    assert re.search(message, one_line(capsys))
+
+
+def test_pick_needs_a_front(tmp_path, capsys):
+    assert run("pick", tmp_path / "no", "--knee") == 2
+    assert "no: no such folder" in one_line(capsys)
+
+
+def test_a_mesh_of_the_front_scores_what_the_front_says(picked, tmp_path, capsys):
+    knee = Front.load(picked).knee()
+    knee.save(tmp_path / "knee.ply")
+    assert run("score", "face:200", tmp_path / "knee.ply", "--front", picked, "--json") == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["error"] == pytest.approx(knee.error)
+    assert (summary["triangles"], summary["uncovered"]) == (knee.triangles, knee.uncovered)
+    assert summary["front"]["solution"] == knee.solution
+    assert summary["front"]["error_ratio"] == pytest.approx(1)
+    assert summary["front"]["triangles_for_this_error"] == knee.triangles
+
+
+def test_score_places_a_worse_mesh_above_the_front(tmp_path, capsys):
+    """Known answer: a roof without its ridge, but in 8 triangles, has the error 3; so has the front with 2."""
+    roof = load("roof:3")
+    write_mesh(tmp_path / "flat.ply", roof.points * [1, 1, 0], roof.faces)
+    assert run("simplify", "roof:3", "-o", tmp_path / "out", "--generations", 10, "--population", 20, "--quiet") == 0
+    assert run("score", "roof:3", tmp_path / "flat.ply", "--front", tmp_path / "out") == 0
+    out = capsys.readouterr().out
+    assert "flat.ply: 8 triangles, error 3, mean 0.3333, RMS 0.5774, max 1, uncovered 0" in out
+    assert "solution 2, with 4 triangles, has the error 0; that is exact; for this error the front needs 2" in out
+
+
+def test_score_draws_the_error(picked, tmp_path, capsys):
+    mesh = picked / next(m for m in read_front(picked).meshes if m)
+    assert run("score", "face:200", mesh, "-o", tmp_path / "error.png") == 0
+    assert (tmp_path / "error.png").read_bytes().startswith(b"\x89PNG")
+    assert capsys.readouterr().out.endswith("error.png\n")
+    assert run("score", "face:200", mesh, "-o", tmp_path / "error.png") == 2
+    assert "error.png: exists already" in one_line(capsys)
+    assert run("score", "face:200", mesh, "-o", tmp_path / "error.txt") == 2
+    assert "use one of .png, .svg, .pdf" in one_line(capsys)
+    assert [p.name for p in tmp_path.iterdir()] == ["error.png"]
+
+
+def test_score_asks_whether_two_meshes_belong_together(tmp_path, capsys):
+    near = load("roof:3")
+    write_mesh(tmp_path / "far.ply", near.points + np.array([100.0, 0, 0]), near.faces)
+    assert run("score", "roof:5", tmp_path / "far.ply") == 0
+    assert "100% of the vertices of roof:5 are uncovered; are both in one frame and unit?" in capsys.readouterr().out
+    assert run("score", "roof:5", tmp_path / "far.ply", "--outside", "ignore", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["error"] == 0
+
+
+def test_score_refuses_a_front_of_another_model_or_reading(picked, tmp_path, capsys):
+    mesh = picked / next(m for m in read_front(picked).meshes if m)
+    assert run("score", "face:300", mesh, "--front", picked) == 2
+    assert "is the front of another model than face:300" in one_line(capsys)
+    assert run("score", "face:200", mesh, "--front", picked, "--outside", "ignore") == 2
+    assert "its errors are those of --outside nearest; leave --outside out to compare" in one_line(capsys)
+    upright = load("roof:3").points[:, [2, 0, 1]]
+    write_mesh(tmp_path / "wall.ply", upright * [1, 1, 0], load("roof:3").faces)
+    assert run("score", "face:200", tmp_path / "wall.ply") == 2
+    assert re.search(r"wall\.ply: cannot be measured against face:200: none of the 8 faces has", one_line(capsys))
+
+
+def test_simplify_alone_names_its_folder_after_the_model(tmp_path, roof_ply, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run("simplify", roof_ply, *QUICK) == 0
+    assert "written: roof_front: " in capsys.readouterr().out
+    assert run("simplify", "face:60,seed=2", *QUICK) == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["face_60_seed_2_front", "roof.ply", "roof_front"]
+    said = re.search(r"take one of them: meshsimp (pick .*)", capsys.readouterr().out)[1]
+    assert run(*said.split()) == 0  # what it says can be done
+    assert (tmp_path / "small.ply").is_file()
+
+
+def test_a_grid_with_an_obvious_nodata_value_is_read_with_a_warning(tmp_path, capsys):
+    elevation = np.arange(30.0).reshape(5, 6)
+    elevation[:, 0] = -9999
+    np.save(tmp_path / "dem.npy", elevation)
+    assert run("info", tmp_path / "dem.npy") == 0
+    said = r"warning: .*dem\.npy: 5 of 30 heights are -9999, far from all others \(1 to 29\); .* \(--nodata=-9999\)"
+    assert re.search(said, capsys.readouterr().err)
+    assert run("info", tmp_path / "dem.npy", "--nodata=-9999") == 0
+    out, err = capsys.readouterr()
+    assert (err, re.search(r"vertices +25", out) is not None) == ("", True)
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_completion_prints_a_script_that_knows_the_options(capsys, shell):
+    assert run("completion", shell) == 0
+    script = capsys.readouterr().out
+    assert all(word in script for word in (*COMMANDS, "triangles", "memetic"))
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_completes_a_command_an_option_and_a_choice(tmp_path, capsys):
+    assert run("completion", "bash") == 0
+    (tmp_path / "completion.sh").write_text(capsys.readouterr().out)
+    ask = 'source ./completion.sh; COMP_WORDS=(meshsimp "$@"); COMP_CWORD=$#; '
+    ask += '$(complete -p meshsimp | sed "s/.*-F //; s/ .*//")'
+    for words, expected in (
+        (["simp"], ["simplify"]),
+        (["simplify", "--gen"], ["--generations"]),
+        (["pick", "out", "--kn"], ["--knee"]),
+        (["simplify", "roof", "--algorithm", "mem"], ["memetic"]),
+    ):
+        shown = f'{ask} meshsimp "${{@: -1}}"; printf "%s\\n" "${{COMPREPLY[@]}}"'
+        done = subprocess.run(
+            ["bash", "-c", shown, "bash", *words], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.stdout.split() == expected, done.stderr
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_every_command_has_examples_that_can_be_parsed(capsys, command):
+    with pytest.raises(SystemExit) as done:
+        run(command, "--help")
+    assert done.value.code == 0
+    examples = re.findall(r"^  meshsimp (.*)$", capsys.readouterr().out, flags=re.M)
+    assert examples
+    for example in examples:
+        assert make_parser().parse_args(example.partition(" > ")[0].split()).command
 
 
 # ------------------------------------------------------------------------------------------------------ info and start
@@ -589,7 +866,7 @@ def test_info_without_a_model_lists_the_built_in_ones(capsys):
     assert "horseshoe:" in out
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["simplify", "--help"], ["info", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], *([command, "--help"] for command in COMMANDS)])
 def test_help_is_quick_because_nothing_heavy_is_imported(arguments):
     code = (
         "import sys\nfrom meshsimp_pymoo.cli import main\n"
@@ -615,9 +892,9 @@ def test_the_version_is_that_of_the_installed_package(capsys):
 
 
 def test_the_choices_offered_are_those_of_the_library():
-    assert cli.FORMATS == MESH_FORMATS
-    assert set(cli.ALGORITHMS) < set(PRESETS)
-    assert cli._parser().parse_args(["simplify", "roof", "-o", "x"]).meshes == MESHES_BY_DEFAULT
+    assert FORMATS == MESH_FORMATS
+    assert set(ALGORITHMS) < set(PRESETS)
+    assert make_parser().parse_args(["simplify", "roof", "-o", "x"]).meshes == MESHES_BY_DEFAULT
 
 
 def test_every_public_name_can_be_imported_and_plotting_waits_until_it_is_needed():
@@ -633,3 +910,88 @@ def test_every_public_name_can_be_imported_and_plotting_waits_until_it_is_needed
     assert set(meshsimp_pymoo.__all__) <= set(dir(meshsimp_pymoo))
     with pytest.raises(AttributeError, match="has no attribute 'simplfy'"):
         _ = meshsimp_pymoo.simplfy
+
+
+# ------------------------------------------------------------------------------- measures, weights, heights
+
+
+@pytest.fixture
+def weighted_ply(tmp_path):
+    face = load("face:200")
+    importance = (face.points[:, 0] > face.points[:, 0].mean()).astype(float)
+    write_mesh(tmp_path / "face.ply", face.points, face.faces, {"importance": importance})
+    return tmp_path / "face.ply"
+
+
+@pytest.mark.parametrize("measure", ["rms", "max"])
+def test_another_measure_makes_another_front_with_the_same_columns(tmp_path, capsys, measure):
+    assert run("simplify", "face:200", "-o", tmp_path / "out", "--measure", measure, *QUICK) == 0
+    stored = read_front(tmp_path / "out")
+    assert (np.diff(stored.quality[f"{measure}_error"]) < 0).all()
+    problem = MeshProblem("face:200")
+    for kept, error in zip(stored.kept, stored.quality["error"], strict=True):
+        assert problem.quality(kept).error == error
+    assert stored.run["settings"]["objectives"] == [f"{measure}_error", "triangles"]
+    assert Front.load(tmp_path / "out").problem.objectives == (f"{measure}_error", "triangles")
+
+
+def test_weights_name_an_attribute_of_the_file(tmp_path, capsys, weighted_ply):
+    assert run("simplify", weighted_ply, "-o", tmp_path / "out", "--weights", "importance", *QUICK) == 0
+    front = Front.load(tmp_path / "out")
+    half = MeshProblem(weighted_ply, weights="importance")
+    assert front[3].error == half.quality(front[3].kept).error < MeshProblem(weighted_ply).quality(front[3].kept).error
+    mesh = tmp_path / "out" / read_front(tmp_path / "out").meshes[3]
+    capsys.readouterr()
+    assert run("score", weighted_ply, mesh, "--weights", "importance", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["error"] == pytest.approx(front[3].error)
+    assert run("score", weighted_ply, mesh, "--front", tmp_path / "out", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["front"]["error_ratio"] == pytest.approx(1.0)
+
+
+def test_refitted_meshes_stand_beside_the_others_and_the_referee_agrees(tmp_path, capsys, oracle, weighted_ply):
+    out = tmp_path / "out"
+    assert run("simplify", weighted_ply, "-o", out, "--refit", "--pick", "knee", "--meshes", "5", *QUICK) == 0
+    assert "5 in meshes, 5 in refitted" in capsys.readouterr().out
+    assert run("simplify", weighted_ply, "-o", tmp_path / "plain", "--pick", "knee", "--meshes", "5", *QUICK) == 0
+    with (out / "front.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    with (tmp_path / "plain" / "front.csv").open(newline="") as file:
+        assert [row[:-2] for row in rows] == list(csv.reader(file))
+    stored = read_front(out)
+    assert stored.refitted_error is not None
+    gained = stored.quality["error"] - stored.refitted_error
+    written = np.array([bool(mesh) for mesh in stored.refitted_meshes])
+    assert written.sum() == 5
+    assert (gained[written] >= 0).all()
+    assert gained[written][0] > 0
+    spec = importlib.util.spec_from_file_location("vertical_error", oracle)
+    referee = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(referee)
+    points, _ = referee._load(weighted_ply)
+    for mesh, error in zip(stored.refitted_meshes, stored.refitted_error, strict=True):
+        if mesh:
+            found, _, _ = referee.vertical_error(points, *referee._load(out / mesh))
+            assert error == pytest.approx(found, rel=1e-6, abs=1e-9)
+    plain = trimesh.load(out / "chosen.ply", process=False)
+    raised = trimesh.load(out / "chosen_refitted.ply", process=False)
+    np.testing.assert_array_equal(plain.faces, raised.faces)
+    np.testing.assert_array_equal(plain.vertices[:, :2], raised.vertices[:, :2])
+    assert not np.array_equal(plain.vertices[:, 2], raised.vertices[:, 2])
+    # The folder is known as ours.
+    assert run("simplify", weighted_ply, "-o", out, "--overwrite", "--quiet", *QUICK) == 0
+    assert read_front(out).refitted_error is None
+    assert not (out / "refitted").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--measure", "l2"], "'l2' is no measure of the error; choose from l1, rms, max"),
+        (["--measure", "max", "--algorithm", "memetic"], "--measure max is not for the memetic search"),
+        (["--weights", "sharpness"], "no per-vertex attribute 'sharpness' to weigh by; it has: none"),
+    ],
+)
+def test_measures_and_weights_that_cannot_be_are_refused(tmp_path, capsys, options, message):
+    assert run("simplify", "face:200", "-o", tmp_path / "out", *options, *QUICK) == 2
+    assert message in one_line(capsys)
+    assert not (tmp_path / "out").exists()

@@ -40,6 +40,12 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())
 # Grids are dispatched here; of the mesh formats, these three are read here and the rest by trimesh.
 GRID_SUFFIXES = (".asc", ".npy", ".npz")
 OWN_SUFFIXES = (".obj", ".off", ".ply")
+# Points without faces; trimesh would read some of them, with a library that it does not bring along.
+POINT_SUFFIXES = (".xyz", ".pts", ".las", ".laz", ".pcd")
+
+# Values that programs write where a grid has no sample; and from this size on a height is none.
+NODATA_HABITS = (-9999.0, 9999.0, -99999.0, -999.0, -32768.0, -32767.0, 32767.0, 65535.0)
+NODATA_SIZE = 1e30
 
 # A PLY header lists properties, one line each; a real one takes a few hundred bytes, scanners' comments a few
 # thousand.
@@ -140,7 +146,8 @@ def read_source(
     Warns
     -----
     ModelWarning
-        If faces that name a vertex twice were dropped, or per-vertex data could not be kept.
+        If faces that name a vertex twice were dropped, per-vertex data could not be kept, or a usual "no data"
+        value stands among the heights of a grid.
     """
     path = Path(path)
     name = str(path)
@@ -148,6 +155,11 @@ def read_source(
     _check_file(path, name)
     if suffix in GRID_SUFFIXES:
         return _guarded(_read_grid, path, name, suffix, spacing, nodata)
+    if suffix in POINT_SUFFIXES:
+        raise ModelError(
+            f"{name}: a {suffix} file holds points without faces; triangulate them (in MeshLab or CloudCompare, say) "
+            "and save a mesh such as .ply, or save a height grid"
+        )
     if suffix not in (known := _known_mesh_suffixes()):
         raise ModelError(
             f"{name}: unknown suffix {suffix!r}; known are {' '.join(known)} for meshes and "
@@ -245,6 +257,7 @@ def grid_source(
             f"{name}: {infinite.sum()} of {z.size} heights are infinite (first: row {row}, column {col}); "
             f"set them to NaN or name the value with nodata"
         )
+    _warn_of_nodata(z[~hidden], name)
     columns = z.shape[1]
     rows = np.flatnonzero(~hidden)
     vertex = np.full(z.shape, -1, np.int64)
@@ -264,6 +277,22 @@ def grid_source(
             f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
     return build_source(points, faces, {}, name, rows=rows, up="z")
+
+
+def _warn_of_nodata(z: FloatArray, name: str) -> None:
+    """Warn of a usual "no data" value among the heights (S,) that is farther from all others than these are apart."""
+    for value in (float(z.min(initial=np.inf)), float(z.max(initial=-np.inf))):
+        if value not in NODATA_HABITS and not NODATA_SIZE <= abs(value) < np.inf:
+            continue
+        others = z[z != value]
+        if not len(others):
+            continue
+        low, high = float(others.min()), float(others.max())
+        if max(low - value, value - high) > high - low:
+            _warn(
+                f"{name}: {len(z) - len(others)} of {len(z)} heights are {value:.9g}, far from all others ({low:g} to "
+                f"{high:g}); if that means 'no sample', say nodata={value:.9g} (--nodata={value:.9g})"
+            )
 
 
 def build_source(
@@ -380,7 +409,7 @@ def _warn(message: str) -> None:
 def _known_mesh_suffixes() -> list[str]:
     from trimesh.exchange.load import mesh_formats
 
-    return sorted({f".{kind}" for kind in mesh_formats() if kind.isalnum()} | set(OWN_SUFFIXES))
+    return sorted({f".{kind}" for kind in mesh_formats() if kind.isalnum()} - set(POINT_SUFFIXES) | set(OWN_SUFFIXES))
 
 
 def _numbers(text: str, name: str) -> FloatArray:

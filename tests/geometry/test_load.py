@@ -494,7 +494,7 @@ def test_too_few_vertices_and_no_faces_are_refused(tmp_path):
     assert "no faces" in refusal(write(tmp_path, "cloud.ply", cloud))
     head, rest = ascii_ply().split("element face 4\nproperty list uchar int vertex_indices\n")
     assert "no faces" in refusal(write(tmp_path, "faceless.ply", head + rest.split("3 0 1 4")[0]))
-    assert "no faces" in refusal(write(tmp_path, "a.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 1\n"))
+    assert "without faces" in refusal(write(tmp_path, "a.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 1\n"))
     with pytest.raises(ModelError, match="all 1 faces"):
         build_source(POINTS, [[1, 1, 1]])
 
@@ -741,3 +741,37 @@ def test_spacing_and_nodata_of_a_mesh_are_refused(tmp_path):
     path = write(tmp_path, "a.ply", binary_ply())
     assert "grids" in refusal(path, spacing=2.0)
     assert "grids" in refusal(path, nodata=0.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "dtype"),
+    [(-9999, np.float64), (-32768, np.int16), (-3.4028234663852886e38, np.float32), (65535, np.int32), (1e31, float)],
+)
+def test_an_obvious_nodata_value_is_warned_of_and_the_advice_helps(tmp_path, value, dtype):
+    heights = np.arange(1, 31).reshape(5, 6).astype(dtype)
+    heights[0, :] = value
+    np.save(tmp_path / "dem.npy", heights)
+    with pytest.warns(ModelWarning, match=r"dem\.npy: 6 of 30 heights are \S+, far from .* \(7 to 30\)") as caught:
+        source = read_source(tmp_path / "dem.npy")
+    assert len(source.points) == 30  # a warning, no more
+    advice = str(caught[0].message).partition("(--nodata=")[2].rstrip(")")
+    assert len(read_source(tmp_path / "dem.npy", nodata=float(advice)).points) == 24
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        [[0, 0], [-9999, -20000]],  # not far from the others
+        [[0, 1], [2, -12345]],  # no value that means anything
+        [[-9999, -9999], [-9999, -9999]],  # there are no others
+        [[0, 1, 2], [2, float("nan"), 4]],
+    ],
+)
+def test_heights_that_may_be_meant_are_not_warned_of(heights):
+    grid_source(np.array(heights, float))
+
+
+@pytest.mark.parametrize("suffix", [".xyz", ".XYZ", ".las"])
+def test_points_without_faces_are_refused_with_the_way_out(tmp_path, suffix):
+    said = refusal(write(tmp_path, f"a{suffix}", "0 0 0\n1 0 0\n0 1 1\n1 1 0\n"))
+    assert f"a {suffix.lower()} file holds points without faces; triangulate them" in said

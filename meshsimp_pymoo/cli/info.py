@@ -1,0 +1,76 @@
+"""``meshsimp info``: what a model is, and whether it can be simplified."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
+
+
+def info(args: argparse.Namespace) -> int:
+    """Describe ``args.model``; without one, list the built-in models."""
+    from meshsimp_pymoo import datasets
+
+    if args.model is None:
+        lines = datasets.describe()
+        print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
+        return OK
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from meshsimp_pymoo.geometry.load import ModelError
+    from meshsimp_pymoo.geometry.orient import front_patch, surface_facts, up_direction, upright_rotation
+
+    source = datasets.find_source(args.model, spacing=args.spacing, nodata=args.nodata)
+    if args.patch == "front":
+        source = front_patch(source, args.up)
+    used = source.points[np.unique(source.faces)]
+    low, extent = used.min(axis=0), np.ptp(used, axis=0)
+    content: dict[str, Any] = {
+        "name": source.name,
+        "vertices": len(used),
+        "triangles": len(source.faces),
+        "unused_vertices": len(source.points) - len(used),
+        "low": low.tolist(),
+        "extent": extent.tolist(),
+        "attributes": sorted(source.attributes),
+    }
+    rows = {
+        "vertices": f"{len(used):,}",
+        "triangles": f"{len(source.faces):,}",
+        "extent": " x ".join(f"{value:.6g}" for value in extent) + " [file units]",
+        "from": ", ".join(f"{value:.10g}" for value in low),
+        "attributes": ", ".join(sorted(source.attributes)) or "none",
+    }
+    if len(used) < len(source.points):
+        rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
+    try:
+        up = up_direction(source, args.up)
+    except ModelError as problem:
+        refusal: str | None = str(problem)
+    else:
+        facts = surface_facts(source, source.points @ upright_rotation(up).T)
+        refusal = facts.refusal
+        content |= {"up": up.tolist(), "fold_share": facts.fold_share} | asdict(facts)
+        flipped = " (its faces are wound the other way)" if facts.flipped else ""
+        rows |= {
+            "up": ", ".join(f"{value:.6g}" for value in up) + flipped,
+            "seen from there": f"{facts.net_share:.1%} of the area",
+            "parts": f"{facts.components}",
+            "border": f"{facts.border_edges:,} edges, {facts.border_loops} closed loop(s)",
+            "vertical": f"{facts.vertical_faces:,} faces",
+            "folded over": f"{facts.folds + facts.hidden:,} faces ({facts.fold_share:.2%})",
+        }
+    rows["verdict"] = "refused" if refusal else "usable: an open height field"
+    if args.json:
+        print(json.dumps(content | {"refusal": refusal}, indent=2))
+    else:
+        print(source.name)
+        print("\n".join(f"  {label:<16}{text}" for label, text in rows.items()))
+    if refusal:
+        say(refusal)
+        return BAD_INPUT
+    return OK

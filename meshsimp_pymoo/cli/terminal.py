@@ -1,0 +1,152 @@
+"""What a person at a terminal sees and does: one-line messages, progress, Ctrl-C."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from meshsimp_pymoo.geometry.error import Quality
+    from meshsimp_pymoo.geometry.model import OpenModel
+
+    FloatArray = npt.NDArray[np.float64]
+
+__all__ = [
+    "BAD_INPUT",
+    "INTERRUPTED",
+    "OK",
+    "TARGET_MISSED",
+    "bar",
+    "described",
+    "interruptible",
+    "progress",
+    "say",
+    "stop_if_interrupted",
+    "warnings_as_lines",
+]
+
+OK, TARGET_MISSED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+# Of the name before the progress bar; the front so far is to fit beside it into 80 columns.
+LONGEST_NAME = 18
+
+
+class _Interrupt:
+    """Remembers Ctrl-C: some libraries swallow the exception while they are imported."""
+
+    seen = False
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Note each Ctrl-C besides raising KeyboardInterrupt; see :func:`stop_if_interrupted`."""
+
+    def note(signum: int, frame: Any) -> None:
+        _Interrupt.seen = True
+        raise KeyboardInterrupt
+
+    _Interrupt.seen = False
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def stop_if_interrupted() -> None:
+    """Raise KeyboardInterrupt if Ctrl-C was pressed, even if a library swallowed it."""
+    if _Interrupt.seen:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def progress(quiet: bool, model: OpenModel) -> Iterator[Callable[[float, int, FloatArray], None]]:
+    """Yield what shows (share done, evaluations, objectives so far): a bar on a terminal, elsewhere nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda share, evaluations, F: None
+        return
+    from meshsimp_pymoo.display import errors_at, usual_sizes
+
+    sizes = usual_sizes(len(model.faces))
+    with bar(quiet, Path(model.name).name) as draw:
+
+        def show(share: float, evaluations: int, F: FloatArray) -> None:
+            errors = zip(errors_at(F, sizes), sizes, strict=True)
+            so_far = [f"{error:.3g}@{size}" for error, size in errors if not math.isnan(error)]
+            draw(share, " ".join(["error", *so_far, f"after {evaluations:,} evaluations"]))
+
+        yield show
+
+
+@contextmanager
+def bar(quiet: bool, name: str) -> Iterator[Callable[[float, str], None]]:
+    """Yield what shows (share done, what is being done): on a terminal a line of its width; elsewhere nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda share, state: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.table import Column
+
+    one_line = Column(no_wrap=True, overflow="ellipsis", ratio=1)
+    columns = (
+        TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True)),
+        BarColumn(bar_width=8),
+        TextColumn("{task.percentage:>2.0f} %", table_column=Column(no_wrap=True)),
+        TimeRemainingColumn(compact=True, table_column=Column(no_wrap=True)),
+        TextColumn("left; {task.fields[state]}", markup=False, table_column=one_line),
+    )
+    short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
+    # steps of an experiment can be a minute apart: the speed is that of the last ten minutes
+    with Progress(
+        *columns, console=Console(stderr=True), transient=True, speed_estimate_period=600, expand=True
+    ) as shown:
+        task = shown.add_task(short, total=1.0, state="")
+
+        def show(share: float, state: str) -> None:
+            shown.update(task, completed=min(share, 1.0), state=state)
+
+        yield show
+
+
+@contextmanager
+def warnings_as_lines() -> Iterator[None]:
+    """Print our own warnings as one line each; others as usual."""
+    show_others = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **kwargs: Any) -> None:
+        if category.__module__.partition(".")[0] == "meshsimp_pymoo":
+            say("warning: " + " ".join(str(message).split()))
+        else:
+            show_others(message, category, *rest, **kwargs)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show
+        warnings.filterwarnings("always", module=r"meshsimp_pymoo(\.|$)")
+        yield
+
+
+def described(quality: Quality) -> str:
+    """Return all numbers of a mesh in words."""
+    return (
+        f"{quality.triangles:,} triangles, error {quality.error:.6g}, mean {quality.mean_error:.4g}, "
+        f"RMS {quality.rms_error:.4g}, max {quality.max_error:.4g}, uncovered {quality.uncovered}"
+    )
+
+
+def say(line: str) -> None:
+    """Print one line on stderr."""
+    print(f"meshsimp: {line}", file=sys.stderr)

@@ -1,0 +1,712 @@
+"""A front as a sequence of solutions: look at it, pick one of them, take its mesh.
+
+It comes from a pymoo result or from a folder that was written before, and shows itself in a notebook::
+
+    front = Front.from_result(minimize(MeshProblem("face.ply"), nsga2_v1(), seed=1))
+    front = Front.load("out")
+    front.best(triangles=500).mesh.export("small.ply")
+    front.knee().error, front[3].triangles, len(front)
+    front.save("out")
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import operator
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.analysis import knee
+from meshsimp_pymoo.geometry.error import ERROR, TRIANGLES, Quality, Simplified
+from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.geometry.refit import Refitted, refit_heights
+from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.results import (
+    MESH_FORMATS,
+    MESHES_BY_DEFAULT,
+    ResultError,
+    claim_file,
+    even_selection,
+    mesh_arrays,
+    new_file,
+    read_front,
+    warn_of_single_precision,
+    write_front,
+    write_mesh,
+)
+
+if TYPE_CHECKING:
+    import pandas
+    import trimesh
+    from matplotlib.axes import Axes
+
+    from meshsimp_pymoo.geometry.model import OpenModel
+
+__all__ = ["Front", "FrontSolution"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+# What of a run's record says how to make its problem again, with the values that old records leave out.
+SETTINGS: dict[str, Any] = {
+    "up": "auto",
+    "patch": None,
+    "spacing": None,
+    "nodata": None,
+    "footprint": "model",
+    "outside": "nearest",
+    "objectives": ("error", "triangles"),
+    "weights": None,
+}
+# Rows of the table that a notebook shows.
+SHOWN_ROWS = 12
+
+
+class FrontSolution:
+    """One solution of a front: its numbers, and its mesh when it is asked for.
+
+    Attributes
+    ----------
+    front : Front
+        Where it belongs.
+    solution : int
+        Its number in the front, from 0; the column ``solution`` of ``front.csv``.
+    quality : Quality
+        All its numbers; each of them is an attribute of the solution too (``error``, ``triangles``, ...).
+    kept : (N,) bool array
+        The vertices that stay, in vector order.
+    """
+
+    def __init__(self, front: Front, solution: int) -> None:
+        self.front = front
+        self.solution = solution
+        self.quality: Quality = front.quality[solution]
+        self.kept: BoolArray = front.kept[solution]
+
+    @property
+    def error(self) -> float:
+        """Sum of the deviations at all original vertices [model units]."""
+        return self.quality.error
+
+    @property
+    def triangles(self) -> int:
+        """Number of triangles."""
+        return self.quality.triangles
+
+    @property
+    def vertices(self) -> int:
+        """Number of vertices that the triangles use."""
+        return self.quality.vertices
+
+    @property
+    def mean_error(self) -> float:
+        """Mean deviation over all original vertices [model units]."""
+        return self.quality.mean_error
+
+    @property
+    def rms_error(self) -> float:
+        """Root mean square of the deviations [model units]."""
+        return self.quality.rms_error
+
+    @property
+    def max_error(self) -> float:
+        """Largest deviation [model units]."""
+        return self.quality.max_error
+
+    @property
+    def uncovered(self) -> int:
+        """Number of original vertices that no triangle covers."""
+        return self.quality.uncovered
+
+    @cached_property
+    def simplified(self) -> Simplified:
+        """Triangles, deviation and cover of the original vertices, computed when first used."""
+        return self.front.problem.simplify(self.kept)
+
+    @cached_property
+    def refitted(self) -> Refitted:
+        """The same triangles with the heights that make the error least, computed when first used."""
+        problem = self.front.problem
+        kept = self.kept | problem.pinned
+        return refit_heights(problem.model, kept, footprint=problem.footprint, outside=problem.outside)
+
+    @property
+    def points(self) -> FloatArray:
+        """The model's vertices (N, 3), upright; ``faces`` are rows of them."""
+        return self.front.problem.model.points
+
+    @property
+    def faces(self) -> npt.NDArray[np.int32]:
+        """The triangles (M, 3) as rows of the model's vertices."""
+        return self.simplified.faces
+
+    @property
+    def attributes(self) -> dict[str, npt.NDArray[Any]]:
+        """Colours and other attributes of the model's vertices."""
+        return self.front.problem.model.attributes
+
+    @cached_property
+    def mesh(self) -> trimesh.Trimesh:
+        """The simplified mesh in the frame of the model's file, with its colours and attributes."""
+        return self.front.problem.mesh(self.kept)
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.results.write_mesh`.
+
+        A mesh that the front's folder holds in this format is copied.
+
+        Raises
+        ------
+        ResultError
+            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
+        """
+        path = claim_file(path, MESH_FORMATS, overwrite=overwrite)
+        suffix = path.suffix.lower()
+        stored = self.front.stored_mesh(self.solution)
+        with new_file(path) as unfinished:
+            if stored is not None and stored.suffix == suffix:
+                shutil.copyfile(stored, unfinished)
+            else:
+                arrays = mesh_arrays(self.front.problem.model, self.faces)
+                warn_of_single_precision(self.front.problem.model, suffix[1:], arrays[0])
+                write_mesh(unfinished, *arrays)
+        return path
+
+    def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
+        """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
+        from meshsimp_pymoo.report.figures import plot_mesh, relief_exaggeration
+
+        return plot_mesh(self, ax, **{"exaggeration": relief_exaggeration(self.front.problem.model)} | kwargs)
+
+    def plot_error(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
+        """Draw the deviation at every original vertex; see :func:`meshsimp_pymoo.report.figures.plot_error`."""
+        from meshsimp_pymoo.report.figures import plot_error
+
+        found = self.simplified
+        return plot_error(self.front.problem.model, found.deviation, ax, **{"covered": found.covered} | kwargs)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, FrontSolution):
+            return NotImplemented
+        return self.front is other.front and self.solution == other.solution
+
+    def __hash__(self) -> int:
+        return hash((id(self.front), self.solution))
+
+    def __repr__(self) -> str:
+        q = self.quality
+        return (
+            f"<solution {self.solution} of {len(self.front)}: {q.triangles} triangles, error {q.error:.6g}, "
+            f"mean {q.mean_error:.4g}, max {q.max_error:.4g}>"
+        )
+
+    def _repr_png_(self) -> bytes:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(5.0, 4.2), dpi=90, layout="constrained")
+        self.plot(figure.subplots()).set_title(
+            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}", fontsize=10
+        )
+        return _png(figure)
+
+
+class Front(Sequence[FrontSolution]):
+    """The solutions of a search that no other solution beats, sorted by triangles.
+
+    Make one with :meth:`from_result`, :meth:`from_subsets` or :meth:`load`. It is a sequence: ``len(front)``,
+    ``front[3]``, ``front[-1]``, ``for solution in front``; a slice is a front too.
+
+    Parameters
+    ----------
+    quality : sequence of Quality, length S
+        The numbers of each solution, sorted by triangles, then error.
+    kept : (S, N) bool array
+        The solutions in vector order.
+    problem : MeshProblem, optional
+        What they are solutions of; by default it is read again from what ``run`` says of it when it is needed.
+    run : mapping, optional
+        The record of the run; see ``run.json``.
+    folder : Path, optional
+        Where the front is stored.
+    meshes : sequence of str, optional
+        Path of each stored mesh relative to the folder; empty where there is none.
+
+    Examples
+    --------
+    The whole front of a roof: without its ridge, with one end of it, and exact:
+
+    >>> import itertools
+    >>> problem = MeshProblem("roof:3")
+    >>> subsets = [np.array(bits, dtype=bool) for bits in itertools.product([False, True], repeat=9)]
+    >>> front = Front.from_subsets(problem, subsets)
+    >>> front.F.tolist()
+    [[3.0, 2.0], [1.5, 3.0], [0.0, 4.0]]
+    >>> front.best(triangles=3)
+    <solution 1 of 3: 3 triangles, error 1.5, mean 0.1667, max 1>
+    """
+
+    def __init__(
+        self,
+        quality: Sequence[Quality],
+        kept: npt.ArrayLike,
+        *,
+        problem: MeshProblem | None = None,
+        run: Mapping[str, Any] | None = None,
+        folder: Path | None = None,
+        meshes: Sequence[str] = (),
+    ) -> None:
+        self.quality = tuple(quality)
+        self.kept: BoolArray = np.asarray(kept, dtype=bool)
+        self.run = dict(run or {})
+        self.folder = folder
+        self._meshes = tuple(meshes) or ("",) * len(self.quality)
+        self._problem = problem
+        if not self.quality:
+            raise ValueError("a front has at least one solution; this one has none")
+        if self.kept.ndim != 2 or len(self.kept) != len(self.quality) or len(self._meshes) != len(self.quality):
+            raise ValueError(f"{len(self.quality)} solutions cannot have kept of the shape {self.kept.shape}")
+
+    # ---------------------------------------------------------------------------------------------- where it comes from
+
+    @classmethod
+    def from_subsets(cls, problem: MeshProblem, kept: npt.ArrayLike, *, ends: bool = False) -> Front:
+        """Evaluate chromosomes and keep those that no other one beats, each once, and that meet the constraints.
+
+        Parameters
+        ----------
+        problem : MeshProblem
+            What they are chromosomes of.
+        kept : (P, N) bool array
+            The vertices that stay, in vector order; pinned ones are added.
+        ends : bool
+            Add what is known without a search: all vertices, and the pinned ones alone.
+
+        Raises
+        ------
+        LookupError
+            If none of them is a mesh that meets the constraints.
+        """
+        rows = np.atleast_2d(np.asarray(kept))
+        if ends:
+            rows = np.vstack([rows, np.ones(problem.n_var, dtype=bool), problem.pinned])
+        table = problem.evaluate_subsets(rows)
+        usable = np.array([_is_feasible(problem, row) for row in table])
+        if not usable.any():
+            raise LookupError(
+                f"{problem.model.name}: none of {len(rows)} subsets of its vertices is a mesh that meets the "
+                "constraints; search longer, or loosen max_triangles and max_error"
+            )
+        rows, table = rows[usable] | problem.pinned, table[usable]
+        quality = [problem.as_quality(row) for row in table]
+        F = _objectives(quality, problem.objectives)
+        best = {row.tobytes() for row in non_dominated(F)}
+        first: dict[bytes, int] = {}
+        for row in np.lexsort((table[:, ERROR], table[:, TRIANGLES])):
+            key = (F[row] + 0.0).tobytes()
+            if key in best:
+                first.setdefault(key, int(row))
+        chosen = list(first.values())
+        return cls([quality[row] for row in chosen], rows[chosen], problem=problem)
+
+    @classmethod
+    def from_result(cls, result: Any, *, ends: bool = True) -> Front:
+        """Take over what a search found.
+
+        Parameters
+        ----------
+        result : pymoo Result, or anything with ``X`` and ``problem``
+            Of ``minimize(MeshProblem(...), ...)`` with any algorithm.
+        ends : bool
+            Add both ends of the front, which are known without a search: all vertices, and the pinned ones alone.
+
+        Raises
+        ------
+        LookupError
+            If the search found nothing that meets its constraints.
+        TypeError
+            If it was not one of a MeshProblem.
+        """
+        problem = result.problem
+        if not isinstance(problem, MeshProblem):  # one that weighs the two objectives
+            problem = getattr(problem, "problem", problem)
+        if not isinstance(problem, MeshProblem):
+            raise TypeError(f"the result is of a {type(problem).__name__}; a Front holds solutions of a MeshProblem")
+        if result.X is None:
+            raise LookupError(
+                f"{problem.model.name}: the search found no solution that meets its constraints; search longer, or "
+                "loosen max_triangles and max_error"
+            )
+        front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends)
+        algorithm = getattr(result, "algorithm", None)
+        facts = {
+            "algorithm": type(algorithm).__name__ if algorithm is not None else None,
+            "seed": getattr(algorithm, "seed", None),
+            "generations": getattr(algorithm, "n_iter", 1) - 1,
+            "evaluations": getattr(getattr(algorithm, "evaluator", None), "n_eval", None),
+            "seconds": getattr(result, "exec_time", None),
+        }
+        front.run |= {key: value for key, value in facts.items() if value is not None}
+        return front
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str], model: Any = None) -> Front:
+        """Read a front that ``save`` or ``meshsimp simplify`` wrote.
+
+        Its numbers are there at once; the model is read when a mesh is asked for, and must be the very same.
+
+        Parameters
+        ----------
+        folder : path
+            The folder.
+        model : path, built-in name, trimesh.Trimesh or OpenModel, optional
+            The original mesh, if it is no longer where the record says.
+
+        Raises
+        ------
+        ResultError
+            If a file is missing or damaged, or ``model`` is another one.
+        """
+        stored = read_front(folder)
+        names = [item.name for item in fields(Quality)]
+        columns = [stored.quality[name].tolist() for name in names]
+        quality = [Quality(**dict(zip(names, row, strict=True))) for row in zip(*columns, strict=True)]
+        front = cls(quality, stored.kept, run=stored.run, folder=stored.folder, meshes=stored.meshes)
+        if model is not None:
+            front._problem = front._problem_of(model)
+        return front
+
+    # ---------------------------------------------------------------------------------------------------- as a sequence
+
+    def __len__(self) -> int:
+        return len(self.quality)
+
+    @overload
+    def __getitem__(self, item: int) -> FrontSolution: ...
+    @overload
+    def __getitem__(self, item: slice) -> Front: ...
+    def __getitem__(self, item: int | slice) -> FrontSolution | Front:
+        if isinstance(item, slice):
+            rows = range(len(self))[item]
+            if not rows:
+                raise IndexError(f"{item} leaves nothing of a front of {len(self)} solutions")
+            rows = range(len(self))[min(rows) : max(rows) + 1 : abs(item.step or 1)]  # sorted by triangles, always
+            return Front(
+                [self.quality[row] for row in rows],
+                self.kept[list(rows)],
+                problem=self._problem,
+                run=self.run,
+                folder=self.folder,
+                meshes=[self._meshes[row] for row in rows],
+            )
+        row = operator.index(item)
+        if not -len(self) <= row < len(self):
+            raise IndexError(f"the front has the solutions 0 to {len(self) - 1}; there is no {row}")
+        return FrontSolution(self, row % len(self))
+
+    @property
+    def objectives(self) -> tuple[str, ...]:
+        """What was minimised; (error, triangles) unless the problem says otherwise."""
+        if self._problem is not None:
+            return self._problem.objectives
+        return tuple(self._settings()["objectives"])
+
+    @property
+    def F(self) -> FloatArray:
+        """The objectives (S, 2): error [model units] and triangles, or what else was minimised."""
+        return _objectives(self.quality, self.objectives)
+
+    @cached_property
+    def problem(self) -> MeshProblem:
+        """What these are solutions of; of a stored front, read again when it is needed.
+
+        Raises
+        ------
+        ResultError
+            If the model is not where the record says, or has changed.
+        """
+        return self._problem if self._problem is not None else self._problem_of(None)
+
+    @property
+    def model(self) -> OpenModel:
+        """The original mesh."""
+        return self.problem.model
+
+    @property
+    def name(self) -> str:
+        """What the model is called."""
+        recorded = (self.run.get("model") or {}).get("name")
+        return str(recorded or self.problem.model.name)
+
+    # --------------------------------------------------------------------------------------------------------- choosing
+
+    def best(
+        self,
+        *,
+        triangles: float | None = None,
+        error: float | None = None,
+        mean_error: float | None = None,
+        rms_error: float | None = None,
+        max_error: float | None = None,
+    ) -> FrontSolution:
+        """Return the best solution within one limit.
+
+        Parameters
+        ----------
+        triangles : int
+            The most accurate solution of at most that many triangles.
+        error, mean_error, rms_error, max_error : float
+            The smallest solution with at most that error [model units].
+
+        Raises
+        ------
+        LookupError
+            If no solution meets the limit; the message says how near the front comes.
+        TypeError
+            If not exactly one limit is given.
+        """
+        given = {
+            "triangles": triangles,
+            "error": error,
+            "mean_error": mean_error,
+            "rms_error": rms_error,
+            "max_error": max_error,
+        }
+        limits = {name: value for name, value in given.items() if value is not None}
+        if len(limits) != 1:
+            raise TypeError(f"best() takes one limit, such as triangles=500 or max_error=0.1; {len(limits)} are given")
+        ((name, limit),) = limits.items()
+        values = np.array([getattr(q, name) for q in self.quality])
+        fitting = np.flatnonzero(values <= limit)
+        what = name.replace("_", " ")
+        if not len(fitting):
+            raise LookupError(
+                f"no solution of {self.name} has a {what} of at most {limit:g}; the least is {values.min():.6g}"
+                if name != "triangles"
+                else f"no solution of {self.name} has at most {limit:g} triangles; the smallest has {values.min()}"
+            )
+        if name == "triangles":
+            accuracy = self.F[fitting, 0]
+            return self[int(fitting[np.argmin(accuracy)])]
+        return self[int(fitting[0])]
+
+    def knee(self) -> FrontSolution:
+        """Return the best compromise; see :func:`meshsimp_pymoo.analysis.knee`."""
+        return self[knee(self.F)]
+
+    # ------------------------------------------------------------------------------------------- showing and writing it
+
+    def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
+        """Draw the front, its knee marked; see :func:`meshsimp_pymoo.report.figures.plot_front`."""
+        from meshsimp_pymoo.report.figures import plot_front
+
+        F = self.F
+        look: dict[str, Any] = {"knee": knee(F), "measure": self.objectives[0]}
+        return plot_front(F[:, [0, -1]], ax, **look | kwargs)
+
+    def save(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        overwrite: bool = False,
+        meshes: int | None = MESHES_BY_DEFAULT,
+        mesh_format: str = "ply",
+        chosen: int | FrontSolution | None = None,
+        refit: bool = False,
+        page: bool = True,
+        run: Mapping[str, Any] | None = None,
+    ) -> Path:
+        """Write the front as ``meshsimp simplify`` does: numbers, pictures, the page, the record and meshes.
+
+        Parameters
+        ----------
+        folder : path
+            The folder to make.
+        overwrite : bool
+            Replace results that exist.
+        meshes : int or None
+            The most meshes to write, an even selection of a longer front; None writes all, 0 none.
+        mesh_format : str
+            "ply", "obj", "stl", "off" or "glb".
+        chosen : int or FrontSolution, optional
+            The solution to write as ``chosen.<mesh_format>`` too.
+        refit : bool
+            Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
+            :func:`~meshsimp_pymoo.geometry.refit.refit_heights`.
+        page : bool
+            Write ``report.html``, the page on which to look at the solutions and choose one.
+        run : mapping, optional
+            What else to record in run.json.
+
+        Raises
+        ------
+        ResultError
+            If the folder cannot be written.
+        """
+        problem = self.problem
+        row = chosen.solution if isinstance(chosen, FrontSolution) else chosen
+        drawn: dict[int, Any] = {}
+
+        def faces(solution: int) -> Any:
+            if solution not in drawn:
+                drawn[solution] = problem.simplify(self.kept[solution]).faces
+            return drawn[solution]
+
+        def draw(unfinished: Path) -> None:
+            from meshsimp_pymoo.report.figures import front_figure, panel_rows
+
+            F = self.F
+            shown = panel_rows(len(self), row, knee(F))
+            figure = front_figure(
+                problem.model,
+                F[:, [0, -1]],
+                [(solution, faces(solution)) for solution in shown],
+                knee=knee(F),
+                chosen=row,
+                measure=self.objectives[0],
+            )
+            figure.savefig(unfinished / "front.png")
+            if page:
+                from meshsimp_pymoo.report.page import write_page
+
+                write_page(read_front(unfinished), problem, folder=folder, knee=knee(F))
+
+        record = self.run | dict(run or {})
+        record["settings"] = problem.settings | dict(record.get("settings") or {})
+        return write_front(
+            folder,
+            problem.model,
+            self.quality,
+            self.kept,
+            faces=faces,
+            meshes=meshes,
+            mesh_format=mesh_format.lower(),
+            chosen=row,
+            refit=(lambda solution: self[solution].refitted) if refit else None,
+            run=record,
+            extra=draw,
+            overwrite=overwrite,
+        )
+
+    def stored_mesh(self, solution: int) -> Path | None:
+        """Return the file of a solution's mesh in the front's folder; None if it was not written."""
+        path = self._meshes[solution]
+        if self.folder is None or not path or not (self.folder / path).is_file():
+            return None
+        return self.folder / path
+
+    def to_frame(self) -> pandas.DataFrame:
+        """Return the numbers as a table of pandas: one row a solution, the columns of ``front.csv``.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_frame() needs pandas: pip install pandas") from None
+        frame = pandas.DataFrame([asdict(q) for q in self.quality])
+        return frame.rename_axis(index="solution")
+
+    def __repr__(self) -> str:
+        few, many = self.quality[0], self.quality[-1]
+        return (
+            f"<front of {self.name}: {len(self)} solutions, {few.triangles} to {many.triangles} triangles, "
+            f"error {few.error:.6g} to {many.error:.6g}>"
+        )
+
+    def _repr_png_(self) -> bytes:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(6.0, 4.2), dpi=90, layout="constrained")
+        self.plot(figure.subplots()).set_title(Path(self.name).name, loc="left", fontsize=10)
+        return _png(figure)
+
+    def _repr_html_(self) -> str:
+        import html
+
+        at = knee(self.F)
+        rows = sorted({*even_selection(len(self), SHOWN_ROWS), at})
+        picture = base64.b64encode(self._repr_png_()).decode()
+        names = ("triangles", "vertices", "error", "mean_error", "max_error")
+        header = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in ("solution", *names))
+        body = []
+        for row in rows:
+            cells = [f"{row}{' (knee)' if row == at else ''}"]
+            cells += [f"{getattr(self.quality[row], name):.6g}" for name in names]
+            body.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+        left_out = "" if len(rows) == len(self) else f"<p>{len(self) - len(rows)} more solutions are not listed.</p>"
+        return (
+            f'<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start">'
+            f'<img alt="{html.escape(repr(self)[1:-1])}" src="data:image/png;base64,{picture}">'
+            f"<div><table><tr>{header}</tr>{''.join(body)}</table>{left_out}</div></div>"
+        )
+
+    # -------------------------------------------------------------------------------------------- the model, read again
+
+    def _settings(self) -> dict[str, Any]:
+        recorded = self.run.get("settings") or {}
+        return {key: recorded.get(key, default) or default for key, default in SETTINGS.items()} | {
+            "nodata": recorded.get("nodata")  # 0 is a height
+        }
+
+    def _problem_of(self, model: Any) -> MeshProblem:
+        """Make the problem again from the record, and check that the model is the same."""
+        facts = self.run.get("model") or {}
+        where = self.folder if self.folder is not None else "the front"
+        way_out = "pass the original (Front.load(folder, model=...), --model FILE) or simplify it again"
+        source = model if model is not None else self._model_file()
+        try:
+            settings = self._settings()
+            if isinstance(settings["spacing"], list):
+                settings["spacing"] = tuple(settings["spacing"])
+            problem = MeshProblem(source, **settings)
+        except ModelError as trouble:
+            if model is not None:
+                raise
+            raise ResultError(f"{where}: its model cannot be read ({trouble}); {way_out}") from None
+        if problem.model.hash != facts.get("hash"):
+            raise ResultError(
+                f"{where}: is the front of another model than {problem.model.name} is now"
+                + ("" if model is not None else " (the file has changed since)")
+                + f", of {facts.get('vertices')} vertices, not {problem.model.n_vertices}"
+                * (facts.get("vertices") != problem.model.n_vertices)
+                + f"; {way_out}"
+            )
+        return problem
+
+    def _model_file(self) -> Path | str:
+        """Return where the record says the model is: beside the results, as it was called, or built in."""
+        facts = self.run.get("model") or {}
+        if self.folder is not None and facts.get("file"):
+            beside = self.folder.resolve() / facts["file"]
+            if beside.is_file():
+                return beside
+        return self.name
+
+
+def _is_feasible(problem: MeshProblem, row: FloatArray) -> bool:
+    if row[TRIANGLES] == 0:
+        return False
+    return all(value <= 0 for value in problem.outcome(row).get("G", ()))
+
+
+def _objectives(quality: Sequence[Quality], names: Sequence[str]) -> FloatArray:
+    return np.array([[getattr(q, name) for name in names] for q in quality], dtype=np.float64)
+
+
+def _png(figure: Any) -> bytes:
+    content = io.BytesIO()
+    figure.savefig(content, format="png")
+    return content.getvalue()
