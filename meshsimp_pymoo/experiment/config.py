@@ -42,6 +42,7 @@ import numpy as np
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.baselines.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.geometry.error import MEASURES
 from meshsimp_pymoo.geometry.load import ModelError
 from meshsimp_pymoo.geometry.model import OpenModel
 from meshsimp_pymoo.operators import OPERATORS
@@ -70,7 +71,8 @@ MAX_NAME = 60
 
 # Keys of `problem`, all arguments of MeshProblem.
 PROBLEM_OPTIONS = (
-    "footprint", "outside", "up", "patch", "spacing", "nodata", "pin", "max_triangles", "max_error",
+    "footprint", "outside", "up", "patch", "spacing", "nodata", "pin", "objectives", "weights", "max_triangles",
+    "max_error",
 )  # fmt: skip
 # What a pymoo algorithm calls the operator of a kind.
 ARGUMENT_OF_KIND = {kind: "eliminate_duplicates" if kind == "duplicates" else kind for kind in OPERATORS}
@@ -273,8 +275,8 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
 
 
 def problem_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options as arguments of `MeshProblem`; the model is open already, so not how to read it."""
-    return {key: value for key, value in options.items() if key not in ("up", "patch", "spacing", "nodata")}
+    """Return the options as arguments of `MeshProblem`; the model is open already and holds the weights."""
+    return {key: value for key, value in options.items() if key not in ("up", "patch", "spacing", "nodata", "weights")}
 
 
 def settings(part: Any) -> dict[str, Any]:
@@ -431,7 +433,7 @@ def _check_build(entry: Entry, config: AlgorithmConfig) -> None:
         )
 
 
-def _try_out(entry: Entry, config: AlgorithmConfig, problems: Iterable[ProblemConfig]) -> None:
+def _try_out(entry: Entry, config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None:
     """Let an algorithm run on a tiny model, and set it up for every problem, before anything is run."""
     for problem in problems:
         entry.try_to(
@@ -440,7 +442,8 @@ def _try_out(entry: Entry, config: AlgorithmConfig, problems: Iterable[ProblemCo
             ),
             f"the algorithm {config.name!r} cannot be used on the problem {problem.name!r}",
         )
-    trials = [MeshProblem(TRIAL_MODEL, n_threads=1)]
+    wanted = dict.fromkeys(problem.build().objectives for problem in problems)
+    trials = [MeshProblem(TRIAL_MODEL, objectives=objectives, n_threads=1) for objectives in wanted]
     trials += [problem.build() for problem in problems if problem.model.n_vertices < TRIAL_VERTICES]
     for trial in trials:
 
@@ -567,6 +570,16 @@ def _option(key: str, entry: Entry) -> Any:
         return entry.choice(("nearest", "ignore"), key)
     if key == "patch":
         return entry.choice(("front",), key)
+    if key == "objectives":
+        names = [item.text() for item in entry.items()]
+        if len(names) != 2 or names[0] not in MEASURES or names[1] != "triangles":
+            several = "; an experiment compares fronts of two objectives, more are for nsga3() in Python"
+            entry.fail(
+                f"expected [one of {', '.join(MEASURES)}, triangles]" + (several if len(names) > 2 else "")
+            )
+        return names
+    if key == "weights":
+        return entry.text()
     if key == "max_triangles":
         return entry.whole(1)
     if key in ("nodata", "max_error"):

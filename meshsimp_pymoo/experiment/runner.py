@@ -19,16 +19,10 @@ paper's series of reductions; and the meshes, one after the other: ``mesh_vertic
 
 from __future__ import annotations
 
-import contextlib
-import multiprocessing
 import os
-import signal
-import threading
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -42,6 +36,7 @@ from meshsimp_pymoo.baselines.meshlab import (
     meshlab_front,
     reductions,
 )
+from meshsimp_pymoo.engines import Engine, EngineError, Processes, Serial
 from meshsimp_pymoo.experiment.config import (
     AlgorithmConfig,
     Budget,
@@ -50,7 +45,7 @@ from meshsimp_pymoo.experiment.config import (
     problem_arguments,
     read_experiment_file,
 )
-from meshsimp_pymoo.geometry.error import ERROR, TRIANGLES, Quality, as_quality, evaluate_subsets, mesh_quality
+from meshsimp_pymoo.geometry.error import TRIANGLES, Quality, evaluate_subsets, measured, mesh_quality
 from meshsimp_pymoo.geometry.model import OpenModel
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
@@ -77,9 +72,6 @@ OVERHEAD_VERTICES = 600
 WORK_PER_SECOND = 1e7
 # Work of a classic method on a model, in evaluations.
 BASELINE_EVALUATIONS = 2000
-
-# Libraries that would start threads of their own beside the processes.
-THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 QUALITY_COLUMNS = ("vertices", "mean_error", "rms_error", "max_error", "uncovered")
 
@@ -163,6 +155,7 @@ def run_experiment(
     out: str | os.PathLike[str],
     *,
     jobs: int = 1,
+    engine: Engine | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Done:
@@ -178,6 +171,9 @@ def run_experiment(
     jobs : int
         Number of processes. With 1, everything is done in this one. They are started anew, so in a script
         the call has to stand under ``if __name__ == "__main__":``.
+    engine : Engine, optional
+        Where the searches are done, in place of ``jobs``: on a Dask cluster, say. The classic methods and the
+        writing are always done here.
     folder : path, optional
         Where the model files are, in place of what the configuration says.
     progress : callable, optional
@@ -210,7 +206,9 @@ def run_experiment(
         missing = [task for task in missing if task.budgets]
         classic_work = _classic_work(experiment)
         shown = _Shown(progress, sum(task.work for task in missing) + sum(classic_work.values()))
-        _perform_all(missing, experiment, store, jobs, shown)
+        own = Serial() if jobs == 1 or len(missing) < 2 else Processes(min(jobs, len(missing)))
+        with own:
+            _perform_all(missing, experiment, store, engine or own, shown)
         rows, skipped, computed = _classic(experiment, tasks, store, shown, classic_work)
         write_experiment(out, content | {"classic": rows, "skipped": list(skipped)})
         asked = {key for task in tasks for key in task.keys} | {row["key"] for row in rows}
@@ -325,16 +323,18 @@ def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[A
     table = problem.evaluate_subsets(kept) if len(kept) else np.zeros((0, 6))
     is_mesh = table[:, TRIANGLES] > 0
     kept, table = kept[is_mesh], table[is_mesh]
-    F = table[:, [ERROR, TRIANGLES]]
+    measure, total = problem.objectives[0], problem.model.total_weight
+    F = np.column_stack([measured(table, measure, total), table[:, TRIANGLES]])
     if len(F):
         _, first = np.unique(F[:, ::-1], axis=0, return_index=True)
         best = {tuple(row) for row in non_dominated(F[first]).tolist()}
         rows = np.array([row for row in first if tuple(F[row].tolist()) in best])
         kept, table, F = kept[rows], table[rows], F[rows]
-    quality = [as_quality(row, problem.n_var) for row in table]
+    quality = [problem.as_quality(row) for row in table]
     nearest = F[:, 0]
     if problem.outside != "nearest" and len(kept):
-        nearest = evaluate_subsets(problem.model, kept, footprint=problem.footprint, outside="nearest")[:, ERROR]
+        charged = evaluate_subsets(problem.model, kept, footprint=problem.footprint, outside="nearest")
+        nearest = measured(charged, measure, total)
     return {
         "F": F,
         "kept": np.packbits(kept, axis=1),
@@ -461,93 +461,43 @@ class _Shown:
 # ----------------------------------------------------------------------------------------- doing it, in processes
 
 
-def _perform_all(tasks: Sequence[Task], experiment: Experiment, store: RunStore, jobs: int, shown: _Shown) -> None:
+@dataclass(frozen=True, eq=False)
+class _Shared:
+    """What every worker has to know: the models with their options, and where runs are written (None: not there)."""
+
+    problems: Mapping[str, tuple[OpenModel, dict[str, Any]]]
+    folder: Path | None
+
+
+def _perform_all(
+    tasks: Sequence[Task], experiment: Experiment, store: RunStore, engine: Engine, shown: _Shown
+) -> None:
     problems = {problem.name: (problem.model, dict(problem.options)) for problem in experiment.problems}
+    shared = _Shared(problems, store.folder if engine.shares_files else None)
     if shown.progress is not None:
         shown.progress(0.0, shown.total, "")
-    if jobs == 1 or len(tasks) < 2:
-        for task in tasks:
-            for path in _perform_and_write(task, problems, store.folder):
-                store.add(path)
-            shown.add(task.work, task.label)
-        return
-    with _one_thread_each():
-        pool = ProcessPoolExecutor(
-            min(jobs, len(tasks)),
-            mp_context=multiprocessing.get_context("spawn"),
-            initializer=_begin_worker,
-            initargs=(problems, store.folder),
-        )
-        try:
-            _share_out(pool, list(tasks), store, jobs, shown)
-        except BrokenProcessPool:
-            raise ResultError(
-                f"{store.folder}: a process ended unexpectedly (killed, or out of memory); what is finished is "
-                "stored, the same command does the rest"
-            ) from None
-        except BaseException:
-            # running searches are given up: what they have finished is on the disk
-            for process in list((pool._processes or {}).values()):
-                process.terminate()
-            raise
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _share_out(pool: ProcessPoolExecutor, tasks: list[Task], store: RunStore, jobs: int, shown: _Shown) -> None:
-    """Keep the processes busy, with a few tasks waiting; big ones first, so that all end together."""
-    waiting = sorted(tasks, key=lambda task: -task.work)
-    running: dict[Future[list[Path]], Task] = {}
-    while waiting or running:
-        while waiting and len(running) < 2 * jobs:
-            task = waiting.pop(0)
-            running[pool.submit(_work_on, task)] = task
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            task = running.pop(future)
-            for path in future.result():
-                store.add(path)
-            shown.add(task.work, task.label)
-
-
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Have processes that are started in here use one thread each."""
-    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    # big ones first, so that all workers end together
+    tasks = list(tasks) if engine.jobs == 1 else sorted(tasks, key=lambda task: -task.work)
     try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for place, finished in engine.each(_work_on, tasks, shared):
+            for run in finished:
+                store.add(run if isinstance(run, Path) else write_run(store.folder, *run))
+            shown.add(tasks[place].work, tasks[place].label)
+    except EngineError as problem:
+        raise ResultError(
+            f"{store.folder}: {problem}; what is finished is stored, the same command does the rest"
+        ) from None
 
 
-_problems: dict[str, tuple[OpenModel, dict[str, Any]]] = {}
-_folder = Path()
-
-
-def _begin_worker(problems: dict[str, tuple[OpenModel, dict[str, Any]]], folder: Path) -> None:
-    """Prepare a process of the pool: the models, and an end when the parent ends."""
-    global _problems, _folder
-    _problems, _folder = problems, folder
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        # a killed parent says nothing, and the pool's processes would wait for work for ever
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    from multiprocessing.connection import wait as wait_for
-
-    wait_for([sentinel])
-    os._exit(1)
-
-
-def _work_on(task: Task) -> list[Path]:
-    return _perform_and_write(task, _problems, _folder)
+def _work_on(task: Task, shared: _Shared) -> list[Any]:
+    """Do a task; return the records of its runs, or, where the folder is out of reach, all that is to be written."""
+    if shared.folder is not None:
+        return list(_perform_and_write(task, shared.problems, shared.folder))
+    model, options = shared.problems[task.problem]
+    return [
+        (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
+        for k, arrays, facts in perform(task, model, options)
+    ]
 
 
 def _perform_and_write(
@@ -600,6 +550,8 @@ def _classic(
                 "outside": problem.options.get("outside", "nearest"),
                 "asked": list(asked),
             }
+            if _measure(problem) != "error":
+                description["measure"] = _measure(problem)
             key = fingerprint(description)
             if store.get(key) is None:
                 if not available:
@@ -621,6 +573,11 @@ def _classic(
     except MeshLabUnavailable as problem_of_machine:
         reason = str(problem_of_machine)
     return rows, (f"skipped: {', '.join(missing)}: {reason}",), computed
+
+
+def _measure(problem: ProblemConfig) -> str:
+    """Return the measure of the error that is minimised beside the triangles."""
+    return str(problem.options.get("objectives", ("error",))[0])
 
 
 def _fewest_triangles(problem: ProblemConfig, tasks: Sequence[Task], store: RunStore) -> int | None:
@@ -645,6 +602,7 @@ def _write_classic(
 ) -> Path:
     """Let a classic method simplify a model to all sizes, and write what it made."""
     outside = problem.options.get("outside", "nearest")
+    measure = _measure(problem)
     model = problem.model
     none = Quality(np.inf, 0, 0, np.inf, np.inf, np.inf, model.n_vertices)
     quality, nearest, vertices, faces, notes = [], [], [], [], []
@@ -663,9 +621,12 @@ def _write_classic(
             continue
         quality.append(mesh.quality)
         nearest.append(
-            mesh_quality(model, mesh.vertices, mesh.faces, outside="nearest").error
-            if outside != "nearest"
-            else mesh.quality.error
+            getattr(
+                mesh.quality
+                if outside == "nearest"
+                else mesh_quality(model, mesh.vertices, mesh.faces, outside="nearest"),
+                measure,
+            )
         )
         vertices.append(mesh.vertices)
         faces.append(mesh.faces)
@@ -674,7 +635,7 @@ def _write_classic(
     arrays = {
         "asked": np.array(asked, dtype=np.int64),
         "paper": np.isin(asked, paper),
-        "F": np.array([[q.error, q.triangles] for q in quality], dtype=np.float64),
+        "F": np.array([[getattr(q, measure), q.triangles] for q in quality], dtype=np.float64),
         "error_nearest": np.array(nearest),
         **_quality_arrays(quality),
         "mesh_vertices": np.concatenate(vertices),

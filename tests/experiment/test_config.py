@@ -128,6 +128,18 @@ def test_models_are_looked_for_beside_the_configuration_or_in_the_folder_it_name
     assert read_experiment_file(elsewhere, folder=tmp_path / "scans").problems[0].model.n_vertices == 81
 
 
+def test_a_problem_may_minimise_another_measure_and_weigh_the_vertices(tmp_path):
+    source = load("pyramid:9")
+    write_mesh(tmp_path / "a.ply", source.points, source.faces, {"importance": np.arange(81.0)})
+    path = changed(tmp_path, problem="{objectives: [rms_error, triangles], weights: importance}", problems="[a.ply]")
+    (problem,) = read_experiment_file(path).problems
+    built = problem.build()
+    assert built.objectives == ("rms_error", "triangles")
+    assert built.model.total_weight == 81 * 40
+    plain = read_experiment_file(changed(tmp_path, problem=None, problems="[a.ply]")).problems[0]
+    assert problem.description() != plain.description()
+
+
 # (keys changed, what the message must say, in this order)
 MISTAKES = {
     "unknown key": ({"sedes": "[1]"}, ["line 6", "sedes", "unknown key", "'seeds'"]),
@@ -158,6 +170,16 @@ MISTAKES = {
     ),
     "option value unknown": ({"problem": "{footprint: hul}"}, ["problem.footprint", "'hul'", "'hull'"]),
     "option of wrong type": ({"problem": "{max_error: small}"}, ["problem.max_error", "'small'", "number"]),
+    "objective unknown": ({"problem": "{objectives: [errror, triangles]}"}, ["problem.objectives", "rms_error"]),
+    "three objectives": (
+        {"problem": "{objectives: [error, max_error, triangles]}"},
+        ["problem.objectives", "two objectives", "nsga3()"],
+    ),
+    "measure that an algorithm cannot lower": (
+        {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]"},
+        ["algorithms[0]", "'memetic' fails", "lower a sum"],
+    ),
+    "weights not in the file": ({"problem": "{weights: sharpness}"}, ["problems[0]", "'sharpness'", "it has: none"]),
     "pin impossible": ({"problem": "{pin: [100000]}"}, ["problems[0]", "100000"]),
     "up impossible": ({"problem": "{up: [0, 0, 0]}"}, ["problem.up", "not all 0"]),
     "no algorithm": ({"algorithms": "[]"}, ["algorithms", "at least one algorithm"]),

@@ -21,6 +21,8 @@ from meshsimp_pymoo import analysis
 from meshsimp_pymoo.baselines import meshlab
 from meshsimp_pymoo.baselines.meshlab import meshlab_available
 from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.engines import DaskEngine
 from meshsimp_pymoo.experiment import runner
 from meshsimp_pymoo.experiment.config import read_experiment_file
 from meshsimp_pymoo.experiment.runner import plan, run_experiment
@@ -28,7 +30,7 @@ from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.report.experiment import write_tables
 from meshsimp_pymoo.report.study import Study
-from meshsimp_pymoo.results import ResultError
+from meshsimp_pymoo.results import ResultError, write_mesh
 from meshsimp_pymoo.runs import ExperimentWarning, RunStore, locked, read_run
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -377,13 +379,24 @@ def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(con
     assert results(out) == results(reference)
 
 
+def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        DaskEngine(cluster.scheduler_address) as engine,
+    ):
+        run_experiment(config, tmp_path / "out", engine=engine)
+    write_tables(tmp_path / "out")
+    assert results(tmp_path / "out") == results(reference)
+
+
 def test_a_process_that_dies_is_answered_in_one_line(config, tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "_work_on", die)
     with pytest.raises(ResultError, match=r"a process ended unexpectedly .* the same command does the rest"):
         run_experiment(config, tmp_path / "out", jobs=2)
 
 
-def die(task: object) -> None:
+def die(task: object, shared: object) -> None:
     os._exit(9)
 
 
@@ -538,3 +551,31 @@ def test_no_result_holds_a_pickle(reference):
         with np.load(path, allow_pickle=False) as file:
             assert all(file[name].dtype.kind in "fiub" for name in file.files)
     assert RunStore(reference).paths
+
+
+def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findings_say_so(tmp_path):
+    face = load("face:90")
+    write_mesh(tmp_path / "face.ply", face.points, face.faces, {"importance": np.linspace(0, 1, 90)})
+    (tmp_path / "study.yaml").write_text(
+        "problem: {objectives: [rms_error, triangles], weights: importance, outside: ignore}\n"
+        "problems: [face.ply]\nalgorithms: [{preset: nsga2_v1, parameters: {pop_size: 12}}]\n"
+        "seeds: [1]\nbudgets: [{generations: 3}]\n",
+        encoding="utf-8",
+    )
+    assert run_experiment(tmp_path / "study.yaml", tmp_path / "out", jobs=1).finished == 1
+    again = run_experiment(tmp_path / "study.yaml", tmp_path / "out", jobs=1)
+    assert (again.finished, again.reused) == (0, 1)
+    (path,) = RunStore(tmp_path / "out").paths.values()
+    arrays = read_run(path).arrays
+    rules = {"objectives": ("rms_error", "triangles"), "weights": "importance"}
+    by_ignoring, by_nearest = (MeshProblem(tmp_path / "face.ply", outside=o, **rules) for o in ("ignore", "nearest"))
+    kept = np.unpackbits(arrays["kept"], axis=1)[:, :90].astype(bool)
+    np.testing.assert_array_equal(by_ignoring.evaluate(kept), arrays["F"])
+    np.testing.assert_array_equal(by_nearest.evaluate(kept)[:, 0], arrays["error_nearest"])
+    np.testing.assert_array_equal(arrays["rms_error"], arrays["F"][:, 0])
+    study = Study(tmp_path / "out")
+    assert study.model(study.problems[0]).total_weight == pytest.approx(45.0)
+    write_tables(tmp_path / "out")
+    said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
+    assert "On face the *error* is the root mean square of the deviations" in said
+    assert "attribute *importance*" in said

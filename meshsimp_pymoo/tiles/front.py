@@ -1,0 +1,546 @@
+"""The front of a height grid that is cut into tiles.
+
+In the first phase each tile is thinned to the end, with all beyond it fixed: its own nested front. As both objectives
+add up over the tiles, the best of all is put together by marginal analysis [1]_: that step comes first, whose error for
+each triangle saved is least. Along the lower convex hull of a tile's front these slopes ascend, so the state of the
+whole at a slope s is each tile's hull cut at s. What is lost is what lies off the hulls: where a tile's front bulges,
+its steps are done together or not at all. Then the front has one point fewer; those that it has are as good.
+
+The vertices along the tiles' edges were fixed, too many of them. So the same is done again with the tiles shifted by a
+third of their side, and by two thirds: whatever lay along an edge lies inside a tile in one of three phases. From then
+on each phase thins to a somewhat larger slope, cut otherwise than the one before. Every phase ends with one row of the
+front, a subset of the row before. When few vertices are left, tiles grow: every second row and column of samples then
+stands for the others, and so on, until one tile holds the whole; it is thinned to the end.
+
+The errors of the front are measured afterwards, for each row over all samples.
+
+References
+----------
+.. [1] B. Fox, "Discrete optimization via marginal analysis", Management Science 13, 1966.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.engines import Engine, Serial
+from meshsimp_pymoo.geometry.error import Quality
+from meshsimp_pymoo.results import ResultError, new_file
+from meshsimp_pymoo.tiles.grid import HeightGrid
+from meshsimp_pymoo.tiles.thin import Tile, thin_tile
+from meshsimp_pymoo.tiles.weld import measure, weld
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+#: Samples along one side of a tile.
+TILE = 512
+LEAST_TILE = 64
+# The finest solution has at most this share of the grid's triangles, and at most so many, unless more are asked for.
+FINEST = 0.1
+MOST_TRIANGLES = 1_200_000
+# From row to row the slope grows by this factor, the number of triangles falls by about a ninth.
+SLOPE_STEP = 1.2
+# Phases that thin less than this share of the vertices make no row; the next step is twice as large.
+LEAST_CHANGE = 0.01
+# Samples for each vertex, above which only every second row and column of them is looked at.
+ENOUGH_SAMPLES = 64
+# Where one tile holds everything, each solution has this share of vertices less than the one before.
+LAST_STEP = 0.1
+SHIFTS = (0.0, 1 / 3, 2 / 3)
+
+# Called with (share done, what is being done).
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TiledFront:
+    """A nested front of a height grid, from fine to coarse.
+
+    Attributes
+    ----------
+    grid : HeightGrid
+        The grid.
+    samples : (V,) int array
+        Numbers of the samples that the finest solution keeps, ascending.
+    level : (V,) float array
+        The slope at which each goes: error for each triangle [model units]; infinite: never.
+    slope : (S,) float array
+        The slope of each solution, ascending: it keeps the samples of higher level.
+    quality : tuple of Quality
+        Measured over all samples; triangles descending, error ascending.
+    """
+
+    grid: HeightGrid
+    samples: IntArray
+    level: FloatArray
+    slope: FloatArray
+    quality: tuple[Quality, ...]
+
+    def __len__(self) -> int:
+        return len(self.quality)
+
+    @property
+    def F(self) -> FloatArray:
+        """The objectives, (S, 2): error [model units] and triangles."""
+        return np.array([[q.error, q.triangles] for q in self.quality])
+
+    def kept(self, row: int) -> IntArray:
+        """Return the numbers of the samples that a solution keeps, ascending."""
+        if not 0 <= row < len(self):
+            raise ValueError(f"there is no solution {row}; the front has the solutions 0 to {len(self) - 1}")
+        return self.samples[self.level > self.slope[row]]
+
+    def slope_of(self, triangles: int) -> float:
+        """Return the least slope whose mesh has at most so many triangles.
+
+        On a rectangle V vertices, B of them on its sides, have 2 V - 2 - B Delaunay triangles.
+
+        Raises
+        ------
+        ValueError
+            If it is less than 2, the least there is.
+        """
+        if triangles < 2:
+            raise ValueError(f"a mesh of {self.grid.name} has at least 2 triangles, not {triangles}")
+        rows, columns = self.grid.shape
+        row, column = np.divmod(self.samples, columns)
+        inside = (row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1)
+        order = np.argsort(-self.level, kind="stable")
+        count = np.cumsum(1 + inside[order]) - 2
+        level = self.level[order]
+        # all samples of one level go together
+        last = np.flatnonzero(np.r_[level[1:] < level[:-1], True])
+        most = last[np.flatnonzero(count[last] <= triangles)[-1]]
+        return float(level[most + 1]) if most + 1 < len(level) else float(self.slope[0])
+
+    def with_slope(self, slope: float, *, threads: int = 1) -> TiledFront:
+        """Return the front with one more solution, of this slope, measured; the same one if it has it already."""
+        if slope in self.slope:
+            return self
+        at = int(np.searchsorted(self.slope, slope))
+        if at == 0:
+            raise ValueError(f"slope {slope:g} is below that of the finest solution, {self.slope[0]:g}")
+        quality = measure(self.grid, weld(self.grid, self.samples[self.level > slope]), n_threads=threads)
+        return replace(
+            self,
+            slope=np.insert(self.slope, at, slope),
+            quality=(*self.quality[:at], quality, *self.quality[at:]),
+        )
+
+
+class Memory:
+    """Keeps finished pieces of work for this call only; see :class:`Folder`."""
+
+    def __init__(self) -> None:
+        self.pieces: dict[str, dict[str, npt.NDArray[Any]]] = {}
+
+    def get(self, name: str) -> dict[str, npt.NDArray[Any]] | None:
+        """Return a piece, or None."""
+        return self.pieces.get(name)
+
+    def put(self, name: str, **arrays: npt.NDArray[Any]) -> None:
+        """Keep a piece."""
+        self.pieces[name] = arrays
+
+    def drop(self, start: str) -> None:
+        """Forget the pieces whose names begin like this."""
+        for name in [name for name in self.pieces if name.startswith(start)]:
+            del self.pieces[name]
+
+
+class Folder:
+    """Keeps finished pieces of work in a folder, each whole or not at all, for a call that goes on.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; made if need be.
+    what : mapping
+        What the pieces belong to: the grid and the settings.
+
+    Raises
+    ------
+    ResultError
+        If the folder holds pieces of something else.
+    """
+
+    def __init__(self, path: Path, what: dict[str, Any]) -> None:
+        self.path = path
+        record = path / "what.json"
+        text = json.dumps(what, indent=1, sort_keys=True) + "\n"
+        if record.exists() and record.read_text(encoding="utf-8") != text:
+            raise ResultError(
+                f"{path}: holds unfinished tiles of another model or of other settings; name another folder, or allow "
+                "overwriting (--overwrite) to begin anew"
+            )
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise ResultError(f"{path}: cannot be made ({problem.strerror}); name another folder") from None
+        if not record.exists():
+            with new_file(record) as partial:
+                partial.write_text(text, encoding="utf-8")
+
+    def get(self, name: str) -> dict[str, npt.NDArray[Any]] | None:
+        """Return a piece; None if there is none, or it is damaged."""
+        try:
+            with (self.path / f"{name}.npz").open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+                return {key: file[key] for key in file.files}
+        except Exception:  # absent, cut off or with flipped bits, which the archive's checksums tell: done again
+            return None
+
+    def put(self, name: str, **arrays: npt.NDArray[Any]) -> None:
+        """Keep a piece."""
+        with new_file(self.path / f"{name}.npz") as partial:
+            np.savez(partial, **arrays)  # type: ignore[arg-type]
+
+    def drop(self, start: str) -> None:
+        """Remove the pieces whose names begin like this."""
+        for path in self.path.glob(f"{start}*.npz"):
+            path.unlink(missing_ok=True)
+
+
+def settings(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> dict[str, Any]:
+    """Return what the pieces of a call of :func:`tiled_front` depend on, and check it.
+
+    Raises
+    ------
+    ValueError
+        If the tile or the finest solution is out of range.
+    """
+    if tile < LEAST_TILE:
+        raise ValueError(f"tile is {tile}; a tile needs at least {LEAST_TILE} samples along its side")
+    if most is not None and most < 2:
+        raise ValueError(f"most is {most}; a mesh of the grid has at least 2 triangles")
+    return {
+        "model": grid.hash,
+        "tile": tile,
+        "most": most or max(2, min(int(FINEST * grid.n_triangles), MOST_TRIANGLES)),
+        "slope_step": SLOPE_STEP,
+        "enough_samples": ENOUGH_SAMPLES,
+        "format": 1,
+    }
+
+
+def tiled_front(
+    grid: HeightGrid,
+    *,
+    tile: int = TILE,
+    most: int | None = None,
+    engine: Engine | None = None,
+    store: Folder | Memory | None = None,
+    threads: int = 1,
+    progress: Progress | None = None,
+) -> TiledFront:
+    """Thin a height grid tile by tile to a whole front.
+
+    Parameters
+    ----------
+    grid : HeightGrid
+        The grid of N samples.
+    tile : int
+        Samples along one side of a tile. Memory: about 600 bytes for each sample of a tile and worker, and 40 bytes
+        for each vertex of the finest solution.
+    most : int, optional
+        Triangles of the finest solution, about; by default a tenth of the grid's, but not above 1 200 000.
+    engine : Engine, optional
+        Where the tiles are thinned; in this process by default. The front does not depend on it.
+    store : Folder or Memory, optional
+        Where finished tiles are kept; with a folder an interrupted call is continued.
+    threads : int
+        Threads that measure the solutions.
+    progress : callable, optional
+        Told about the progress.
+
+    Returns
+    -------
+    TiledFront
+    """
+    setting = settings(grid, tile=tile, most=most)
+    work = _Work(grid, tile, engine or Serial(), store or Memory(), progress or (lambda share, text: None))
+    samples, slope = work.start(setting["most"] // 2)
+    level = np.full(len(samples), np.inf)
+    slopes = [slope]
+    n_kept, n_row = len(samples), len(samples)
+    phase, stride, step = len(SHIFTS), 1, SLOPE_STEP
+    while True:
+        while ENOUGH_SAMPLES * stride**2 * n_kept < grid.n_samples:
+            stride *= 2
+        if work.is_one_tile(stride):
+            break
+        before, slope = slope, slope * step
+        removed, at = work.phase(phase, stride, slope, samples[np.isinf(level)])
+        level[np.searchsorted(samples, removed)] = np.minimum(_above(before, at), slope)
+        phase += 1
+        n_kept -= len(removed)
+        if n_kept <= (1.0 - LEAST_CHANGE) * n_row:
+            slopes.append(slope)
+            n_row, step = n_kept, SLOPE_STEP
+        else:
+            step *= 2.0
+    removed, at = work.finish(stride, samples[np.isinf(level)])
+    cuts = _last_cuts(at, len(grid.corners))
+    at = _above(slope, _ascending(at))
+    level[np.searchsorted(samples, removed)] = at
+    slopes += at[cuts - 1].tolist()
+    quality = work.measure(samples, level, slopes, threads)
+    # a solution that is not better than a smaller one is none
+    errors = np.array([q.error for q in quality])
+    best = errors < np.r_[np.minimum.accumulate(errors[::-1])[::-1][1:], np.inf]
+    return TiledFront(
+        grid,
+        samples,
+        level,
+        np.array(slopes)[best],
+        tuple(q for q, is_best in zip(quality, best, strict=True) if is_best),
+    )
+
+
+def _above(slope: float, level: FloatArray) -> FloatArray:
+    """Raise levels that are not above a slope to just above it, in their order."""
+    low = np.flatnonzero(level <= slope)
+    rank = np.empty(len(low))
+    rank[np.argsort(level[low], kind="stable")] = np.arange(1, len(low) + 1)
+    raised = level.copy()
+    raised[low] = slope * (1.0 + rank * 1e-12)
+    return raised
+
+
+def _ascending(level: FloatArray) -> FloatArray:
+    """Lower levels that do not descend by next to nothing, so that each is above the one before.
+
+    Then a front can be cut between any two vertices, off the hulls too: all of them are meshes.
+    """
+    n_after = np.arange(len(level))[::-1]
+    return level - np.abs(level) * n_after * 1e-12
+
+
+def _last_cuts(level: FloatArray, n_corners: int) -> IntArray:
+    """Return how many samples are gone in each of the last solutions: along the hull, but with steps that are not long.
+
+    Parameters
+    ----------
+    level : (n,) float array
+        Ascending; samples of one level belong to one side of the hull.
+    n_corners : int
+        Samples that never go.
+    """
+    on_hull = np.flatnonzero(np.r_[level[1:] > level[:-1], True]) + 1
+    cuts = []
+    n_gone = 0
+    while n_gone < len(level):
+        step = max(1, int(LAST_STEP * (len(level) - n_gone + n_corners)))
+        near = on_hull[(on_hull > n_gone) & (on_hull <= n_gone + 2 * step)]
+        n_gone = int(near[np.argmin(np.abs(near - n_gone - step))]) if len(near) else n_gone + step
+        cuts.append(n_gone)
+    return np.array(cuts, np.int64)
+
+
+def cut_axis(n: int, tile: int, shift: float, stride: int = 1) -> IntArray:
+    """Return the samples along one axis at which tiles begin and end.
+
+    Parameters
+    ----------
+    n : int
+        Samples along the axis.
+    tile : int
+        Wanted number of samples that count along a tile's side; the true one is 2/3 to 3/2 of it.
+    shift : float
+        Share of a tile's side by which all inner cuts are shifted.
+    stride : int
+        Every how many samples one counts; cuts are at those.
+
+    Returns
+    -------
+    (k,) int array
+        Ascending, from 0 to n - 1.
+
+    Examples
+    --------
+    >>> cut_axis(301, 100, 0.0).tolist(), cut_axis(301, 100, 1 / 3).tolist()
+    ([0, 100, 200, 300], [0, 133, 233, 300])
+    """
+    number = max(1, round((n - 1) / (tile * stride)))
+    size = (n - 1) / number
+    inner = np.round((np.arange(number) + shift) * size / stride).astype(np.int64) * stride
+    away = (inner >= 0.5 * size) & (inner <= n - 1 - 0.5 * size)
+    return np.array([0, *inner[away & (number > 1)], n - 1], np.int64)
+
+
+class _Work:
+    """One call's work on a grid."""
+
+    def __init__(
+        self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | Memory, progress: Progress
+    ) -> None:
+        self.grid = grid
+        self.tile = tile
+        self.engine = engine
+        self.store = store
+        self.progress = progress
+        self.domain = np.array([grid.x[0], grid.x[-1], grid.y[-1], grid.y[0]])
+
+    def is_one_tile(self, stride: int) -> bool:
+        """Whether at this stride one tile holds the whole."""
+        return all(len(cut_axis(n, self.tile, 0.0, stride)) == 2 for n in self.grid.shape)
+
+    def boxes(self, shift: float, stride: int) -> list[tuple[int, int, int, int]]:
+        """Return first and last row, first and last column of each tile."""
+        rows, columns = (cut_axis(n, self.tile, shift, stride).tolist() for n in self.grid.shape)
+        return [
+            (top, bottom, left, right)
+            for top, bottom in pairwise(rows)
+            for left, right in pairwise(columns)
+        ]
+
+    def task(self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None) -> Tile:
+        """Return what a tile's task needs to know."""
+        grid, n_columns = self.grid, self.grid.shape[1]
+        top, bottom, left, right = box
+        rows, columns = _strided(top, bottom, stride), _strided(left, right, stride)
+        sites = site_xy = site_z = None
+        if kept is not None:
+            low, high = np.searchsorted(kept, [top * n_columns, (bottom + 1) * n_columns])
+            column = kept[low:high] % n_columns
+            sites = kept[low:high][(column >= left) & (column <= right)]
+            site_xy, site_z = grid.xy_at(sites), grid.height_at(sites)
+        return Tile(
+            name=f"{grid.name}, rows {top} to {bottom}, columns {left} to {right}",
+            rows=rows,
+            columns=columns,
+            heights=grid.window(rows, columns),
+            x=grid.x[columns],
+            y=grid.y[rows],
+            sites=sites,
+            site_xy=site_xy,
+            site_z=site_z,
+            n_columns=n_columns,
+            corners=grid.corners,
+            domain=self.domain,
+            unit=grid.unit,
+            stride=stride,
+            limit=limit,
+        )
+
+    def thin(
+        self, name: str, shift: float, stride: int, limit: float, kept: IntArray | None
+    ) -> Iterator[tuple[int, IntArray, FloatArray]]:
+        """Thin all tiles that are not in the store; yield (tile, removed, level) of all, in their order."""
+        boxes = self.boxes(shift, stride)
+        missing = [k for k in range(len(boxes)) if self.store.get(f"{name}_{k}") is None]
+        n_done = len(boxes) - len(missing)
+        tasks = (self.task(boxes[k], stride, limit, kept) for k in missing)
+        for place, (removed, level) in self.engine.each(_thin, tasks):
+            if kept is None:  # nearly all samples of the grid: in half the space
+                level = level.astype(np.float32)
+                removed = removed.astype(np.min_scalar_type(self.grid.n_samples))
+            self.store.put(f"{name}_{missing[place]}", removed=removed, level=level)
+            n_done += 1
+            n_left = 1.0 if kept is None else len(kept) / self.grid.n_samples
+            share = 0.6 * n_done / len(boxes) if kept is None else 0.6 + 0.2 * (1.0 - n_left) ** 8
+            self.progress(share, f"tile {n_done} of {len(boxes)}")
+        for k in range(len(boxes)):
+            piece = self.store.get(f"{name}_{k}")
+            if piece is None:
+                raise ResultError(
+                    f"{self.grid.name}: a finished tile was stored, but is gone or damaged; start the same call again"
+                )
+            yield k, piece["removed"], piece["level"]
+
+    def start(self, n_vertices: int) -> tuple[IntArray, float]:
+        """Return the finest row: thin all tiles to the end, find the slope, and go over the tiles' edges."""
+        stored = self.store.get("start")
+        if stored is not None:
+            return stored["kept"], float(stored["slope"])
+        n = self.grid.n_samples
+        histogram = np.zeros(1 << 16, np.int64)
+        greatest = 0.0
+        for _, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
+            histogram += np.bincount(_bins(level), minlength=len(histogram))
+            greatest = max(greatest, float(level.max(initial=0.0)))
+        # What the finest row is to keep, of the vertices that were free; those that were not will be in their turn.
+        most = int(histogram.sum()) * n_vertices / n
+        above = histogram[::-1].cumsum()[::-1]
+        # the least bin such that no more than wanted are above it
+        bin_ = int(np.argmax(np.r_[above[1:], 0] <= most))
+        slope = max(_bin_end(bin_), 1e-9 * greatest) or 1.0
+        keep = np.ones(n, bool)
+        for _, removed, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
+            keep[removed[level <= slope]] = False
+        kept = np.flatnonzero(keep)
+        del keep
+        for phase in range(1, len(SHIFTS)):
+            removed, _ = self.phase(phase, 1, slope, kept)
+            kept = np.setdiff1d(kept, removed, assume_unique=True)
+        self.store.put("start", kept=kept, slope=np.array(slope))
+        self.store.drop("start_")
+        return kept, slope
+
+    def phase(self, phase: int, stride: int, slope: float, kept: IntArray) -> tuple[IntArray, FloatArray]:
+        """Thin the tiles of a phase to a slope; return the samples in the order in which they go, and their levels."""
+        name = f"phase_{phase:04d}"
+        stored = self.store.get(name)
+        if stored is None:
+            found = [piece[1:] for piece in self.thin(name, SHIFTS[phase % len(SHIFTS)], stride, slope, kept)]
+            removed, level = (np.concatenate(column) for column in zip(*found, strict=True))
+            order = np.argsort(level, kind="stable")
+            stored = {"removed": removed[order], "level": _ascending(level[order])}
+            self.store.put(name, **stored)
+            self.store.drop(f"{name}_")
+        return stored["removed"], stored["level"]
+
+    def finish(self, stride: int, kept: IntArray) -> tuple[IntArray, FloatArray]:
+        """Thin what is left to the end, as one tile; return the samples in the order in which they go, and levels."""
+        stored = self.store.get("finish")
+        if stored is None:
+            (box,) = self.boxes(0.0, stride)
+            ((_, (removed, level)),) = self.engine.each(_thin, [self.task(box, stride, np.inf, kept)])
+            stored = {"removed": removed, "level": level}
+            self.store.put("finish", **stored)
+        return stored["removed"], stored["level"]
+
+    def measure(self, samples: IntArray, level: FloatArray, slopes: list[float], threads: int) -> list[Quality]:
+        """Measure the solutions of these slopes over all samples."""
+        quality = []
+        for k, slope in enumerate(slopes):
+            name = f"quality_{k:04d}"
+            stored = self.store.get(name)
+            if stored is None:
+                q = measure(self.grid, weld(self.grid, samples[level > slope]), n_threads=threads)
+                numbers = (q.error, q.triangles, q.vertices, q.mean_error, q.rms_error, q.max_error, q.uncovered)
+                self.store.put(name, numbers=np.array(numbers, np.float64))
+            else:
+                error, triangles, vertices, mean, rms, most, uncovered = stored["numbers"].tolist()
+                q = Quality(error, int(triangles), int(vertices), mean, rms, most, int(uncovered))
+            quality.append(q)
+            self.progress(0.8 + 0.2 * (k + 1) / len(slopes), f"solution {k + 1} of {len(slopes)} measured")
+        return quality
+
+
+def _thin(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
+    return thin_tile(task)
+
+
+def _strided(first: int, last: int, stride: int) -> IntArray:
+    """Every stride-th number from first to last, and the last."""
+    numbers = np.arange(first, last + 1, stride, dtype=np.int64)
+    return numbers if numbers[-1] == last else np.append(numbers, last)
+
+
+def _bins(level: FloatArray) -> IntArray:
+    """Return the number of the bin of each level: equal ratios of 2**-8 or less, 0 for what is not positive."""
+    return (np.maximum(level, 0.0).astype(np.float32).view(np.int32) >> 15).astype(np.int64)
+
+
+def _bin_end(bin_: int) -> float:
+    """Return the greatest number of a bin."""
+    return float(np.array([((bin_ + 1) << 15) - 1], np.int32).view(np.float32)[0])

@@ -1,0 +1,358 @@
+"""One tile: its own nested front while everything beyond it stays as it is.
+
+A triangle of the tile's sites whose circle lies in the tile is a triangle of the whole triangulation, since no site
+elsewhere can be in its circle. A site is *free* while all triangles around it are of that kind; it stays so while free
+sites are removed, as what fills a star depends on the star alone [1]_. So thinning the free sites of a tile by the
+exact change of its error is thinning of the whole, in another order; and as stars of free sites lie in their tile,
+tiles can be thinned at the same time.
+
+The change of the error is that over the samples of the tile, or over every second, fourth, ... row and column of them
+(``stride``), each standing for the others: once a triangle covers hundreds of samples, they say the same.
+
+References
+----------
+.. [1] O. Devillers, "On deletion in Delaunay triangulations", Int. J. Computational Geometry & Applications 12, 2002.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from meshsimp_pymoo.baselines.greedy import _sift_down, _sift_up
+from meshsimp_pymoo.geometry.live import (
+    END,
+    N_EMITTED,
+    Ground,
+    Live,
+    _star,
+    _total,
+    build,
+    make_ground,
+    make_live,
+    remove,
+    try_remove,
+)
+from meshsimp_pymoo.geometry.model import OpenModel, vector_order
+from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+# Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
+FORESIGHT = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """What a tile's task needs to know: everything, so that it can be done on any machine.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    rows, columns : (h,), (w,) int arrays
+        The samples that count, ascending, the tile's border included.
+    heights : (h, w) float array
+        Their heights [model units].
+    x, y : (w,), (h,) float arrays
+        Where the columns and rows are in the unit square.
+    sites : (n,) int array, or None
+        Numbers of the samples kept so far in the tile, ascending; None: all.
+    site_xy, site_z : (n, 2), (n,) float arrays, or None
+        Their coordinates and heights.
+    n_columns : int
+        Columns of the whole grid: sample ``row * n_columns + column``.
+    corners : (4,) int array
+        The whole grid's corner samples, which always stay.
+    domain : (4,) float array
+        The whole grid in the unit square: least and largest x, least and largest y.
+    unit : float
+        Side of the unit square [model units].
+    stride : int
+        Distance of the rows and columns that count.
+    limit : float
+        Error that a triangle may be worth, for it to go [model units]; infinite: all go.
+    """
+
+    name: str
+    rows: IntArray
+    columns: IntArray
+    heights: FloatArray
+    x: FloatArray
+    y: FloatArray
+    sites: IntArray | None
+    site_xy: FloatArray | None
+    site_z: FloatArray | None
+    n_columns: int
+    corners: IntArray
+    domain: FloatArray
+    unit: float
+    stride: int
+    limit: float
+
+
+def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
+    """Thin the free sites of a tile.
+
+    Parameters
+    ----------
+    tile : Tile
+        The tile.
+
+    Returns
+    -------
+    removed : (m,) int array
+        Numbers of the samples that may go, in the order in which they go.
+    level : (m,) float array
+        The slope at which each goes: error for each triangle along the lower convex hull of the tile's own front,
+        ascending, at most ``tile.limit`` [model units].
+    """
+    number, xy, z, weight, is_site, is_ours = _samples(tile)
+    order = vector_order(xy, z)
+    number, xy, z, is_site, is_ours = number[order], xy[order], z[order], is_site[order], is_ours[order]
+    box = np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
+    corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
+    model = _model(tile, number, xy, z, None if weight is None else weight[order], corners)
+    sites = np.flatnonzero(is_site)
+    ground = make_ground(model, footprint="hull", outside="ignore")
+    live = make_live(len(z))
+    build(ground, live, model, sites)
+    fixed = np.isin(number, tile.corners) | ~is_ours
+    # beyond the whole grid there is nothing that a circle could hold
+    open_sides = np.where(box == tile.domain, np.array([-np.inf, np.inf, -np.inf, np.inf]), box)
+    _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
+    n = int((~fixed[sites]).sum())
+    removed = np.empty(n, np.int64)
+    error = np.empty(n + 1)
+    triangles = np.empty(n + 1, np.int64)
+    n_removed = _thin_to(ground, live, sites, fixed, FORESIGHT * 2.0 * tile.limit, removed, error, triangles)
+    level = hull_levels(triangles[0] - triangles[: n_removed + 1], error[: n_removed + 1])
+    n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
+    return number[removed[:n_wanted]], level[:n_wanted]
+
+
+def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
+    """Return the slope of the lower convex hull under each step of a front.
+
+    Parameters
+    ----------
+    saved : (m + 1,) int array
+        Triangles saved so far, strictly ascending from 0.
+    error : (m + 1,) float array
+        Error there.
+
+    Returns
+    -------
+    (m,) float array
+        Ascending. Cutting at any slope s, after the last step of at most s, is the point of the front with the least
+        error + s * triangles.
+
+    Examples
+    --------
+    The second step is dear, but the third one makes up for it: both are done at once, or neither.
+
+    >>> hull_levels(np.arange(4), np.array([0.0, 1.0, 4.0, 5.0]))
+    array([1., 2., 2.])
+    """
+    return _hull_levels(np.ascontiguousarray(saved, np.int64), np.ascontiguousarray(error, np.float64))
+
+
+@njit(cache=True, nogil=True)
+def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
+    m = len(saved)
+    hull = np.empty(m, np.int64)
+    n = 0
+    for k in range(m):
+        while n >= 2:
+            a = hull[n - 2]
+            b = hull[n - 1]
+            if (error[b] - error[a]) * (saved[k] - saved[a]) < (error[k] - error[a]) * (saved[b] - saved[a]):
+                break
+            n -= 1
+        hull[n] = k
+        n += 1
+    level = np.empty(max(m - 1, 0))
+    for q in range(n - 1):
+        a = hull[q]
+        b = hull[q + 1]
+        slope = (error[b] - error[a]) / (saved[b] - saved[a])
+        for k in range(a, b):
+            level[k] = slope
+    # rounding may turn two almost equal slopes around
+    for k in range(1, m - 1):
+        level[k] = max(level[k], level[k - 1])
+    return level
+
+
+def _samples(
+    tile: Tile,
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray | None, BoolArray, BoolArray]:
+    """Put a tile's samples together: number, place, height, weight (None: 1), whether a site, whether really kept.
+
+    The corners of the tile are sites in any case, so that all samples are covered; those that are not kept are not ours
+    to change, nor is anything at a triangle with them.
+    """
+    grid = (tile.rows[:, None] * tile.n_columns + tile.columns).ravel()
+    xy = np.column_stack([np.tile(tile.x, len(tile.y)), np.repeat(tile.y, len(tile.x))])
+    z = tile.heights.ravel()
+    if tile.sites is None or tile.site_xy is None or tile.site_z is None:
+        everywhere = np.ones(len(z), bool)
+        return grid, xy, z, None, everywhere, everywhere.copy()
+    kept = np.isin(grid, tile.sites, assume_unique=True)
+    extra = ~np.isin(tile.sites, grid, assume_unique=True)
+    n_extra = int(extra.sum())
+    is_ours = np.ones(len(z) + n_extra, bool)
+    is_site = np.concatenate([kept, np.ones(n_extra, bool)])
+    h, w = len(tile.rows), len(tile.columns)
+    corner = np.array([0, w - 1, (h - 1) * w, h * w - 1])
+    is_ours[corner] = kept[corner]
+    is_site[corner] = True
+    # a site between the rows that count covers nothing that they do not stand for
+    weight = np.concatenate([np.full(len(z), float(tile.stride) ** 2), np.zeros(n_extra)])
+    return (
+        np.concatenate([grid, tile.sites[extra]]),
+        np.concatenate([xy, tile.site_xy[extra]]),
+        np.concatenate([z, tile.site_z[extra]]),
+        None if tile.stride == 1 else weight,
+        is_site,
+        is_ours,
+    )
+
+
+def _model(
+    tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: FloatArray | None, corners: IntArray
+) -> OpenModel:
+    """Return the tile as a model: the arrays that triangulating needs, and two faces for its extent."""
+    points = np.column_stack([xy * tile.unit, z])
+    a, b, c, d = corners[np.lexsort((xy[corners, 0], xy[corners, 1]))]
+    return OpenModel(
+        name=tile.name,
+        points=points,
+        faces=np.array([[a, b, d], [a, d, c]], np.int32),
+        corners=np.sort(corners).astype(np.int64),
+        source_index=number,
+        file_points=points,
+        attributes={},
+        up=np.array([0.0, 0.0, 1.0]),
+        rotation=np.eye(3),
+        pivot=np.zeros(3),
+        offset=np.zeros(3),
+        xy=np.ascontiguousarray(xy),
+        unit=tile.unit,
+        weights=weight,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _fix_foreign(
+    xy: np.ndarray,
+    mesh: np.ndarray,
+    end: int,
+    foreign: np.ndarray,
+    box: np.ndarray,
+    domain: np.ndarray,
+    fixed: np.ndarray,
+) -> None:
+    """Fix the corners of all triangles that need not be triangles of the whole.
+
+    ``box`` is what the tile knows of: least and largest x, least and largest y, infinite where the whole ends.
+    """
+    for t in range(0, end, RECORD):
+        a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
+        if (a | b | c) > LAST_INDEX:
+            # A circle through both ends of an edge on the tile's side reaches beyond it: the triangle inside tells.
+            continue
+        known = not (foreign[a] or foreign[b] or foreign[c])
+        if known:
+            ux = xy[2 * b] - xy[2 * a]
+            uy = xy[2 * b + 1] - xy[2 * a + 1]
+            vx = xy[2 * c] - xy[2 * a]
+            vy = xy[2 * c + 1] - xy[2 * a + 1]
+            area = 2.0 * (ux * vy - uy * vx)
+            uu = ux * ux + uy * uy
+            vv = vx * vx + vy * vy
+            sx = (vy * uu - uy * vv) / area
+            sy = (ux * vv - vx * uu) / area
+            rr = sx * sx + sy * sy
+            sx += xy[2 * a]
+            sy += xy[2 * a + 1]
+            # How far the circle reaches within the whole grid: beyond its sides there is nothing.
+            over_x = max(max(sx - domain[1], domain[0] - sx), 0.0)
+            over_y = max(max(sy - domain[3], domain[2] - sy), 0.0)
+            reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
+            reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
+            known = (
+                sx - reach_x >= box[0]
+                and sx + reach_x <= box[1]
+                and sy - reach_y >= box[2]
+                and sy + reach_y <= box[3]
+            )
+        if not known:
+            fixed[a] = True
+            fixed[b] = True
+            fixed[c] = True
+
+
+@njit(cache=True, nogil=True)
+def _thin_to(
+    g: Ground,
+    live: Live,
+    sites: np.ndarray,
+    fixed: np.ndarray,
+    limit: float,
+    removed: np.ndarray,
+    error: np.ndarray,
+    triangles: np.ndarray,
+) -> int:
+    """Remove the vertex whose removal adds the least error, while that is at most ``limit``; return how many went."""
+    n_all = len(g.z)
+    key = np.full(n_all, np.inf)
+    heap = np.empty(len(sites), np.int32)
+    at = np.full(n_all, -1, np.int32)
+    n = 0
+    for k in range(len(sites)):
+        v = sites[k]
+        if not fixed[v]:
+            key[v], _ = try_remove(g, live, v)
+            heap[n] = v
+            at[v] = n
+            n += 1
+    for k in range(n // 2 - 1, -1, -1):
+        _sift_down(heap, at, key, k, n)
+    error[0] = _total(live)
+    triangles[0] = live.tally[N_EMITTED]
+    n_removed = 0
+    around = np.empty(len(live.ring), np.int64)
+    while n > 0 and key[heap[0]] < np.inf and key[heap[0]] <= limit:
+        v = heap[0]
+        n -= 1
+        heap[0] = heap[n]
+        at[heap[0]] = 0
+        at[v] = -1
+        if n > 0:
+            _sift_down(heap, at, key, 0, n)
+        m = _star(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
+        for k in range(m):
+            around[k] = np.int64(live.ring[k])
+        if not remove(g, live, v):
+            continue
+        removed[n_removed] = v
+        n_removed += 1
+        error[n_removed] = _total(live)
+        triangles[n_removed] = live.tally[N_EMITTED]
+        for k in range(m):
+            w = around[k]
+            if w > LAST_INDEX or at[w] < 0:
+                continue
+            old = key[w]
+            key[w], _ = try_remove(g, live, w)
+            if key[w] < old:
+                _sift_up(heap, at, key, at[w])
+            else:
+                _sift_down(heap, at, key, at[w], n)
+    return n_removed

@@ -1,0 +1,242 @@
+"""The mesh of a kept subset of a height grid, and its error over all samples.
+
+The mesh is the Delaunay triangulation of the kept samples, the same triangles that
+:func:`~meshsimp_pymoo.geometry.error.simplify` gives for the same subset of the same grid in memory. Its error is added
+up over all samples, band by band, so that memory holds the mesh and a few rows of heights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from meshsimp_pymoo.geometry.error import Quality
+from meshsimp_pymoo.geometry.model import vector_order
+from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD, locate, triangulate
+from meshsimp_pymoo.tiles.grid import HeightGrid
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class WeldedMesh:
+    """A triangulated subset of a grid.
+
+    Attributes
+    ----------
+    samples : (V,) int array
+        Numbers of its vertices' samples, in vector order.
+    xy, z : (V, 2), (V,) float arrays
+        Their coordinates in the unit square and heights [file units].
+    records : uint32 array
+        The triangles with their neighbours; see :mod:`meshsimp_pymoo.geometry.triangulation`.
+    """
+
+    samples: IntArray
+    xy: FloatArray
+    z: FloatArray
+    records: npt.NDArray[np.uint32]
+
+    @property
+    def faces(self) -> IntArray:
+        """The triangles (M, 3) as rows of ``samples``, counter-clockwise from above, the least row first, sorted."""
+        corners = self.records.reshape(-1, RECORD)[:, :3]
+        faces = corners[corners.max(axis=1) <= LAST_INDEX].astype(np.int64)
+        turn = faces.argmin(axis=1)
+        rows = np.arange(len(faces))
+        faces = np.stack([faces[rows, (turn + k) % 3] for k in range(3)], axis=1)
+        return faces[np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))]
+
+    @property
+    def n_triangles(self) -> int:
+        """Number of triangles."""
+        corners = self.records.reshape(-1, RECORD)[:, :3]
+        return int((corners.max(axis=1) <= LAST_INDEX).sum())
+
+
+def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
+    """Triangulate kept samples.
+
+    Parameters
+    ----------
+    grid : HeightGrid
+        The grid.
+    kept : (V,) int array
+        Numbers of the samples, the four corners among them.
+
+    Raises
+    ------
+    ValueError
+        If a corner is missing: the mesh would not cover the grid.
+    """
+    kept = np.sort(np.asarray(kept, np.int64))
+    if not np.isin(grid.corners, kept).all():
+        raise ValueError(f"the {len(kept)} samples lack a corner of {grid.name}; keep all four")
+    xy, z = grid.xy_at(kept), grid.height_at(kept)
+    order = vector_order(xy, z)
+    samples, xy, z = kept[order], np.ascontiguousarray(xy[order]), z[order]
+    first = np.flatnonzero(np.isin(samples, grid.corners)).astype(np.int64)
+    records = np.empty(16 * len(samples), np.uint32)
+    end = triangulate(
+        xy.ravel(), len(samples), first, np.empty(0, np.int64), np.empty(len(samples), np.uint8), records,
+        *grid.exact_ranges,
+    )  # fmt: skip
+    return WeldedMesh(samples, xy, z, records[:end])
+
+
+def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Quality:
+    """Measure a mesh over all samples of the grid.
+
+    The sums are taken row by row and then over the rows, so they do not depend on the number of threads.
+    """
+    n_rows = grid.shape[0]
+    table = np.zeros((n_rows, 3))
+    flat = np.ascontiguousarray(mesh.xy).ravel()
+    bounds = np.linspace(0, n_rows, n_threads + 1).astype(int)
+
+    def do(part: int) -> None:
+        t = 0
+        for row, band in grid.bands(first=bounds[part], end=bounds[part + 1]):
+            rows = slice(row, row + len(band))
+            t = _measure_rows(
+                grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table[rows]
+            )
+
+    if n_threads == 1:
+        do(0)
+    else:
+        with ThreadPoolExecutor(n_threads) as pool:
+            list(pool.map(do, range(n_threads)))
+    n = grid.n_samples
+    error, squares, maximum = float(table[:, 0].sum()), float(table[:, 1].sum()), float(table[:, 2].max())
+    return Quality(
+        error=error,
+        triangles=mesh.n_triangles,
+        vertices=len(mesh.samples),
+        mean_error=error / n,
+        rms_error=float(np.sqrt(squares / n)),
+        max_error=maximum,
+        uncovered=0,
+    )
+
+
+def pieces(grid: HeightGrid, mesh: WeldedMesh, size: int) -> Iterator[tuple[int, int, IntArray, IntArray]]:
+    """Cut a mesh into tiles along its own edges: every triangle goes to the tile that its centroid lies in.
+
+    Neighbouring pieces share the vertices and edges between them, so they meet without cracks and without vertices in
+    the middle of an edge.
+
+    Parameters
+    ----------
+    grid : HeightGrid
+        The grid.
+    mesh : WeldedMesh
+        The mesh.
+    size : int
+        Samples along one side of a tile.
+
+    Yields
+    ------
+    (int, int, (v,) int array, (m, 3) int array)
+        Row and column of the tile, from the north-west; its samples; its triangles as rows of those. Tiles without a
+        triangle are left out.
+    """
+    faces = mesh.faces
+    row, column = np.divmod(mesh.samples, grid.shape[1])
+    tile_row = row[faces].sum(axis=1) // (3 * size)
+    tile_column = column[faces].sum(axis=1) // (3 * size)
+    number = tile_row * (grid.shape[1] // size + 1) + tile_column
+    order = np.argsort(number, kind="stable")
+    starts = np.flatnonzero(np.r_[True, np.diff(number[order]) > 0])
+    for group in np.split(order, starts[1:]):
+        used, compact = np.unique(faces[group], return_inverse=True)
+        yield int(tile_row[group[0]]), int(tile_column[group[0]]), mesh.samples[used], compact.reshape(-1, 3)
+
+
+def find_cracks(vertices: FloatArray, faces: IntArray) -> int:
+    """Count the edges that break a mesh of a rectangle: not in two triangles, or in one and not on a side.
+
+    Parameters
+    ----------
+    vertices : (V, 2) or (V, 3) float array
+        Positions.
+    faces : (M, 3) int array
+        Triangles.
+
+    Returns
+    -------
+    int
+        0 where the mesh covers the rectangle without a crack.
+
+    Examples
+    --------
+    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
+    >>> find_cracks(square, np.array([[0, 1, 2], [0, 2, 3]]))
+    0
+    >>> find_cracks(square, np.array([[0, 1, 2], [0, 4, 3], [4, 2, 3]]))      # the diagonal has a vertex on one side
+    3
+    """
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    edges.sort(axis=1)
+    _, first, count = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_index=True, return_counts=True)
+    ends = vertices[edges[first[count == 1]]][:, :, :2]
+    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
+    on_side = ((ends == low).all(axis=1) | (ends == high).all(axis=1)).any(axis=1)
+    return int((count > 2).sum() + (~on_side).sum())
+
+
+@njit(cache=True, nogil=True)
+def _measure_rows(
+    x: np.ndarray,
+    y: np.ndarray,
+    heights: np.ndarray,
+    xy: np.ndarray,
+    z: np.ndarray,
+    mesh: np.ndarray,
+    start: int,
+    exact_area: float,
+    table: np.ndarray,
+) -> int:
+    """Fill sum, sum of squares and maximum of the deviations of each row; return a triangle near the last row's begin.
+
+    In each row the surface is linear along x within a triangle, but it is worked out at every sample from the
+    triangle's corners, as everywhere.
+    """
+    begin = start
+    for r in range(len(y)):
+        t = begin
+        py = y[r]
+        total = 0.0
+        squares = 0.0
+        maximum = 0.0
+        for c in range(len(x)):
+            px = x[c]
+            t = locate(xy, mesh, t, px, py, exact_area)
+            if c == 0:
+                begin = t
+            i = mesh[t]
+            j = mesh[t + 1]
+            k = mesh[t + 2]
+            ax = xy[2 * i] - px
+            ay = xy[2 * i + 1] - py
+            bx = xy[2 * j] - px
+            by = xy[2 * j + 1] - py
+            cx = xy[2 * k] - px
+            cy = xy[2 * k + 1] - py
+            wa = bx * cy - by * cx
+            wb = cx * ay - cy * ax
+            wc = ax * by - ay * bx
+            d = abs((wa * z[i] + wb * z[j] + wc * z[k]) / (wa + wb + wc) - heights[r, c])
+            total += d
+            squares += d * d
+            maximum = max(maximum, d)
+        table[r, 0] = total
+        table[r, 1] = squares
+        table[r, 2] = maximum
+    return begin

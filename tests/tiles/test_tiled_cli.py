@@ -1,0 +1,206 @@
+"""``meshsimp simplify --tile``: what a person with a big height grid sees and gets."""
+
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.cli import tiled as tiled_command
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.geometry.load import read_source
+from meshsimp_pymoo.geometry.model import build_model, load_model
+from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.results import ResultError, write_mesh
+from meshsimp_pymoo.tiles.grid import open_grid
+from meshsimp_pymoo.tiles.output import read_tiled_front
+from meshsimp_pymoo.tiles.thin import thin_tile
+from meshsimp_pymoo.tiles.weld import find_cracks
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("grid") / "relief.npy"
+    grid = open_grid(build_model(load("jacksboro:4")))
+    np.save(path, grid.heights.astype(np.float32))
+    return path
+
+
+@pytest.fixture(scope="module")
+def out(path, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out") / "front"
+    call = ["simplify", str(path), "-o", str(out), "--tile", "64", "--triangles", "700", "--meshes", "4", "--jobs", "1"]
+    assert main([*call, "--spacing", "30"]) == 0
+    return out
+
+
+def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
+    assert {entry.name for entry in out.iterdir()} == {"front.csv", "nested.npz", "meshes", "chosen.ply", "run.json"}
+    assert len(list((out / "meshes").iterdir())) == 4
+    chosen = read_source(out / "chosen.ply")
+    assert 690 <= len(chosen.faces) <= 700
+    assert find_cracks(chosen.points, chosen.faces) == 0
+    record = json.loads((out / "run.json").read_text())
+    assert record["settings"]["tile"] == 64
+    assert record["model"]["vertices"] == np.load(path).size
+
+
+def test_an_independent_referee_agrees_with_the_front_of_a_mesh_whose_vertices_are_a_grid(tmp_path, oracle):
+    model = build_model(load("jacksboro:5"))
+    write_mesh(tmp_path / "relief.ply", model.file_points, model.faces)
+    call = ["simplify", str(tmp_path / "relief.ply"), "-o", str(tmp_path / "out"), "--tile", "64", "--jobs", "1"]
+    assert main([*call, "--meshes", "6", "--quiet"]) == 0
+    table = tmp_path / "out" / "front.csv"
+    command = [sys.executable, str(oracle), str(tmp_path / "relief.ply"), "--front", str(table)]
+    judged = subprocess.run(command, capture_output=True, text=True)
+    assert judged.returncode == 0, judged.stdout + judged.stderr
+
+
+def test_the_meshes_are_those_of_the_untiled_problem(out, path):
+    grid = open_grid(path, spacing=30.0)
+    front = read_tiled_front(out, grid)
+    problem = MeshProblem(path, spacing=30.0)
+    record = json.loads((out / "run.json").read_text())
+    row = len(front) - 1 - record["chosen"]
+    kept = np.isin(problem.model.source_index, front.kept(row))
+    whole = problem.simplify(kept)
+    assert whole.quality.error == pytest.approx(front.quality[row].error, rel=1e-9)
+    chosen = read_source(out / "chosen.ply")
+    assert np.array_equal(chosen.points, problem.model.file_points[kept])
+    assert len(chosen.faces) == whole.quality.triangles
+
+
+def test_a_mesh_of_any_size_is_picked_from_the_folder(out, path, tmp_path, capsys):
+    assert main(["pick", str(out), "--triangles", "333", "-o", str(tmp_path / "small.ply"), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    mesh = read_source(tmp_path / "small.ply")
+    assert 325 <= len(mesh.faces) == said["triangles"] <= 333
+    assert find_cracks(mesh.points, mesh.faces) == 0
+    assert main(["pick", str(out), "--solution", "1", "-o", str(tmp_path / "one.obj")]) == 0
+    assert main(["pick", str(out), "--max-error", "0", "-o", str(tmp_path / "none.ply")]) == 1
+    assert "nothing is written" in capsys.readouterr().err
+    np.save(tmp_path / "other.npy", np.load(path) + 1)
+    assert main(["pick", str(out), "--knee", "--model", str(tmp_path / "other.npy")]) == 2
+    assert "is not a front of" in capsys.readouterr().err
+
+
+def test_two_processes_write_the_same_bytes(out, path, tmp_path):
+    call = ["simplify", str(path), "--tile", "64", "--triangles", "700", "--meshes", "4", "--spacing", "30", "--quiet"]
+    assert main([*call, "-o", str(tmp_path / "other"), "--jobs", "2", "--threads", "1"]) == 0
+    for file in ("front.csv", "nested.npz", "chosen.ply"):
+        assert (tmp_path / "other" / file).read_bytes() == (out / file).read_bytes(), file
+
+
+def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
+    call = ["simplify", str(path), "-o", str(tmp_path / "out"), "--tile", "64", "--pieces", "--pick", "knee"]
+    assert main([*call, "--meshes", "none", "--jobs", "1", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    parts = [read_source(file) for file in sorted((tmp_path / "out" / "chosen").iterdir())]
+    assert len(parts) >= 4
+    assert sum(len(part.faces) for part in parts) == summary["chosen"]["triangles"]
+    points = np.concatenate([part.points for part in parts])
+    start = np.cumsum([0] + [len(part.points) for part in parts])
+    faces = np.concatenate([part.faces + first for part, first in zip(parts, start, strict=False)])
+    welded, rows = np.unique(points, axis=0, return_inverse=True)
+    assert find_cracks(welded, rows.ravel()[faces]) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--time", "5s"], "--time does not go with tiles"),
+        (["--algorithm", "memetic"], "--algorithm does not go with tiles"),
+        (["--pin", "hull"], "--pin does not go with tiles"),
+        (["--triangles", "1"], "at least 2 triangles"),
+        (["--dask", "tcp://127.0.0.1:9"], "no Dask scheduler answers"),
+    ],
+)
+def test_what_tiles_cannot_do_is_refused_in_one_line(path, tmp_path, capsys, options, message, monkeypatch):
+    monkeypatch.setattr("meshsimp_pymoo.engines.CONNECT_SECONDS", 0.3)
+    assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--tile", "64", *options]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.glob("out/*.csv"))
+
+
+def test_a_scan_is_not_cut_into_tiles(tmp_path, capsys):
+    assert main(["simplify", "face:300", "-o", str(tmp_path / "out"), "--tile", "64"]) == 2
+    assert "only a height grid without gaps can be cut into tiles" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_big_grids_are_cut_into_tiles_without_being_asked(path, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(tiled_command, "TILED_FROM", 5_000)
+    assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1"]) == 0
+    assert "thinned tile by tile" in capsys.readouterr().out
+    monkeypatch.setattr(tiled_command, "TILED_FROM", 10_000_000)
+    call = ["simplify", str(path), "-o", str(tmp_path / "whole"), "--generations", "1", "--population", "4"]
+    assert main([*call, "--meshes", "none"]) == 0
+    assert (tmp_path / "whole" / "front.npz").exists()
+
+
+def again(path, target):
+    call = ["simplify", str(path), "-o", str(target), "--tile", "64", "--triangles", "700", "--meshes", "4"]
+    return [*call, "--spacing", "30", "--jobs", "1", "--quiet"]
+
+
+def test_killed_and_started_again_it_goes_on_and_ends_with_the_same_bytes(out, path, tmp_path, monkeypatch):
+    target = tmp_path / "out"
+    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo.cli", *again(path, target)])
+    deadline = time.monotonic() + 120
+    while len(list((target / "tiles").glob("*.npz"))) < 3 and child.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+    child.kill()
+    child.wait()
+    if not (target / "front.csv").exists():
+        assert len(list((target / "tiles").glob("*.npz"))) >= 3
+        assert main(again(path, target)) == 0
+    for file in ("front.csv", "nested.npz", "chosen.ply"):
+        assert (target / file).read_bytes() == (out / file).read_bytes(), file
+    assert not (target / "tiles").exists()
+
+
+def test_interrupted_it_says_so_and_goes_on(out, path, tmp_path, monkeypatch, capsys):
+    target, calls = tmp_path / "out", []
+
+    def interrupted(tile):
+        calls.append(tile.name)
+        if len(calls) == 6:
+            raise KeyboardInterrupt
+        return thin_tile(tile)
+
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", interrupted)
+    assert main(again(path, target)) == 130
+    assert "finished tiles are in" in capsys.readouterr().err
+    assert len(list((target / "tiles").glob("*.npz"))) >= 2
+    assert main(again(path, target)) == 0
+    assert calls[5] == calls[6]
+    assert (target / "front.csv").read_bytes() == (out / "front.csv").read_bytes()
+
+
+def test_unfinished_tiles_of_other_settings_are_named_and_can_be_overwritten(path, tmp_path, capsys):
+    out = tmp_path / "out"
+    (out / "tiles").mkdir(parents=True)
+    (out / "tiles" / "what.json").write_text("{}\n")
+    call = ["simplify", str(path), "-o", str(out), "--tile", "64", "--meshes", "none", "--jobs", "1", "--quiet"]
+    assert main(call) == 2
+    assert "unfinished tiles of another model or of other settings" in capsys.readouterr().err
+    assert main([*call, "--overwrite"]) == 0
+    assert main(call) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_a_front_of_another_grid_is_not_read(out, path):
+    with pytest.raises(ResultError, match="is not a front of"):
+        read_tiled_front(out, open_grid(load_model(path, spacing=(30.0, 31.0))))
+    (out / "nested.npz").rename(out / "gone.npz")
+    try:
+        with pytest.raises(ResultError, match=r"nested\.npz: cannot be read"):
+            read_tiled_front(out, open_grid(path, spacing=30.0))
+    finally:
+        (out / "gone.npz").rename(out / "nested.npz")

@@ -1,0 +1,368 @@
+"""Tiles: what a tile may do, how tiles come together, and that a call goes on where it stopped."""
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshsimp_pymoo.baselines.greedy import thinning
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.engines import Processes, Serial
+from meshsimp_pymoo.geometry.error import evaluate_subsets, simplify
+from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.geometry.model import build_model, load_model
+from meshsimp_pymoo.results import ResultError
+from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_front
+from meshsimp_pymoo.tiles.front import settings as call_settings
+from meshsimp_pymoo.tiles.grid import count_samples, open_grid
+from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
+from meshsimp_pymoo.tiles.weld import find_cracks, measure, pieces, weld
+
+MODEL = build_model(load("jacksboro:3"))
+GRID = open_grid(MODEL)
+SMALL = build_model(load("jacksboro:12"))
+SMALL_GRID = open_grid(SMALL)
+
+
+def subset(grid, share, seed):
+    kept = np.random.default_rng(seed).random(grid.n_samples) < share
+    kept[grid.corners] = True
+    return np.flatnonzero(kept)
+
+
+def as_chromosome(grid, samples):
+    kept = np.zeros(grid.n_samples, bool)
+    kept[grid.row_of[samples]] = True
+    return kept
+
+
+@pytest.fixture(scope="module")
+def front():
+    return tiled_front(GRID, tile=64)
+
+
+# --------------------------------------------------------------------------------------------------------- the grid
+
+
+def test_a_grid_has_its_samples_where_the_model_of_the_same_heights_has_them(tmp_path):
+    z = np.random.default_rng(1).normal(size=(23, 31)).astype(np.float32)
+    np.save(tmp_path / "z.npy", z)
+    grid = open_grid(tmp_path / "z.npy", spacing=(0.1, 0.7))
+    assert isinstance(grid.heights, np.memmap)
+    model = load_model(tmp_path / "z.npy", spacing=(0.1, 0.7))
+    number = model.source_index
+    assert np.array_equal(grid.xy_at(number), model.xy)
+    assert np.array_equal(grid.file_points(number), model.file_points)
+    again = open_grid(model)
+    assert np.array_equal(again.row_of[number], np.arange(len(number)))
+    assert np.array_equal(again.xy_at(number), model.xy)
+    assert again.samples_of_rows(number).tolist() == number.tolist()
+    assert count_samples(tmp_path / "z.npy") == 23 * 31
+
+
+def test_the_size_of_an_ascii_grid_is_read_from_its_header(tmp_path):
+    (tmp_path / "z.asc").write_text("NCOLS 4000\nNROWS 3000\nXLLCORNER 0\nYLLCORNER 0\nCELLSIZE 1\n")
+    assert count_samples(tmp_path / "z.asc") == 12_000_000
+    assert count_samples("jacksboro") is None
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda z: np.where(z == z[5, 7], np.nan, z), r"no height at row 5, column 7"),
+        (lambda z: z[0], r"shape \(31,\); give a grid"),
+        (lambda z: z.astype(complex), r"type complex128"),
+    ],
+)
+def test_what_is_no_full_grid_is_refused(make, message):
+    z = np.random.default_rng(1).normal(size=(23, 31))
+    with pytest.raises(ModelError, match=message):
+        tiled_front(open_grid(make(z)), tile=64)
+
+
+def test_a_height_that_means_no_sample_is_refused():
+    z = np.arange(70.0, dtype=np.float32).reshape(7, 10)
+    with pytest.raises(ModelError, match="no height at row 3, column 4"):
+        tiled_front(open_grid(z, nodata=34), tile=64)
+
+
+def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
+    with pytest.raises(ModelError, match="not all crossings"):
+        open_grid(build_model(load("face:200")))
+    with pytest.raises(ModelError, match="has weights"):
+        open_grid(SMALL.with_weights(np.full(SMALL.n_vertices, 2.0)))
+    (tmp_path / "z.npy").write_bytes(b"\x93NUMPY nonsense")
+    with pytest.raises(ModelError, match="not a whole NumPy array file"):
+        open_grid(tmp_path / "z.npy")
+
+
+# --------------------------------------------------------------------------------------------------------- the mesh
+
+
+@settings(max_examples=25, deadline=None)
+@given(share=st.sampled_from([0.0, 0.01, 0.1, 0.5, 1.0]), seed=st.integers(0, 2**32))
+def test_a_welded_mesh_is_the_triangulation_of_the_whole_with_its_error(share, seed):
+    samples = subset(SMALL_GRID, share, seed)
+    mesh = weld(SMALL_GRID, samples)
+    whole = simplify(SMALL, as_chromosome(SMALL_GRID, samples))
+    assert np.array_equal(SMALL_GRID.row_of[mesh.samples][mesh.faces], whole.faces)
+    quality = measure(SMALL_GRID, mesh, n_threads=1 + seed % 3)
+    for name in ("error", "triangles", "vertices", "mean_error", "rms_error", "max_error"):
+        assert getattr(quality, name) == pytest.approx(getattr(whole.quality, name), rel=1e-9, abs=1e-9)
+    assert find_cracks(mesh.xy, mesh.faces) == 0
+
+
+def test_the_number_of_threads_does_not_change_a_bit_of_the_error():
+    mesh = weld(GRID, subset(GRID, 0.02, 1))
+    assert len({measure(GRID, mesh, n_threads=n) for n in (1, 2, 5)}) == 1
+
+
+def test_pieces_are_the_mesh_and_meet_without_cracks():
+    mesh = weld(GRID, subset(GRID, 0.05, 2))
+    parts = list(pieces(GRID, mesh, 40))
+    assert len({part[:2] for part in parts}) == len(parts) >= 9
+    faces = np.concatenate([samples[faces] for _, _, samples, faces in parts])
+    assert sorted(map(tuple, faces.tolist())) == sorted(map(tuple, mesh.samples[mesh.faces].tolist()))
+    assert find_cracks(GRID.xy_at(np.arange(GRID.n_samples)), faces) == 0
+
+
+def test_a_crack_and_a_vertex_on_an_edge_are_found():
+    mesh = weld(SMALL_GRID, subset(SMALL_GRID, 0.1, 3))
+    assert find_cracks(mesh.xy, mesh.faces) == 0
+    assert find_cracks(mesh.xy, np.delete(mesh.faces, len(mesh.faces) // 2, axis=0)) >= 1
+    torn = mesh.faces.copy()
+    inside = np.flatnonzero(((mesh.xy[torn] > 0.05) & (mesh.xy[torn] < 0.7)).all(axis=(1, 2)))[0]
+    torn[inside, 0] = len(mesh.xy)  # the same corner, but a vertex of its own
+    assert find_cracks(np.vstack([mesh.xy, mesh.xy[mesh.faces[inside, 0]]]), torn) == 4
+
+
+def test_a_mesh_without_a_corner_is_refused():
+    with pytest.raises(ValueError, match="lack a corner"):
+        weld(SMALL_GRID, np.arange(1, 50))
+
+
+# --------------------------------------------------------------------------------------------------------- a tile
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    share=st.sampled_from([0.03, 0.2, 0.6, 1.0]),
+    seed=st.integers(0, 2**32),
+    limit=st.sampled_from([5.0, 60.0, np.inf]),
+    side=st.sampled_from([(30, 90), (0, 60), (60, 114)]),
+)
+def test_what_tiles_remove_changes_the_error_of_the_whole_by_what_they_say(share, seed, limit, side):
+    """Several tiles at once, each for itself: the sum of their levels is the change of the whole."""
+    kept = subset(GRID, share, seed)
+    work = _Work(GRID, 64, Serial(), Memory(), lambda *_: None)
+    change, removed = 0.0, []
+    low, high = side
+    for left, right in itertools.pairwise([0, 50, 100, GRID.shape[1] - 1]):
+        gone, level = thin_tile(work.task((low, high, left, right), 1, limit, kept))
+        row, column = np.divmod(gone, GRID.shape[1])
+        on_side = (row == 0) | (row == GRID.shape[0] - 1) | (column == 0) | (column == GRID.shape[1] - 1)
+        assert (np.diff(level) >= 0).all()
+        assert (level <= limit).all()
+        assert ((row > low) | (low == 0)).all()
+        change += float(np.sum(level * np.where(on_side, 1, 2)))
+        removed.append(gone)
+    removed = np.concatenate(removed)
+    assert len(np.unique(removed)) == len(removed)
+    assert np.isin(removed, kept).all()
+    rest = np.setdiff1d(kept, removed)
+    table = evaluate_subsets(MODEL, np.array([as_chromosome(GRID, kept), as_chromosome(GRID, rest)]))
+    assert table[1, 0] - table[0, 0] == pytest.approx(change, rel=1e-6, abs=1e-6 * table[1, 0])
+    if share >= 0.2 and limit == np.inf:
+        assert len(removed) > 0.4 * share * GRID.shape[1] * (high - low)
+
+
+def test_all_samples_as_sites_are_the_same_tile_as_no_sites_given():
+    work = _Work(GRID, 64, Serial(), Memory(), lambda *_: None)
+    box = (20, 60, 30, 80)
+    some = thin_tile(work.task(box, 1, np.inf, None))
+    same = thin_tile(work.task(box, 1, np.inf, np.arange(GRID.n_samples)))
+    assert np.array_equal(some[0], same[0])
+    assert np.array_equal(some[1], same[1])
+
+
+def test_the_only_tile_of_a_grid_is_thinned_as_the_whole():
+    work = _Work(SMALL_GRID, 512, Serial(), Memory(), lambda *_: None)
+    gone, _ = thin_tile(work.task((0, SMALL_GRID.shape[0] - 1, 0, SMALL_GRID.shape[1] - 1), 1, np.inf, None))
+    assert SMALL_GRID.row_of[gone].tolist() == thinning(SMALL).order[::-1].tolist()
+
+
+@given(st.lists(st.floats(-5, 5), min_size=1, max_size=30), st.floats(-6, 6))
+def test_a_hull_cut_at_a_slope_is_the_best_point_of_the_front_for_it(steps, slope):
+    error = np.concatenate([[0.0], np.cumsum(steps)])
+    level = hull_levels(np.arange(len(error)), error)
+    at = int(np.searchsorted(level, slope, side="right"))
+    lagrangian = error - slope * np.arange(len(error))
+    assert lagrangian[at] <= lagrangian.min() + 1e-9
+
+
+# --------------------------------------------------------------------------------------------------------- the front
+
+
+def test_every_solution_is_a_subset_of_the_finer_one_with_the_error_that_is_said(front):
+    triangles = front.F[:, 1]
+    assert (np.diff(triangles) < 0).all()
+    assert (np.diff(front.F[:, 0]) > 0).all()
+    assert triangles[0] > 0.08 * GRID.n_triangles
+    assert triangles[-1] == 2
+    for row in range(1, len(front)):
+        assert np.isin(front.kept(row), front.kept(row - 1)).all()
+    rows = range(0, len(front), 5)
+    table = evaluate_subsets(MODEL, np.array([as_chromosome(GRID, front.kept(row)) for row in rows]))
+    for row, found in zip(rows, table, strict=True):
+        assert found[0] == pytest.approx(front.quality[row].error, rel=1e-9)
+        assert found[1] == front.quality[row].triangles
+
+
+def test_tiles_lose_at_most_three_percent_against_thinning_in_one_piece():
+    """Below some hundred triangles thinning is a matter of luck, with tiles and without."""
+    model = build_model(load("jacksboro:2"))
+    front, whole = tiled_front(open_grid(model), tile=64), thinning(model)
+    excess = front.F[:, 0] / np.interp(front.F[:, 1], whole.triangles, whole.error) - 1
+    assert excess[front.F[:, 1] > 300].max() < 0.03
+    assert excess[front.F[:, 1] > 3000].max() < 0.01
+    assert excess.mean() < 0.01
+
+
+@pytest.mark.parametrize("wanted", [2, 3, 100, 1234, 2900])
+def test_any_size_can_be_cut_out_of_the_front(front, wanted):
+    slope = front.slope_of(wanted)
+    more = front.with_slope(slope)
+    row = more.slope.tolist().index(slope)
+    assert 0.9 * wanted - 2 <= more.quality[row].triangles <= wanted
+    assert more.with_slope(slope) is more
+    kept = as_chromosome(GRID, more.kept(row))
+    assert evaluate_subsets(MODEL, kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
+
+
+def test_a_mesh_of_one_triangle_and_a_finer_one_than_the_finest_are_refused(front):
+    with pytest.raises(ValueError, match="at least 2 triangles, not 1"):
+        front.slope_of(1)
+    with pytest.raises(ValueError, match="below that of the finest"):
+        front.with_slope(front.slope[0] / 2)
+
+
+def test_a_plane_is_two_triangles_and_a_roof_four():
+    x = np.arange(140.0)
+    plane = tiled_front(open_grid(x[:, None] + 2 * x), tile=64)
+    assert [(round(q.error, 6), q.triangles) for q in plane.quality] == [(0.0, 2)]
+    roof = tiled_front(open_grid(np.tile(-np.abs(np.arange(129.0) - 64), (129, 1))), tile=64)
+    assert (roof.quality[0].triangles, round(roof.quality[0].error, 6)) == (4, 0.0)
+
+
+def test_cliffs_end(front):
+    z = np.random.default_rng(1).integers(0, 2, (150, 150)) * 1e9
+    blocks = tiled_front(open_grid(np.kron(z[:10, :10], np.ones((15, 15)))), tile=64)
+    assert blocks.quality[-1].triangles == 2
+    assert (np.diff(blocks.F[:, 0]) > 0).all()
+
+
+def test_tiles_cover_the_axis_and_their_cuts_are_apart():
+    for n, tile, shift, stride in itertools.product((5, 64, 97, 200, 1000), (64, 100), (0, 1 / 3, 2 / 3), (1, 2, 4)):
+        cuts = cut_axis(n, tile, shift, stride)
+        assert (cuts[0], cuts[-1]) == (0, n - 1)
+        assert (cuts[1:-1] % stride == 0).all()
+        if len(cuts) > 2:
+            assert np.diff(cuts).min() >= 0.3 * tile * stride
+            assert np.diff(cuts).max() <= 2.3 * tile * stride
+
+
+@pytest.mark.parametrize(
+    ("given_", "message"), [({"tile": 10}, "tile is 10; .* at least 64"), ({"most": 1}, "most is 1; .* 2 triangles")]
+)
+def test_impossible_settings_are_refused(given_, message):
+    with pytest.raises(ValueError, match=message):
+        tiled_front(SMALL_GRID, **given_)
+
+
+# ------------------------------------------------------------------------------------------- engines and going on
+
+
+class Backwards:
+    """Finishes tasks in the wrong order, and stops after some of them if asked to."""
+
+    jobs, shares_files = 3, True
+
+    def __init__(self, most=None):
+        self.left = most
+        self.done = 0
+
+    def each(self, work, tasks, shared=None):
+        for place, task in reversed(list(enumerate(tasks))):
+            if self.left is not None and self.done == self.left:
+                raise KeyboardInterrupt
+            self.done += 1
+            yield place, work(task, shared)
+
+
+def same(a, b):
+    return (
+        np.array_equal(a.samples, b.samples)
+        and np.array_equal(a.level, b.level)
+        and np.array_equal(a.slope, b.slope)
+        and a.quality == b.quality
+    )
+
+
+def test_the_front_depends_neither_on_the_order_nor_on_the_engine(front):
+    assert same(tiled_front(GRID, tile=64, engine=Backwards(), threads=3), front)
+    with Processes(2) as engine:
+        assert same(tiled_front(GRID, tile=64, engine=engine), front)
+
+
+def test_a_dask_cluster_finds_the_same_front(front):
+    distributed = pytest.importorskip("distributed")
+    from meshsimp_pymoo.engines import DaskEngine
+
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        DaskEngine(cluster.scheduler_address) as engine,
+    ):
+        assert same(tiled_front(GRID, tile=64, engine=engine), front)
+
+
+def test_a_call_that_was_stopped_goes_on_and_ends_with_the_same_front(front, tmp_path):
+    what = call_settings(GRID, tile=64)
+    total = Backwards()
+    tiled_front(GRID, tile=64, engine=total)
+    done = 0
+    for most in (3, 7, 20, None):
+        engine = Backwards(most)
+        try:
+            found = tiled_front(GRID, tile=64, engine=engine, store=Folder(tmp_path / "tiles", what))
+        except KeyboardInterrupt:
+            assert most is not None
+            assert not list((tmp_path / "tiles").glob(".*"))
+        done += engine.done
+    assert same(found, front)
+    assert done <= total.done + 3  # what was in work when it was stopped
+
+
+def test_damaged_pieces_are_done_again(front, tmp_path):
+    what = call_settings(GRID, tile=64)
+    with pytest.raises(KeyboardInterrupt):
+        tiled_front(GRID, tile=64, engine=Backwards(20), store=Folder(tmp_path, what))
+    stored = sorted(tmp_path.glob("*.npz"))
+    assert len(stored) >= 3
+    for k, path in enumerate(stored):
+        data = bytearray(path.read_bytes())
+        if k % 2:
+            data[len(data) // 2] ^= 0x10
+        path.write_bytes(data[: len(data) // 2] if k % 2 == 0 else data)
+    assert same(tiled_front(GRID, tile=64, store=Folder(tmp_path, what)), front)
+
+
+def test_pieces_of_something_else_are_not_used(tmp_path):
+    Folder(tmp_path, call_settings(GRID, tile=64))
+    with pytest.raises(ResultError, match="of another model or of other settings"):
+        Folder(tmp_path, call_settings(GRID, tile=65))
+    with pytest.raises(ResultError, match="of another model or of other settings"):
+        Folder(tmp_path, call_settings(SMALL_GRID, tile=64))
+    assert json.loads((tmp_path / "what.json").read_text())["tile"] == 64
