@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, grid_source, read_source
+from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, Window, grid_source, is_there, read_source
 
 __all__ = ["describe", "find_source", "load", "names"]
 
@@ -137,15 +137,17 @@ def find_source(
     *,
     spacing: float | tuple[float, float] | None = None,
     nodata: float | None = None,
+    window: Window | None = None,
+    max_edge: float | None = None,
 ) -> SourceMesh:
     """Read the file of this name or, where there is none, make the built-in model of this name.
 
     Parameters
     ----------
     model : str or path
-        A mesh or grid file, or the name of a built-in model. A file wins over a built-in model of the same
+        A mesh, grid or cloud file, or the name of a built-in model. A file wins over a built-in model of the same
         name.
-    spacing, nodata : optional
+    spacing, nodata, window, max_edge : optional
         Passed on to :func:`~meshsimp_pymoo.geometry.load.read_source`; for files only.
 
     Raises
@@ -155,11 +157,13 @@ def find_source(
     """
     text = os.fspath(model)
     looks_like_file = bool(Path(text.partition(":")[0]).suffix) or os.sep in text or "/" in text
-    if Path(text).exists() or looks_like_file or isinstance(model, Path):
-        return read_source(Path(text), spacing=spacing, nodata=nodata)
+    if is_there(Path(text)) or looks_like_file or isinstance(model, Path):
+        return read_source(Path(text), spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
     source = load(text)
-    if spacing is not None or nodata is not None:
-        raise ModelError(f"{text}: spacing and nodata describe height grids in files; a built-in model has its own")
+    if not (spacing is None and nodata is None and window is None and max_edge is None):
+        raise ModelError(
+            f"{text}: spacing, nodata, window and max_edge are for files; a built-in model has its own samples"
+        )
     return source
 
 

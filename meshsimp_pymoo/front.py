@@ -32,17 +32,15 @@ from meshsimp_pymoo.geometry.refit import Refitted, refit_heights
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.results import (
-    MESH_FORMATS,
+    MESH_SUFFIXES,
     MESHES_BY_DEFAULT,
     ResultError,
     claim_file,
     even_selection,
-    mesh_arrays,
     new_file,
     read_front,
-    warn_of_single_precision,
     write_front,
-    write_mesh,
+    write_solution,
 )
 
 if TYPE_CHECKING:
@@ -63,6 +61,8 @@ SETTINGS: dict[str, Any] = {
     "patch": None,
     "spacing": None,
     "nodata": None,
+    "window": None,
+    "max_edge": None,
     "footprint": "model",
     "outside": "nearest",
     "objectives": ("error", "triangles"),
@@ -170,16 +170,14 @@ class FrontSolution:
         ResultError
             If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
         """
-        path = claim_file(path, MESH_FORMATS, overwrite=overwrite)
+        path = claim_file(path, MESH_SUFFIXES, overwrite=overwrite)
         suffix = path.suffix.lower()
         stored = self.front.stored_mesh(self.solution)
         with new_file(path) as unfinished:
             if stored is not None and stored.suffix == suffix:
                 shutil.copyfile(stored, unfinished)
             else:
-                arrays = mesh_arrays(self.front.problem.model, self.faces)
-                warn_of_single_precision(self.front.problem.model, suffix[1:], arrays[0])
-                write_mesh(unfinished, *arrays)
+                write_solution(unfinished, self.front.problem.model, self.faces)
         return path
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
@@ -536,7 +534,7 @@ class Front(Sequence[FrontSolution]):
         meshes : int or None
             The most meshes to write, an even selection of a longer front; None writes all, 0 none.
         mesh_format : str
-            "ply", "obj", "stl", "off" or "glb".
+            "ply", "obj", "stl", "off", "glb" or "landxml".
         chosen : int or FrontSolution, optional
             The solution to write as ``chosen.<mesh_format>`` too.
         refit : bool
@@ -669,8 +667,9 @@ class Front(Sequence[FrontSolution]):
         source = model if model is not None else self._model_file()
         try:
             settings = self._settings()
-            if isinstance(settings["spacing"], list):
-                settings["spacing"] = tuple(settings["spacing"])
+            for key in ("spacing", "window"):
+                if isinstance(settings[key], list):
+                    settings[key] = tuple(settings[key])
             problem = MeshProblem(source, **settings)
         except ModelError as trouble:
             if model is not None:

@@ -1,121 +1,322 @@
-"""Evolution that starts from the greedy pass, crosses patches and searches locally: the front to beat.
+"""Search that starts from the greedy pass and anneals down a ladder of sizes: the front to beat.
 
-The population is a ladder of sizes: every rung is a number of triangles and holds the best mesh found of at most that
-many. Parents are neighbours on the ladder, so that their patches have a similar density; a child takes one side of a
-random line from each, is brought to the size of its first parent, and is annealed (Ho, Shu, Chen 2004 call the passing
-on of solutions between neighbouring sizes inheritance). The error on a rung never grows, so at these sizes the front is
-never worse than the thinning it started from.
+The population is a ladder: every rung is a number of triangles and holds the best mesh found of at most that many. In a
+generation some rungs, far apart, get a child each, annealed at the rung's size: in the first generation their own
+mesh, in the following ones, one rung lower each, the mesh of the rung above, so that good places are handed down the
+ladder (Ho, Shu, Chen 2004 call the passing on of solutions between neighbouring sizes inheritance). When all rungs have
+had their turn, a sweep, the next sweep begins, with twice as many moves, or with as many as fit in the time that is
+left. One slow sweep gives better meshes than several quick ones.
+
+The error on a rung never grows, so the front is never worse than the thinning it started from.
 """
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.algorithms.base.genetic import GeneticAlgorithm
+from pymoo.core.mating import Mating
 from pymoo.core.population import Population
-from pymoo.core.selection import Selection
 from pymoo.core.survival import Survival
+from pymoo.termination.max_time import TimeBasedTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
+from pymoo.util.optimum import filter_optimum
 
-from meshsimp_pymoo.operators import (
-    HalfPlaneCrossover,
-    NestedSubsets,
-    PackedDuplicates,
-    PinnedCorners,
-    Relocation,
-)
+from meshsimp_pymoo.baselines.greedy import NestedFront, thinning
+from meshsimp_pymoo.geometry.error import thread_pool
+from meshsimp_pymoo.operators import NestedSubsets, PackedDuplicates, PinnedCorners
+from meshsimp_pymoo.operators.local_search import relocate_all
+from meshsimp_pymoo.operators.requirements import summed_measure
+from meshsimp_pymoo.operators.sampling import nested_front
 
-# Partners are at most this many rungs apart.
-REACH = 3
-# Matings a generation that find nothing new before the run ends.
-REPEATS = 20
-# Generations where the caller gives no termination.
-GENERATIONS = 50
-
-
-class SizeNeighbours(Selection):
-    """Pairs of parents that are close in their number of triangles; every individual is a first parent in turn."""
-
-    def _do(
-        self,
-        problem: Any,
-        pop: Population,
-        n_select: int,
-        n_parents: int,
-        *args: Any,
-        random_state: np.random.Generator,
-        **kwargs: Any,
-    ) -> NDArray[np.int64]:
-        order = np.argsort(pop.get("F")[:, 1], kind="stable")
-        turns = -(-n_select // len(pop))
-        first = np.concatenate([random_state.permutation(len(pop)) for _ in range(turns)])[:n_select]
-        parents = np.empty((n_select, n_parents), dtype=int)
-        parents[:, 0] = first
-        for k in range(1, n_parents):
-            step = random_state.integers(1, REACH, size=n_select, endpoint=True)
-            step *= random_state.choice([-1, 1], n_select)
-            partner = first + step
-            # At the ends of the ladder the step goes the other way.
-            partner = np.where((partner < 0) | (partner >= len(pop)), first - step, partner)
-            parents[:, k] = np.clip(partner, 0, len(pop) - 1)
-        return order[parents]
+# Rungs that get a child in the same generation.
+CHAINS = 16
+# Above this share of the vertices a rung gets no more moves than there, however many it keeps.
+FULL_SHARE = 0.25
+# Temperatures, in units of the error per kept vertex, and the share left in the end: where a chain begins, and below.
+FRESH = (0.3, 0.03)
+AGAIN = (0.15, 0.1)
+# Moves a kept vertex in the first sweep unless told: as many as make this total, within the bounds.
+TOTAL_MOVES = 2e7
+MOVES_PER_VERTEX = (20.0, 1000.0)
+# With a time limit: the share of the first sweep, the most moves a kept vertex, and seconds a move before any is timed.
+FIRST_SHARE = 0.12
+SLOWEST = 4000.0
+SECONDS_A_MOVE = 2e-6
+# Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs.
+LAST_SHARE = 0.03
+FILL_SECONDS = 40.0
+# The search ends after so many generations, and two sweeps, that found nothing new.
+IDLE = 6
+# In the final front neighbours differ by this share of the error, with at most so many meshes between two rungs and so
+# many entries of their subsets in all.
+STEP = 0.015
+BETWEEN = 24
+ENTRIES = 2e8
 
 
 class SizeLadder(Survival):
     """On every rung the individual of least error among those of at most so many triangles.
 
-    The rungs are the numbers of triangles of the first population. Rungs that share their best individual leave places,
-    which go to the individuals that come closest to their rung's best.
+    Parameters
+    ----------
+    rungs : (R,) int array, optional
+        Numbers of triangles; by default those of the first population.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rungs: NDArray[np.integer] | None = None) -> None:
         super().__init__(filter_infeasible=False)
-        self.rungs: NDArray[np.float64] | None = None
+        self.rungs = None if rungs is None else np.unique(rungs)
 
-    def _do(self, problem: Any, pop: Population, *args: Any, n_survive: int | None = None, **kwargs: Any) -> Population:
+    def best(self, problem: Any, pop: Population) -> NDArray[np.int64]:
+        """Return for each rung the row of its best individual in the population, -1 where none is small enough."""
         F = pop.get("F")
-        if F.shape[1] != 2:
-            raise ValueError(
-                f"the ladder of sizes has two objectives, a measure of the error and the triangles, the problem has "
-                f"{F.shape[1]}; leave one measure, or use nsga3()"
-            )
-        violation = pop.get("CV").ravel() if problem.has_constraints() else np.zeros(len(pop))
         if self.rungs is None:
             self.rungs = np.unique(F[:, 1])
-        n_survive = len(pop) if n_survive is None else min(n_survive, len(pop))
+        violation = pop.get("CV").ravel() if problem.has_constraints() else np.zeros(len(pop))
         # By violation, then error, then triangles: the first of those small enough is a rung's best.
         order = np.lexsort((F[:, 1], F[:, 0], violation))
-        winners: list[int] = []
-        least = np.full(len(pop), np.inf)
-        for rung in self.rungs[::-1]:
-            fitting = order[F[order, 1] <= rung]
+        triangles = F[order, 1]
+        rows = np.full(len(self.rungs), -1)
+        for k, rung in enumerate(self.rungs):
+            fitting = np.flatnonzero(triangles <= rung)
             if len(fitting):
-                winners.append(int(fitting[0]))
-        for k in range(len(pop)):
-            rung = self.rungs[min(int(np.searchsorted(self.rungs, F[k, 1])), len(self.rungs) - 1)]
-            best = [w for w in winners if F[w, 1] <= rung]
-            least[k] = F[best, 0].min() if best else F[k, 0]
-        unique = list(dict.fromkeys(winners))
-        if len(unique) < n_survive:
-            excess = np.divide(F[:, 0], least, out=np.full(len(pop), np.inf), where=least > 0) + 1e9 * violation
-            excess[unique] = np.inf
-            unique += [int(k) for k in np.argsort(excess, kind="stable")[: n_survive - len(unique)]]
-        return pop[np.sort(unique[:n_survive])]
+                rows[k] = order[fitting[0]]
+        return rows
+
+    def _do(self, problem: Any, pop: Population, *args: Any, n_survive: int | None = None, **kwargs: Any) -> Population:
+        rows = self.best(problem, pop)
+        return pop[np.unique(rows[rows >= 0])]
+
+
+class DownTheLadder(Mating):
+    """Children of the next larger rung, annealed at the rung's size; see the module's text.
+
+    Parameters
+    ----------
+    ladder : SizeLadder
+        The rungs.
+    moves_per_vertex : float, optional
+        Moves for each kept vertex in the first sweep; twice as many in each later one, up to 1000. By default as many as take some
+        tens of seconds. With a time limit as many as fit.
+    n_chains : int
+        Children in a generation, on rungs far apart.
+    """
+
+    def __init__(
+        self,
+        ladder: SizeLadder,
+        moves_per_vertex: float | None = None,
+        *,
+        n_chains: int = CHAINS,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(None, None, None, **kwargs)
+        self.ladder = ladder
+        self.moves_per_vertex = moves_per_vertex
+        self.n_chains = n_chains
+        self.sweep = 0
+        self.step = 0
+        self.moves_done = 0.0
+        self.seconds = 0.0
+
+    def do(
+        self,
+        problem: Any,
+        pop: Population,
+        n_offsprings: int,
+        *,
+        random_state: np.random.Generator,
+        algorithm: Any = None,
+        **kwargs: Any,
+    ) -> Population:
+        """Return the children of the rungs whose turn it is, not evaluated."""
+        rungs = self.ladder.rungs
+        assert rungs is not None
+        rows = self.ladder.best(problem, pop)
+        X = pop.get("X")
+        # Rungs from the largest down, cut into chains; each chain does one rung a generation.
+        chains = [chain for chain in np.array_split(np.arange(len(rungs))[::-1], self.n_chains) if len(chain)]
+        turn = np.array([chain[self.step] for chain in chains if self.step < len(chain)])
+        turn = turn[rows[turn] >= 0]
+        # A chain begins with its own first rung, shaken thoroughly, and hands the result down.
+        fresh = self.step == 0
+        temperature, cooling = FRESH if fresh else AGAIN
+        parents = rows[turn if fresh else turn + 1]
+        work = self._work(problem, pop, rows)
+        left = sum(work[chain[self.step :]].sum() for chain in chains)
+        moves = np.ceil(self._pace(problem, algorithm, work.sum(), left) * work[turn]).astype(int)
+        begun = time.perf_counter()
+        children = relocate_all(
+            problem,
+            X[parents],
+            moves,
+            random_state,
+            triangles=rungs[turn].astype(int),
+            temperature=temperature,
+            cooling=cooling,
+        )
+        self.seconds += time.perf_counter() - begun
+        self.moves_done += float(moves.sum())
+        self.step += 1
+        if self.step >= max(len(chain) for chain in chains):
+            self.step = 0
+            self.sweep += 1
+        return self.eliminate_duplicates.do(Population.new(X=children), pop)
+
+    @staticmethod
+    def _work(problem: Any, pop: Population, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the moves of each rung if there is one for each kept vertex, up to a share of all vertices."""
+        kept = (pop.get("X") & ~problem.pinned).sum(axis=1)[np.maximum(rows, 0)]
+        return np.minimum(np.maximum(kept, 1), FULL_SHARE * problem.n_var)
+
+    def _pace(self, problem: Any, algorithm: Any, whole: float, left: float) -> float:
+        """Return the moves for each kept vertex, given the work of a whole sweep and of what is left of it."""
+        deadline = time_limit(algorithm)
+        if deadline is None:
+            lowest, highest = MOVES_PER_VERTEX
+            given = self.moves_per_vertex
+            first = min(max(TOTAL_MOVES / whole, lowest), highest) if given is None else given
+            return min(first * 2.0**self.sweep, max(first, highest))
+        a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
+        span, remaining = deadline
+        if self.sweep == 0:
+            remaining -= (1.0 - FIRST_SHARE) * span
+        return min(max(remaining / (a_move * left), 1.0), SLOWEST)
+
+
+def time_limit(algorithm: Any) -> tuple[float, float] | None:
+    """Return the seconds a run has for its search and those left; None where it does not end by time."""
+    termination = getattr(algorithm, "termination", None)
+    for part in getattr(termination, "terminations", [termination]):
+        if isinstance(part, TimeBasedTermination):
+            whole = float(part.max_time)
+            last = max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6)
+            return whole, whole - last - (time.time() - algorithm.start_time)
+    return None
+
+
+class MemeticSearch(GeneticAlgorithm):
+    """The algorithm of :func:`memetic`; in the end it fills the gaps between the rungs."""
+
+    pop: Any
+    opt: Any
+
+    def __init__(self, pop_size: int, triangles: tuple[int, int] | None, **kwargs: Any) -> None:
+        super().__init__(pop_size, **kwargs)
+        self.triangles = triangles
+        self.idle = 0
+
+    def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
+        ladder = self.survival
+        if ladder.rungs is None:
+            low, high = (int(f(infills.get("F")[:, 1])) for f in (np.min, np.max))
+            if self.triangles is not None:
+                low, high = max(low, self.triangles[0]), min(max(high, low), self.triangles[1])
+            ladder.rungs = np.unique(np.round(np.geomspace(low, max(high, low), self.pop_size)).astype(int))
+        super()._initialize_advance(infills=infills, **kwargs)
+
+    def _infill(self) -> Population | None:
+        deadline = time_limit(self)
+        if deadline is not None and deadline[1] <= 0.0:
+            self.termination.force_termination = True
+            return None
+        children = self.mating.do(
+            self.problem, self.pop, self.n_offsprings, algorithm=self, random_state=self.random_state
+        )
+        # All of them known: no child may be left to find, and a budget of evaluations would never be used up.
+        self.idle = 0 if len(children) else self.idle + 1
+        if self.idle >= max(IDLE, 2 * sweep_generations(self.pop_size)):
+            self.termination.force_termination = True
+        return children if len(children) else None
+
+    def _advance(self, infills: Any = None, **kwargs: Any) -> None:
+        if infills is None:
+            return
+        self.pop = self.survival.do(
+            self.problem,
+            Population.merge(self.pop, infills),
+            n_survive=self.pop_size,
+            algorithm=self,
+            random_state=self.random_state,
+        )
+
+    def _finalize(self) -> None:
+        """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
+        pop = self.pop
+        X = between_the_rungs(self.problem, pop.get("X"), pop.get("F"), nested_front(self.problem, self))
+        if len(X):
+            extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
+            self.evaluator.eval(self.problem, extra, algorithm=self)
+            self.opt = filter_optimum(Population.merge(self.opt, extra), least_infeasible=True)
+
+
+def between_the_rungs(
+    problem: Any, X: NDArray[np.bool_], F: NDArray[np.float64], thinned: NestedFront
+) -> NDArray[np.bool_]:
+    """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller."""
+    order = np.argsort(F[:, 1], kind="stable")
+    measure = summed_measure(problem)
+    most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
+
+    def one(k: int) -> list[NDArray[np.bool_]]:
+        low, high = F[order[k - 1], 1], F[order[k], 1]
+        ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
+        n_rows = min(max(int(np.log(max(ratio, 1.0)) / STEP), 1), BETWEEN, most_rows)
+        wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
+        wanted = wanted[(wanted > low) & (wanted < high)]
+        if not len(wanted):
+            return []
+        fronts = [thinned]
+        if F[order[k], 0] < _best_of(thinned, high)[0]:
+            # The rung is better than the thinned model: so may be what it is thinned to.
+            fronts.append(
+                thinning(
+                    problem.model,
+                    problem.pinned,
+                    kept=X[order[k]],
+                    footprint=problem.footprint,
+                    outside=problem.outside,
+                    measure=measure,
+                    least=int(low),
+                )
+            )
+        rows = []
+        for most in wanted:
+            best = min((_best_of(front, most) for front in fronts), key=lambda choice: choice[0])
+            if best[0] < F[order[k - 1], 0]:
+                rows.append(best[1].kept(best[2]))
+        return rows
+
+    return np.array([kept for rows in thread_pool().map(one, range(1, len(order))) for kept in rows]).reshape(
+        -1, X.shape[1]
+    ).astype(bool)
+
+
+def _best_of(front: NestedFront, most: float) -> tuple[float, NestedFront, int]:
+    """Return the least error of a nested front's meshes of at most so many triangles, the front and the mesh's row."""
+    rows = np.flatnonzero((front.triangles > 0) & (front.triangles <= most))
+    if not len(rows):
+        return np.inf, front, 0
+    k = int(rows[np.argmin(front.error[rows])])
+    return float(front.error[k]), front, k
 
 
 def memetic(
     pop_size: int = 100,
     *,
     triangles: tuple[int, int] | None = None,
-    moves_per_vertex: float = 60.0,
-    max_moves: int = 1_000_000,
+    moves_per_vertex: float | None = None,
     **kwargs: Any,
-) -> GeneticAlgorithm:
-    """Return the seeded memetic algorithm: thinning, half-plane crossover, annealed relocation, a ladder of sizes.
+) -> MemeticSearch:
+    """Return the seeded memetic algorithm: thinning, then annealing down a ladder of sizes.
 
-    It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error").
+    It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error"). By
+    default it ends after one sweep of the ladder, some tens of seconds for thousands of vertices; with a termination by
+    time it takes as many moves as fit.
 
     Parameters
     ----------
@@ -123,12 +324,23 @@ def memetic(
         Rungs of the ladder.
     triangles : (int, int), optional
         Smallest and largest number of triangles to look at; all by default.
-    moves_per_vertex : float
-        Moves of the local search for each kept vertex and child; see :class:`~meshsimp_pymoo.operators.Relocation`.
-    max_moves : int
-        Moves of a whole generation, some microseconds each.
+    moves_per_vertex : float, optional
+        Moves of the annealing for each kept vertex in the first sweep, twice as many in each later one, up to 1000. By
+        default as many as make twenty million in all, within 20 and 1000; with a termination by time, as many as fit.
     **kwargs
         Further arguments of pymoo's ``GeneticAlgorithm``; they replace those set here.
+
+    Raises
+    ------
+    ValueError
+        If ``moves_per_vertex`` is negative.
+    TypeError
+        If ``kwargs`` has a selection, crossover or mutation, which this algorithm does in one step.
+
+    Returns
+    -------
+    MemeticSearch
+        A pymoo algorithm. Its result holds some meshes between the rungs beside the population's.
 
     Examples
     --------
@@ -139,21 +351,29 @@ def memetic(
     >>> sorted({(float(e), int(t)) for e, t in result.F}, key=lambda row: row[1])[-1]
     (0.0, 4)
     """
+    if moves_per_vertex is not None and not moves_per_vertex >= 0:
+        raise ValueError(f"moves_per_vertex = {moves_per_vertex} is no number of at least 0")
+    for name in ("selection", "crossover", "mutation"):
+        if name in kwargs:
+            raise TypeError(f"memetic() makes its children in one step; give mating=... in place of {name}=...")
+    ladder = SizeLadder()
+    duplicates = PackedDuplicates()
     defaults: dict[str, Any] = {
         "sampling": NestedSubsets(triangles),
-        "selection": SizeNeighbours(),
-        "crossover": HalfPlaneCrossover(prob=0.5, n_offsprings=1, keep_size=True),
-        "mutation": Relocation(moves_per_vertex, max_moves=max_moves),
-        "survival": SizeLadder(),
+        "mating": DownTheLadder(ladder, moves_per_vertex, eliminate_duplicates=duplicates),
+        "survival": ladder,
         "repair": PinnedCorners(),
-        "eliminate_duplicates": PackedDuplicates(),
+        "eliminate_duplicates": duplicates,
         "output": MultiObjectiveOutput(),
         "advance_after_initial_infill": True,
-        "n_offsprings": max(pop_size // 4, 1),
+        "n_offsprings": CHAINS,
     }
-    algorithm = GeneticAlgorithm(pop_size, **(defaults | kwargs))
-    # Searches repeated for children that turn out to be known; if all fail the run ends, with nothing left to find.
-    algorithm.mating.n_max_iterations = REPEATS
+    algorithm = MemeticSearch(pop_size, triangles, **(defaults | kwargs))
     # What pymoo's constructor would put here cannot compare bool vectors.
-    algorithm.termination = kwargs.get("termination", ("n_gen", GENERATIONS))
+    algorithm.termination = kwargs.get("termination", ("n_gen", sweep_generations(pop_size)))
     return algorithm
+
+
+def sweep_generations(pop_size: int) -> int:
+    """Return the generations that a sweep of so many rungs takes, the first population included."""
+    return 1 + -(-pop_size // CHAINS)

@@ -28,7 +28,7 @@ from meshsimp_pymoo.geometry.error import (
     evaluate_subsets,
     simplify,
 )
-from meshsimp_pymoo.geometry.load import ModelError, SourceMesh
+from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, Window
 from meshsimp_pymoo.geometry.model import OpenModel, load_model
 from meshsimp_pymoo.geometry.orient import Up
 
@@ -90,6 +90,10 @@ class MeshProblem(ElementwiseProblem):
         Sample distances of a height grid [units].
     nodata : float, optional
         Height that means "no sample" in a height grid.
+    window : (column, row, columns, rows), optional
+        The part of a height grid to take.
+    max_edge : float, optional
+        Longest edge in the plane of a triangle of a point cloud [units].
     pin : "corners", "hull", file rows, positions, or a list of these
         Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole numbers
         for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's frame.
@@ -147,6 +151,8 @@ class MeshProblem(ElementwiseProblem):
         patch: str | None = None,
         spacing: tuple[float, float] | None = None,
         nodata: float | None = None,
+        window: Window | None = None,
+        max_edge: float | None = None,
         pin: str | Sequence[Any] | npt.NDArray[Any] | None = None,
         objectives: Sequence[str] = ("error", "triangles"),
         weights: str | npt.ArrayLike | None = None,
@@ -177,13 +183,17 @@ class MeshProblem(ElementwiseProblem):
             "patch": patch,
             "spacing": spacing,
             "nodata": nodata,
+            "window": window,
+            "max_edge": max_edge,
             "footprint": footprint,
             "outside": outside,
             "pin": pin,
             "objectives": self.objectives,
             "weights": weights,
         }
-        self.model = open_model(model, up=up, patch=patch, spacing=spacing, nodata=nodata)
+        self.model = open_model(
+            model, up=up, patch=patch, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge
+        )
         if weights is not None:
             self.model = self.model.with_weights(weights)
         self.footprint = footprint
@@ -336,10 +346,12 @@ def open_model(
     patch: str | None = None,
     spacing: tuple[float, float] | None = None,
     nodata: float | None = None,
+    window: Window | None = None,
+    max_edge: float | None = None,
 ) -> OpenModel:
     """Read a mesh from a file, a built-in name or memory; see :func:`meshsimp_pymoo.geometry.model.load_model`."""
     if isinstance(model, (str, Path)):
-        model = find_source(model, spacing=spacing, nodata=nodata)
+        model = find_source(model, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
     return load_model(model, up=up, patch=patch)
 
 

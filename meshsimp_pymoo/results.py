@@ -26,20 +26,20 @@ import os
 import platform
 import secrets
 import shutil
+import struct
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.geometry.load import ModelWarning
+from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, read_npz
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.geometry.error import Quality
@@ -50,18 +50,23 @@ __all__ = [
     "FRONT_COLUMNS",
     "MESHES_BY_DEFAULT",
     "MESH_FORMATS",
+    "MESH_SUFFIXES",
     "REFIT_COLUMNS",
     "ResultError",
     "StoredFront",
     "claim_file",
     "claim_output",
+    "local_origin",
     "mesh_arrays",
+    "mesh_suffix",
     "new_file",
     "package_versions",
     "read_front",
-    "warn_of_single_precision",
+    "refuse_format",
+    "stays_inside",
     "write_front",
     "write_mesh",
+    "write_solution",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -81,9 +86,11 @@ FRONT_COLUMNS = (
 )
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
-MESH_FORMATS = ("ply", "obj", "stl", "off", "glb")
-SINGLE_PRECISION_FORMATS = ("stl", "glb")  # by their own definitions
+MESH_FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
+# A LandXML file is called .xml everywhere; the name of the format is understood too.
+MESH_SUFFIXES = (*MESH_FORMATS, "xml")
 SINGLE_PRECISION_LOSS = 1e-6  # share of the model's diagonal; a larger shift of a vertex is worth a warning
+MOST_COUNTED = 2**53  # no mesh has so many triangles
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 OWN_ENTRIES = (
     "front.csv", "front.npz", "front.png", "run.json", "meshes",
@@ -101,6 +108,29 @@ PLY_TYPES = {
 }  # fmt: skip
 PLY_WIDER = {"b1": "u1", "f2": "f4", "i8": "f8", "u8": "f8"}
 PLY_COLORS = ("red", "green", "blue", "alpha")
+
+# glTF 2.0: the numbers of the types, of what a buffer is for, and of "triangles".
+GLTF_FLOAT, GLTF_UINT, GLTF_UBYTE = 5126, 5125, 5121
+GLTF_VERTICES, GLTF_INDICES, GLTF_TRIANGLES = 34962, 34963, 4
+LANDXML = "http://www.landxml.org/schema/LandXML-1.2"
+# LandXML demands a date and a time; one that never changes keeps equal meshes equal.
+LANDXML_DATE = {"date": "1980-01-01", "time": "00:00:00"}
+# What a CRS calls its unit, and LandXML's system of units and names for it; metres where nothing is known.
+LANDXML_UNITS = {
+    "metre": ("Metric", "meter"), "meter": ("Metric", "meter"), "m": ("Metric", "meter"),
+    "kilometre": ("Metric", "kilometer"), "foot": ("Imperial", "foot"), "ft": ("Imperial", "foot"),
+    "us survey foot": ("Imperial", "USSurveyFoot"), "ftus": ("Imperial", "USSurveyFoot"),
+}  # fmt: skip
+LANDXML_MEASURES = {
+    "Metric": {
+        "areaUnit": "squareMeter", "volumeUnit": "cubicMeter",
+        "temperatureUnit": "celsius", "pressureUnit": "milliBars",
+    },
+    "Imperial": {
+        "areaUnit": "squareFoot", "volumeUnit": "cubicFeet",
+        "temperatureUnit": "fahrenheit", "pressureUnit": "inchHG",
+    },
+}  # fmt: skip
 
 
 class ResultError(ValueError):
@@ -226,8 +256,9 @@ def write_front(
         The most meshes to write; a longer front writes an even selection, its ends included. None writes all,
         0 none.
     mesh_format : str
-        One of MESH_FORMATS. PLY (binary, double precision) keeps every attribute; OBJ and OFF keep full
-        precision; STL and GLB are single precision by definition.
+        One of MESH_FORMATS. PLY (binary, double precision) keeps every attribute; OBJ, OFF and LandXML keep full
+        precision; STL and GLB are single precision by definition, GLB from an origin that it states (see
+        :func:`write_mesh`).
     chosen : int, optional
         Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
     refit : callable, optional
@@ -263,6 +294,9 @@ def write_front(
         )
     if mesh_format not in MESH_FORMATS:
         raise ValueError(f"mesh_format is {mesh_format!r}; it must be one of {', '.join(MESH_FORMATS)}")
+    refuse_format(model, mesh_format)
+    suffix = mesh_suffix(mesh_format)
+    look = _written_frame(model, mesh_format)
     F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
     if not np.isfinite(F).all():
         raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
@@ -288,18 +322,18 @@ def write_front(
                 arrays = mesh_arrays(model, faces(int(row)))
                 single = max(single, _single_precision_shift(arrays[0]))
                 if solution in with_mesh:
-                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{mesh_format}"
-                    write_mesh(partial / path, *arrays)
+                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{suffix}"
+                    write_mesh(partial / path, *arrays, **look)
                 if row == chosen:
-                    write_mesh(partial / f"chosen.{mesh_format}", *arrays)
+                    write_mesh(partial / f"chosen.{suffix}", *arrays, **look)
                 if refit is not None:
                     better = refit(int(row))
                     raised = (better.vertices(model), *arrays[1:])
                     fitted = [_spelled("error", better.error), path.replace("meshes/", "refitted/")]
                     if solution in with_mesh:
-                        write_mesh(partial / fitted[1], *raised)
+                        write_mesh(partial / fitted[1], *raised, **look)
                     if row == chosen:
-                        write_mesh(partial / f"chosen_refitted.{mesh_format}", *raised)
+                        write_mesh(partial / f"chosen_refitted.{suffix}", *raised, **look)
             numbers = [_spelled(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
         _warn_of_shift(model, mesh_format, single)
@@ -314,7 +348,9 @@ def write_front(
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
                 "up": model.up,
+                **({"georeference": model.georeference} if model.georeference else {}),
             },
+            **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),
             "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
             "versions": package_versions(),
@@ -375,11 +411,24 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     record = folder / "run.json"
     try:
         run = json.loads(record.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
+    except (OSError, ValueError, RecursionError) as problem:
         raise ResultError(f"{record}: cannot be read ({_short(problem)})") from None
     if not isinstance(run, dict) or run.get("solutions") != count:
         raise ResultError(f"{record}: is not the record of this front of {count} solutions")
+    _check_record(run, count, record)
     return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes)
+
+
+def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
+    """Refuse a record whose parts are not of the kind that others rely on."""
+    model, chosen = run.get("model") or {}, run.get("chosen")
+    wrong = [name for name in ("model", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    if not wrong:
+        wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
+    if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
+        wrong.append("chosen")
+    if wrong:
+        raise ResultError(f"{path}: {', '.join(wrong)} is not what a front's record holds; write the front again")
 
 
 def mesh_arrays(
@@ -413,19 +462,33 @@ def write_mesh(
     vertices: FloatArray,
     faces: IntArray,
     attributes: Mapping[str, npt.NDArray[Any]] | None = None,
+    *,
+    origin: npt.ArrayLike | None = None,
+    georeference: Mapping[str, Any] | None = None,
+    name: str = "surface",
 ) -> None:
     """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
 
     Parameters
     ----------
     path : path
-        Ends in one of MESH_FORMATS.
+        Ends in one of MESH_SUFFIXES; ``.xml`` is LandXML, a surface for survey and GIS programs.
     vertices : (V, 3) float array
-        Coordinates; written in double precision (STL and GLB, by definition: single).
+        Coordinates; written in double precision (STL and GLB, by definition: single). LandXML takes z for the height,
+        y for the northing and x for the easting.
     faces : (M, 3) int array
         Triangles.
     attributes : mapping of str to (V,) or (V, k) array, optional
-        ``color`` (uint8, 3 or 4 columns) goes to every format but STL and OFF, anything else to PLY only.
+        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, anything else to PLY only.
+    origin : (3,) floats, optional
+        Of GLB: what is subtracted from the coordinates before they lose their double precision. The file says it twice:
+        as the translation of its one node, which puts the mesh back where it was, and as ``extras.origin``. By default
+        it is 0 where that loses nothing, else the mesh's lower corner in whole units.
+    georeference : mapping, optional
+        What is known of the coordinates (see :class:`~meshsimp_pymoo.geometry.load.SourceMesh`): PLY says the CRS in a
+        comment, GLB in ``extras``, LandXML as its coordinate system and unit.
+    name : str
+        What LandXML calls the surface.
 
     Raises
     ------
@@ -435,8 +498,16 @@ def write_mesh(
     path = Path(path)
     attributes = dict(attributes or {})
     suffix = path.suffix.lower().lstrip(".")
+    facts = dict(georeference or {})
     if suffix == "ply":
-        path.write_bytes(_ply_bytes(vertices, faces, attributes))
+        path.write_bytes(_ply_bytes(vertices, faces, attributes, facts))
+        return
+    if suffix == "glb":
+        start = local_origin(vertices) if origin is None else np.asarray(origin, dtype=np.float64)
+        path.write_bytes(_glb_bytes(vertices, faces, attributes.get("color"), start, facts))
+        return
+    if suffix in ("xml", "landxml"):
+        path.write_bytes(_landxml_bytes(vertices, faces, name, facts))
         return
     if suffix not in MESH_FORMATS:
         raise ValueError(f"{path}: no such mesh format; write one of {', '.join(MESH_FORMATS)}")
@@ -450,6 +521,70 @@ def write_mesh(
         options |= {"include_normals": False, "header": None}
     written = mesh.export(file_type=suffix, **options)
     path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))
+
+
+def mesh_suffix(mesh_format: str) -> str:
+    """Return the suffix of files of a mesh format, without the dot."""
+    return "xml" if mesh_format == "landxml" else mesh_format
+
+
+def local_origin(vertices: FloatArray) -> FloatArray:
+    """Return the origin (3,) from which single precision holds vertices (V, 3): 0 if that does, else whole units.
+
+    >>> local_origin(np.array([[0.0, 0.5, 1.0], [1.0, 1.0, 2.0]])).tolist()
+    [0.0, 0.0, 0.0]
+    >>> local_origin(np.array([[500000.1, 5400000.1, 7.5], [500001.1, 5400001.1, 8.5]])).tolist()
+    [500000.0, 5400000.0, 7.0]
+    """
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
+    if _single_precision_shift(vertices) <= SINGLE_PRECISION_LOSS * diagonal:
+        return np.zeros(3)
+    return np.asarray(np.floor(vertices.min(axis=0)), dtype=np.float64)
+
+
+def refuse_format(model: OpenModel, mesh_format: str) -> None:
+    """Refuse LandXML for a model whose heights are not along the z of its file.
+
+    Raises
+    ------
+    ResultError
+        With the direction that they have.
+    """
+    if mesh_format not in ("landxml", "xml"):
+        return
+    a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    if model.up[2] <= 0 or (area < 0).any():
+        raise ResultError(
+            f"{model.name}: a LandXML surface has its heights along z, and this one has them along "
+            f"{model.up.round(6).tolist()}; write another format, such as ply"
+        )
+
+
+def _written_frame(model: OpenModel, mesh_format: str) -> dict[str, Any]:
+    """Return what `write_mesh` is to know of a model's frame; all meshes of a front have one origin."""
+    origin = local_origin(model.file_points) if mesh_format == "glb" else np.zeros(3)
+    return {"origin": origin, "georeference": model.georeference, "name": Path(model.name).stem}
+
+
+def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
+    """Write a mesh of a model, its triangles (M, 3) in vector order, in the format of the path's suffix.
+
+    Raises
+    ------
+    ResultError
+        If the format cannot hold this model.
+
+    Warns
+    -----
+    ModelWarning
+        If single precision moves vertices by more than rounding.
+    """
+    suffix = path.suffix.lower().lstrip(".")
+    refuse_format(model, suffix)
+    arrays = mesh_arrays(model, faces)
+    _warn_of_shift(model, suffix, _single_precision_shift(arrays[0]))
+    write_mesh(path, *arrays, **_written_frame(model, suffix))
 
 
 def claim_file(path: str | os.PathLike[str], suffixes: Sequence[str], *, overwrite: bool = False) -> Path:
@@ -496,11 +631,6 @@ def new_file(path: Path) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
-def warn_of_single_precision(model: OpenModel, mesh_format: str, vertices: FloatArray) -> None:
-    """Warn if a format of single precision moves vertices (V, 3) of the model's file frame by more than rounding."""
-    _warn_of_shift(model, mesh_format, _single_precision_shift(vertices))
-
-
 def package_versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that decide the results; absent ones are left out."""
     versions = {"python": platform.python_version()}
@@ -513,10 +643,10 @@ def package_versions() -> dict[str, str]:
 
 
 def _warn_of_shift(model: OpenModel, mesh_format: str, shift: float) -> None:
-    if mesh_format in SINGLE_PRECISION_FORMATS and shift > SINGLE_PRECISION_LOSS * model.diagonal:
+    if mesh_format == "stl" and shift > SINGLE_PRECISION_LOSS * model.diagonal:
         warnings.warn(
             f"{model.name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
-            "[file units]; ply, obj and off keep them exactly",
+            "[file units]; ply, obj and off keep them exactly, glb states a local origin",
             ModelWarning,
             stacklevel=3,
         )
@@ -582,7 +712,7 @@ def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...],
                 continue
             try:
                 value = kind(row[at])
-                if not 0 <= value < float("inf"):
+                if not 0 <= value < (MOST_COUNTED if kind is int else float("inf")):
                     raise ValueError
             except ValueError:
                 raise ResultError(f"{path}, line {line}: {column} is {row[at]!r}") from None
@@ -598,9 +728,21 @@ def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...],
     refitted = tuple(row[-1] for row in rows[1:]) if header[-1] == "refitted_mesh" else ()
     for line, paths in enumerate(zip(meshes, refitted or meshes, strict=True), start=2):
         for mesh in paths:
-            if mesh and (PurePosixPath(mesh).is_absolute() or ".." in PurePosixPath(mesh).parts):
+            if mesh and not stays_inside(path.parent, mesh):
                 raise ResultError(f"{path}, line {line}: mesh {mesh!r} is not inside the folder")
     return columns, meshes, refitted
+
+
+def stays_inside(folder: Path, name: str) -> bool:
+    """Tell whether a stored name leads to a place inside the folder, by any system's rules and through any link."""
+    if "\0" in name or any(
+        bool(path.anchor) or ".." in path.parts for path in (PurePosixPath(name), PureWindowsPath(name))
+    ):
+        return False
+    try:
+        return (folder / name).resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # a link that leads to itself
+        return False
 
 
 def _write_npz(path: Path, **arrays: npt.NDArray[Any]) -> None:
@@ -616,9 +758,12 @@ def _write_npz(path: Path, **arrays: npt.NDArray[Any]) -> None:
 
 def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            F, packed, source_index = file["F"], file["kept"], file["source_index"]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, TypeError) as problem:
+        with path.open("rb") as stream:
+            arrays = read_npz(stream, path.name)
+        F, packed, source_index = arrays["F"], arrays["kept"], arrays["source_index"]
+    except KeyError as problem:
+        raise ResultError(f"{path}: holds no array {problem}; the file is not ours") from None
+    except (OSError, ModelError, MemoryError) as problem:
         raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
     for name, array, kind, ndim in (
         ("F", F, "f", 2),
@@ -636,7 +781,9 @@ def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
     return F, packed, source_index
 
 
-def _ply_bytes(vertices: FloatArray, faces: IntArray, attributes: Mapping[str, npt.NDArray[Any]]) -> bytes:
+def _ply_bytes(
+    vertices: FloatArray, faces: IntArray, attributes: Mapping[str, npt.NDArray[Any]], georeference: Mapping[str, Any]
+) -> bytes:
     """Return a binary PLY with double coordinates; trimesh's own writer stores single precision."""
     vertices = np.asarray(vertices, dtype=np.float64)
     columns: list[tuple[str, npt.NDArray[Any]]] = [(axis, vertices[:, k]) for k, axis in enumerate("xyz")]
@@ -661,13 +808,125 @@ def _ply_bytes(vertices: FloatArray, faces: IntArray, attributes: Mapping[str, n
     header = [
         "ply",
         "format binary_little_endian 1.0",
+        *_crs_comments(georeference),
         f"element vertex {len(vertices)}",
         *properties,
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
         "end_header\n",
     ]
-    return "\n".join(header).encode("ascii") + record.tobytes() + triangles.tobytes()
+    return "\n".join(header).encode("utf-8") + record.tobytes() + triangles.tobytes()
+
+
+def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
+    """Return the line of a PLY header that says the coordinate reference system, if it is known."""
+    if georeference.get("epsg"):
+        return [f"comment crs EPSG:{georeference['epsg']}"]
+    wkt = " ".join(str(georeference.get("crs") or "").split())
+    return [f"comment crs {wkt}"] if wkt else []
+
+
+def _glb_bytes(
+    vertices: FloatArray,
+    faces: IntArray,
+    color: npt.NDArray[Any] | None,
+    origin: FloatArray,
+    georeference: Mapping[str, Any],
+) -> bytes:
+    """Return a GLB of one node with one mesh, whose coordinates are those from the origin."""
+    points = (np.asarray(vertices, dtype=np.float64) - origin).astype("<f4")
+    parts: list[tuple[npt.NDArray[Any], int, dict[str, Any]]] = [
+        (
+            points,
+            GLTF_VERTICES,
+            {
+                "componentType": GLTF_FLOAT,
+                "type": "VEC3",
+                "count": len(points),
+                "min": points.min(axis=0).tolist(),
+                "max": points.max(axis=0).tolist(),
+            },
+        ),
+        (
+            np.asarray(faces).astype("<u4").ravel(),
+            GLTF_INDICES,
+            {"componentType": GLTF_UINT, "type": "SCALAR", "count": 3 * len(faces)},
+        ),
+    ]
+    attributes = {"POSITION": 0}
+    if color is not None:
+        rgba = np.full((len(points), 4), 255, np.uint8)
+        rgba[:, : color.shape[1]] = color
+        form = {"componentType": GLTF_UBYTE, "type": "VEC4", "count": len(points), "normalized": True}
+        parts.append((rgba, GLTF_VERTICES, form))
+        attributes["COLOR_0"] = 2
+    binary, views = b"", []
+    for values, target, _ in parts:
+        content = values.tobytes()
+        views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(content), "target": target})
+        binary += content + b"\0" * (-len(content) % 4)
+    node: dict[str, Any] = {"mesh": 0}
+    if origin.any():
+        node |= {"translation": origin.tolist(), "extras": {"origin": origin.tolist()}}
+    crs = {key: georeference[key] for key in ("epsg", "crs") if georeference.get(key)}
+    if crs:
+        node["extras"] = node.get("extras", {}) | crs
+    tree = {
+        "asset": {"version": "2.0", "generator": "meshsimp_pymoo"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [node],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "mode": GLTF_TRIANGLES}]}],
+        "accessors": [{"bufferView": k} | form for k, (_, _, form) in enumerate(parts)],
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(binary)}],
+    }
+    text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    length = 12 + 8 + len(text) + 8 + len(binary)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, length) + chunks
+
+
+def _landxml_bytes(vertices: FloatArray, faces: IntArray, name: str, georeference: Mapping[str, Any]) -> bytes:
+    """Return a LandXML 1.2 surface: points as "northing easting elevation", faces counter-clockwise."""
+    from xml.sax.saxutils import quoteattr
+
+    system, unit = LANDXML_UNITS.get(str(georeference.get("unit") or "").lower(), LANDXML_UNITS["metre"])
+    measures = {"linearUnit": unit} | LANDXML_MEASURES[system]
+    crs = {"epsgCode": str(georeference.get("epsg") or ""), "ogcWktCode": str(georeference.get("crs") or "")}
+    z = vertices[:, 2]
+    points = [
+        f'<P id="{k}">{y!r} {x!r} {height!r}</P>' for k, (x, y, height) in enumerate(vertices.tolist(), start=1)
+    ]
+    triangles = [f"<F>{a} {b} {c}</F>" for a, b, c in (np.asarray(faces, dtype=np.int64) + 1).tolist()]
+
+    def spelled(attributes: Mapping[str, str]) -> str:
+        return "".join(f" {key}={quoteattr(_printable(value))}" for key, value in attributes.items() if value)
+
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<LandXML xmlns="{LANDXML}" version="1.2" readOnly="false"{spelled(LANDXML_DATE)}>',
+        f"<Units><{system}{spelled(measures)}/></Units>",
+        *([f"<CoordinateSystem{spelled(crs)}/>"] if any(crs.values()) else []),
+        '<Application name="meshsimp_pymoo"/>',
+        f"<Surfaces><Surface{spelled({'name': name})}>",
+        f'<Definition surfType="TIN" elevMin="{float(z.min())!r}" elevMax="{float(z.max())!r}">',
+        "<Pnts>",
+        *points,
+        "</Pnts>",
+        "<Faces>",
+        *triangles,
+        "</Faces>",
+        "</Definition></Surface></Surfaces>",
+        "</LandXML>",
+    ]
+    return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _printable(text: str) -> str:
+    """Return a text without the characters that XML cannot hold."""
+    return "".join(character if character.isprintable() else "?" for character in text)
 
 
 def _single_precision_shift(vertices: FloatArray) -> float:

@@ -25,8 +25,6 @@ import json
 import os
 import re
 import secrets
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -35,8 +33,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.geometry.load import ModelError, read_npz
 from meshsimp_pymoo.geometry.model import OpenModel
-from meshsimp_pymoo.results import ResultError
+from meshsimp_pymoo.results import ResultError, stays_inside
 
 __all__ = [
     "EXPERIMENT_FILE",
@@ -66,7 +65,7 @@ FORMAT = 1
 KEY_DIGITS = 16
 
 # What is not stored of a model: results can be shown without its colours and the checks it passed.
-NOT_STORED = ("attributes", "facts")
+NOT_STORED = ("attributes", "facts", "georeference")
 
 
 class ExperimentWarning(UserWarning):
@@ -159,7 +158,7 @@ def read_experiment(out: str | os.PathLike[str]) -> dict[str, Any]:
         raise ResultError(f"{out}: no experiment is stored there ({EXPERIMENT_FILE} is missing)")
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
+    except (OSError, ValueError, RecursionError) as problem:
         raise ResultError(f"{path}: cannot be read ({_first_line(problem)}); `meshsimp run` writes it anew") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise ResultError(f"{path}: is not of the format {FORMAT} that this version reads; run it again")
@@ -324,6 +323,8 @@ def read_model(out: Path, relative: str, expected: str) -> OpenModel:
     ResultError
         If it is missing or damaged.
     """
+    if not isinstance(relative, str) or not stays_inside(out, relative):
+        raise ResultError(f"{out}: names a model {relative!r} outside the folder; run the experiment again")
     path = out / relative
     try:
         arrays = _arrays(path.read_bytes(), path)
@@ -388,9 +389,8 @@ def _put(path: Path, content: bytes) -> None:
 
 def _arrays(content: bytes, path: Path) -> dict[str, npt.NDArray[Any]]:
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, KeyError) as problem:
+        return read_npz(io.BytesIO(content), path.name)
+    except (ModelError, MemoryError) as problem:
         raise ResultError(f"{path}: is damaged ({_first_line(problem)})") from None
 
 

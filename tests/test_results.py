@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -28,6 +29,9 @@ from meshsimp_pymoo.results import (
     write_front,
     write_mesh,
 )
+
+MESH_PROGRAM_FORMATS = [name for name in results.MESH_FORMATS if name != "landxml"]
+UTM = np.array([500_000.25, 5_400_000.5, 300.125])
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +121,7 @@ def test_a_long_front_writes_an_even_selection_of_its_meshes(tmp_path, model, so
     assert on_disk == {path for path in stored.meshes if path}
 
 
-@pytest.mark.parametrize("suffix", results.MESH_FORMATS)
+@pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)
 def test_every_format_opens_in_trimesh_with_the_same_shape(tmp_path, model, solutions, suffix):
     folder = write(tmp_path / "out", model, solutions, mesh_format=suffix, chosen=0, meshes=1)
     vertices, faces, _ = mesh_arrays(model, solutions[1][0].faces)
@@ -132,7 +136,7 @@ def test_every_format_opens_in_trimesh_with_the_same_shape(tmp_path, model, solu
         assert np.array_equal(corners, expected)
 
 
-@pytest.mark.parametrize("suffix", results.MESH_FORMATS)
+@pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)
 def test_every_format_opens_in_pymeshlab(tmp_path, model, solutions, suffix):
     pymeshlab = pytest.importorskip("pymeshlab", exc_type=ImportError)
     vertices, faces, attributes = mesh_arrays(model, solutions[1][0].faces)
@@ -190,14 +194,108 @@ def test_double_precision_survives_far_from_the_origin(tmp_path, solutions):
     assert written <= {tuple(point) for point in far.points.tolist()}
 
 
-@pytest.mark.parametrize("suffix", ["stl", "glb"])
-def test_a_single_precision_format_says_how_far_it_moves_vertices(tmp_path, solutions, suffix):
+def test_a_single_precision_format_says_how_far_it_moves_vertices(tmp_path, solutions):
     source = load("face:200")
     far = load_model(dataclasses.replace(source, points=source.points + np.array([5e6, 4e6, 0])))
     with pytest.warns(
         ModelWarning, match=r"moves vertices by up to 0\.[12]\d+ \[file units\]; ply, obj and off"
     ):
-        write(tmp_path / "out", far, solutions, mesh_format=suffix)
+        write(tmp_path / "out", far, solutions, mesh_format="stl")
+
+
+def glb_tree(path):
+    content = path.read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    assert content[:4] == b"glTF"
+    assert int.from_bytes(content[8:12], "little") == len(content)
+    assert length % 4 == 0
+    return json.loads(content[20 : 20 + length])
+
+
+def test_a_glb_far_from_the_origin_states_a_local_one_and_loses_nothing(tmp_path, solutions):
+    source = load("face:200")
+    points = np.round(source.points * 1024) / 1024 + UTM
+    far = load_model(dataclasses.replace(source, points=points, georeference={"epsg": 25832, "crs": "PROJCS[...]"}))
+    folder = write(tmp_path / "out", far, solutions, mesh_format="glb", chosen=3)
+    (origin,) = {tuple(glb_tree(path)["nodes"][0]["extras"]["origin"]) for path in folder.glob("**/*.glb")}
+    assert origin == tuple(np.floor(far.file_points.min(axis=0)))
+    node = glb_tree(folder / "chosen.glb")["nodes"][0]
+    assert node["translation"] == list(origin)
+    assert (node["extras"]["epsg"], node["extras"]["crs"]) == (25832, "PROJCS[...]")
+    assert read_front(folder).run["mesh_origin"] == list(origin)
+    vertices, faces, _ = mesh_arrays(far, solutions[1][3].faces)
+    for path in (folder / "chosen.glb", folder / "meshes" / "000.glb"):
+        if not path.exists():
+            continue
+        mesh = trimesh.load(path, process=False, force="mesh")  # puts it where the node says, in double precision
+        assert np.array_equal(mesh.triangles, vertices[faces])
+    again = read_source(folder / "chosen.glb")
+    assert {tuple(p) for p in again.points.tolist()} == {tuple(p) for p in vertices.tolist()}
+
+
+def test_a_glb_near_the_origin_has_its_coordinates_as_they_are(tmp_path, model, solutions):
+    folder = write(tmp_path / "out", model, solutions, mesh_format="glb", meshes=1)
+    (path,) = folder.glob("meshes/*.glb")
+    assert glb_tree(path)["nodes"] == [{"mesh": 0}]
+    assert "mesh_origin" not in read_front(folder).run
+
+
+LAND = "{http://www.landxml.org/schema/LandXML-1.2}"
+
+
+@pytest.mark.parametrize(
+    ("unit", "system", "linear"),
+    [(None, "Metric", "meter"), ("metre", "Metric", "meter"), ("US survey foot", "Imperial", "USSurveyFoot")],
+)
+def test_landxml_is_a_tin_of_northing_easting_and_elevation_in_double_precision(
+    tmp_path, solutions, unit, system, linear
+):
+    source = load("face:200")
+    facts = {"epsg": 25832, "crs": 'PROJCS["a & b"]', "unit": unit}
+    far = load_model(dataclasses.replace(source, points=source.points + UTM, georeference=facts, name='<a & "b">.tif'))
+    folder = write(tmp_path / "out", far, solutions, mesh_format="landxml", chosen=3, meshes=1)
+    assert read_front(folder).meshes[0].endswith(".xml")
+    root = ElementTree.parse(folder / "chosen.xml").getroot()
+    assert root.tag == f"{LAND}LandXML"
+    assert {"version", "date", "time"} <= set(root.attrib)
+    (units,) = root.find(f"{LAND}Units")
+    assert units.tag == LAND + system
+    assert units.get("linearUnit") == linear
+    assert {"areaUnit", "linearUnit", "volumeUnit", "temperatureUnit", "pressureUnit"} == set(units.attrib)
+    coordinates = root.find(f"{LAND}CoordinateSystem")
+    assert (coordinates.get("epsgCode"), coordinates.get("ogcWktCode")) == ("25832", 'PROJCS["a & b"]')
+    surface = root.find(f"{LAND}Surfaces/{LAND}Surface")
+    assert surface.get("name") == '<a & "b">'
+    definition = surface.find(f"{LAND}Definition")
+    assert definition.get("surfType") == "TIN"
+    points = {int(p.get("id")): [float(word) for word in p.text.split()] for p in definition.find(f"{LAND}Pnts")}
+    assert sorted(points) == list(range(1, len(points) + 1))
+    vertices, faces, _ = mesh_arrays(far, solutions[1][3].faces)
+    back = np.array([points[k + 1] for k in range(len(points))])[:, [1, 0, 2]]
+    assert np.array_equal(back, vertices)  # to the last bit
+    triangles = np.array([f.text.split() for f in definition.find(f"{LAND}Faces")], dtype=int)
+    assert np.array_equal(triangles - 1, faces)
+    assert float(definition.get("elevMax")) == vertices[:, 2].max()
+
+
+def test_landxml_is_refused_where_the_height_is_not_z(tmp_path):
+    roof = load("roof:5")
+    model = load_model(SourceMesh(roof.points[:, [2, 0, 1]], roof.faces, {}, "turned"), up="x")
+    kept = np.ones((1, model.n_vertices), dtype=bool)
+    with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .*\[1.0, 0.0, 0.0\]"):
+        write_front(tmp_path / "out", model, [simplify(model, kept[0]).quality], kept, meshes=0, mesh_format="landxml")
+
+
+def test_the_reference_system_stands_in_the_record_and_in_the_ply(tmp_path, solutions):
+    source = load("face:200")
+    facts = {"epsg": 25832, "transform": [1.0, 0.0, 2.0, 0.0, -1.0, 5.0]}
+    folder = write(tmp_path / "a", load_model(dataclasses.replace(source, georeference=facts)), solutions, chosen=1)
+    assert read_front(folder).run["model"]["georeference"] == facts
+    assert b"\ncomment crs EPSG:25832\n" in (folder / "chosen.ply").read_bytes()
+    wkt = {"crs": 'LOCAL_CS["Höhe\n\n2",  UNIT["metre",1]]'}
+    folder = write(tmp_path / "b", load_model(dataclasses.replace(source, georeference=wkt)), solutions, chosen=1)
+    assert '\ncomment crs LOCAL_CS["Höhe 2", UNIT["metre",1]]\n'.encode() in (folder / "chosen.ply").read_bytes()
+    assert len(read_source(folder / "chosen.ply").faces) == solutions[1][1].quality.triangles
 
 
 def test_a_tilted_model_is_written_back_in_its_own_frame(tmp_path):
@@ -349,6 +447,36 @@ def spoil_npz(**changed):
     return spoil
 
 
+def link_out(folder):
+    (folder.parent / "secret.ply").write_text("secret")
+    (folder / "meshes").mkdir(exist_ok=True)
+    (folder / "meshes" / "out.ply").symlink_to(folder.parent / "secret.ply")
+    spoil_csv(2, "mesh", "meshes/out.ply")(folder)
+
+
+def npz_bomb(folder):
+    header = b"{'descr': '|u1', 'fortran_order': False, 'shape': (4000000000, 8), }".ljust(117) + b"\n"
+    with zipfile.ZipFile(folder / "front.npz", "w") as archive:
+        archive.writestr("kept.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header)
+
+
+def packed_bomb(folder):
+    with zipfile.ZipFile(folder / "front.npz", "w") as archive:
+        archive.writestr("kept.npy", b"\0" * 1000)
+    content = (folder / "front.npz").read_bytes()
+    at = content.rindex(b"PK\x01\x02")  # the directory's last entry: its unpacked size
+    changed = content[: at + 24] + (4_000_000_000).to_bytes(4, "little") + content[at + 28 :]
+    (folder / "front.npz").write_bytes(changed)
+
+
+def change_run(**changed):
+    def spoil(folder):
+        run = json.loads((folder / "run.json").read_text())
+        (folder / "run.json").write_text(json.dumps(run | changed))
+
+    return spoil
+
+
 def spoil_run(folder):
     run = json.loads((folder / "run.json").read_text())
     (folder / "run.json").write_text(json.dumps(run | {"solutions": 11}))
@@ -375,17 +503,23 @@ DAMAGE = {
         spoil_csv(2, "mesh", "../x.ply"),
         r"line 2: mesh '\.\./x\.ply' is not inside the folder",
     ),
+    "absolute path": (spoil_csv(2, "mesh", "/etc/x.ply"), r"line 2: mesh '/etc/x\.ply' is not inside the folder"),
+    "Windows path": (spoil_csv(2, "mesh", "C:x.ply"), r"line 2: mesh 'C:x\.ply' is not inside the folder"),
+    "climbing Windows path": (spoil_csv(2, "mesh", "a\\..\\..\\x.ply"), r"is not inside the folder"),
+    "link that leads out": (link_out, r"line 2: mesh 'meshes/out\.ply' is not inside the folder"),
     "other error": (spoil_csv(3, "error", "1.5"), r"front\.npz: its F is not that of front\.csv"),
     "no npz": (lambda f: (f / "front.npz").unlink(), r"front\.npz: cannot be read \(No such file"),
-    "cut npz": (cut("front.npz", 0.6), r"front\.npz: cannot be read \(File is not a zip file\)"),
+    "cut npz": (cut("front.npz", 0.6), r"front\.npz: cannot be read \(.*File is not a zip file"),
     "no kept": (
         lambda f: np.savez(f / "front.npz", F=np.zeros((12, 2))),
-        r"front\.npz: cannot be read \(.*kept",
+        r"front\.npz: holds no array 'kept'",
     ),
     "pickled": (
         lambda f: np.savez(f / "front.npz", F=np.array([{}], dtype=object)),
-        r"front\.npz: cannot be read \(Object arrays cannot be loaded",
+        r"front\.npz: cannot be read \(.*F\.npy: holds Python objects, which are never unpickled",
     ),
+    "array of 32 GB": (npz_bomb, r"front\.npz: cannot be read \(.*kept\.npy: truncated: declares"),
+    "packed bomb": (packed_bomb, r"front\.npz: cannot be read \(.*declares 4000000000 bytes packed into"),
     "unpacked bits": (spoil_npz(kept=lambda k: np.unpackbits(k, axis=1)), r"kept has the shape \(12, 200\)"),
     "bools": (spoil_npz(kept=lambda k: k > 0), r"kept has the type bool"),
     "too many vertices": (
@@ -398,6 +532,11 @@ DAMAGE = {
     ),
     "no run": (lambda f: (f / "run.json").unlink(), r"run\.json: cannot be read \(No such file"),
     "cut run": (cut("run.json", 0.5), r"run\.json: cannot be read"),
+    "chosen beyond": (change_run(chosen=12), r"run\.json: chosen is not what a front's record holds"),
+    "chosen no number": (change_run(chosen="0"), r"run\.json: chosen is not"),
+    "model no mapping": (change_run(model="face.ply"), r"run\.json: model is not"),
+    "file no text": (change_run(model={"file": 3}), r"run\.json: model\.file is not"),
+    "deep run": (lambda f: (f / "run.json").write_text("[" * 100_000), r"run\.json: cannot be read"),
     "other run": (spoil_run, r"run\.json: is not the record of this front of 12 solutions"),
     "no folder": (lambda f: shutil.rmtree(f), r"out: no such folder"),
 }

@@ -35,8 +35,8 @@ from meshsimp_pymoo.geometry.live import (
     _total,
     build,
     insert,
+    lent_live,
     make_ground,
-    make_live,
     remove,
     summed_error,
     try_remove,
@@ -92,6 +92,7 @@ def thinning(
     footprint: str = "model",
     outside: str = "nearest",
     measure: str = "error",
+    least: int = 0,
 ) -> NestedFront:
     """Remove the vertex whose removal adds the least error, until only the pinned ones are left.
 
@@ -107,6 +108,8 @@ def thinning(
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
     measure : {"error", "rms_error"}
         What counts: w_p d_p, or w_p times the square of d_p; also what the front's ``error`` is.
+    least : int
+        Stop once there are this many triangles or fewer.
 
     Returns
     -------
@@ -116,13 +119,13 @@ def thinning(
     start = np.ones(model.n_vertices, bool) if kept is None else kept | fixed
     sites = _sites(model, start, fixed)
     ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
-    live = make_live(model.n_vertices)
+    live = lent_live(model.n_vertices)
     build(ground, live, model, sites)
     n = int((~fixed[sites]).sum())
     removed = np.empty(n, np.int64)
     error = np.empty(n + 1)
     triangles = np.empty(n + 1, np.int64)
-    n_removed = _thin(ground, live, sites, fixed, removed, error, triangles)
+    n_removed = _thin(ground, live, sites, fixed, least, removed, error, triangles)
     base = np.setdiff1d(sites, removed[:n_removed])
     return NestedFront(
         base,
@@ -172,7 +175,7 @@ def greedy_insertion(
     fixed = _pinned(model, pinned)
     sites = _sites(model, fixed, fixed)
     ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
-    live = make_live(model.n_vertices)
+    live = lent_live(model.n_vertices)
     build(ground, live, model, sites)
     n = model.n_vertices - len(sites) if most is None else min(most, model.n_vertices - len(sites))
     inserted = np.empty(n, np.int64)
@@ -256,6 +259,7 @@ def _thin(
     live: Live,
     sites: np.ndarray,
     fixed: np.ndarray,
+    least: int,
     removed: np.ndarray,
     error: np.ndarray,
     triangles: np.ndarray,
@@ -280,7 +284,7 @@ def _thin(
     triangles[0] = live.tally[N_EMITTED]
     n_removed = 0
     around = np.empty(len(live.ring), np.int64)
-    while n > 0 and key[heap[0]] < np.inf:
+    while n > 0 and key[heap[0]] < np.inf and triangles[n_removed] > least:
         v = heap[0]
         n -= 1
         heap[0] = heap[n]

@@ -45,6 +45,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         say("interrupted; nothing is written")
         return INTERRUPTED
+    except MemoryError:
+        say("the work does not fit into memory; take a part of the model, a smaller population, or tiles (--tile)")
+        return BAD_INPUT
     except Exception as problem:
         if not isinstance(problem, _input_errors()):
             raise

@@ -22,14 +22,14 @@ DEFAULT_GENERATIONS = 200
 MEASURES = {"l1": "error", "rms": "rms_error", "max": "max_error"}
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}
 # Presets that return a front; the weighted-sum ones return one solution.
-ALGORITHMS = ("nsga2_v1", "nsga2_v2", "moead", "memetic")
-FORMATS = ("ply", "obj", "stl", "off", "glb")
+ALGORITHMS = ("memetic", "nsga2_v1", "nsga2_v2", "moead")
+FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
 SHELLS = ("bash", "zsh", "tcsh")
 
 MODELS = """\
-MODEL is a mesh (PLY, OBJ, STL, OFF, GLB, ...), a height grid (.npy, .npz, .asc)
-or a built-in model such as jacksboro:11, face:5000 or roof; `meshsimp info`
-lists the built-in ones.
+MODEL is a mesh (PLY, OBJ, STL, OFF, GLB, ...), a height grid (.npy, .npz, .asc,
+GeoTIFF), a point cloud (.xyz, .pts, .txt, .csv, LAS, LAZ) or a built-in model
+such as jacksboro:11, face:5000 or roof; `meshsimp info` lists the built-in ones.
 """
 SIMPLIFY_EXAMPLES = """\
 examples:
@@ -43,6 +43,8 @@ examples:
       the smallest that deviates nowhere by more than 0.1
   meshsimp simplify grid.npy --spacing 30 --nodata=-9999
       a height grid
+  meshsimp simplify scan.laz --max-edge 5 --format landxml
+      a point cloud with bays and holes, as a TIN for GIS programs
   meshsimp simplify huge.npy --tile 512 --triangles 200000
       a height grid that is too big for one piece
 """
@@ -186,7 +188,7 @@ def _add_simplify(commands: Any) -> None:
     wanted.add_argument("--pick", choices=("knee",), help="the best compromise: the knee of the front")
 
     budget = simplify.add_argument_group(
-        f"how long to search (default: {DEFAULT_GENERATIONS} generations)"
+        f"how long to search (default: one sweep over all sizes; other algorithms: {DEFAULT_GENERATIONS} generations)"
     ).add_mutually_exclusive_group()
     budget.add_argument(
         "--time", type=_duration, metavar="T", help="60s, 10min, 1h (results then depend on the machine)"
@@ -195,7 +197,7 @@ def _add_simplify(commands: Any) -> None:
     budget.add_argument("--generations", type=_whole(1), metavar="N")
 
     search = simplify.add_argument_group("how to search")
-    search.add_argument("--algorithm", choices=ALGORITHMS, default="nsga2_v1", help="preset (default: %(default)s)")
+    search.add_argument("--algorithm", choices=ALGORITHMS, default="memetic", help="preset (default: %(default)s)")
     search.add_argument("--population", type=_whole(2), default=100, metavar="N", help="(default: %(default)s)")
     search.add_argument(
         "--seed",
@@ -291,7 +293,8 @@ def _add_pick(commands: Any) -> None:
         "-o",
         "--output",
         metavar="FILE",
-        help=f"mesh to write; its suffix is its format: {', '.join(FORMATS)} (default: nothing is written)",
+        help=f"mesh to write; its suffix is its format: {', '.join(FORMATS[:-1])}, xml (LandXML) (default: nothing is "
+        "written)",
     )
     pick.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
     pick.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
@@ -435,6 +438,16 @@ def _add_model_options(parser: argparse.ArgumentParser) -> None:
     )
     model.add_argument("--spacing", type=_spacing, metavar="D|DX,DY", help="of the samples of a height grid")
     model.add_argument("--nodata", type=_real(None), metavar="Z", help="height that means no sample in a height grid")
+    model.add_argument(
+        "--window", type=_window, metavar="COLUMN,ROW,COLUMNS,ROWS", help="the part of a height grid to take, from 0"
+    )
+    model.add_argument(
+        "--max-edge",
+        type=_positive,
+        metavar="L",
+        help="longest edge of a triangle of a point cloud, in the plane: keeps bays of its outline and holes open "
+        "(default: its convex hull is covered)",
+    )
 
 
 class _Version(argparse.Action):
@@ -493,6 +506,21 @@ def _spacing(text: str) -> tuple[float, float]:
     if len(values) not in (1, 2) or min(values) <= 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not one or two positive numbers")
     return values[0], values[-1]
+
+
+def _window(text: str) -> tuple[int, int, int, int]:
+    parts = text.split(",")
+    if len(parts) != 4:
+        raise argparse.ArgumentTypeError(f"{text!r} is not COLUMN,ROW,COLUMNS,ROWS")
+    column, row = (_whole(0)(part) for part in parts[:2])
+    columns, rows = (_whole(2)(part) for part in parts[2:])
+    return column, row, columns, rows
+
+
+def _positive(text: str) -> float:
+    if (value := _number(text)) <= 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not positive")
+    return value
 
 
 def _objectives(text: str) -> tuple[str, str]:

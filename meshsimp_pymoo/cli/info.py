@@ -24,7 +24,9 @@ def info(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.geometry.load import ModelError
     from meshsimp_pymoo.geometry.orient import front_patch, surface_facts, up_direction, upright_rotation
 
-    source = datasets.find_source(args.model, spacing=args.spacing, nodata=args.nodata)
+    source = datasets.find_source(
+        args.model, spacing=args.spacing, nodata=args.nodata, window=args.window, max_edge=args.max_edge
+    )
     if args.patch == "front":
         source = front_patch(source, args.up)
     used = source.points[np.unique(source.faces)]

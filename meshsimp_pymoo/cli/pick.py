@@ -10,13 +10,13 @@ from meshsimp_pymoo.cli.arguments import UsageError
 from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
 from meshsimp_pymoo.cli.tiled import pick_tiled
 from meshsimp_pymoo.front import Front, FrontSolution
-from meshsimp_pymoo.results import MESH_FORMATS, claim_file
+from meshsimp_pymoo.results import MESH_SUFFIXES, claim_file
 from meshsimp_pymoo.tiles.output import is_tiled
 
 
 def pick(args: argparse.Namespace) -> int:
     """Say which solution of the front in ``args.front`` is meant, and write its mesh if a file is named."""
-    path = None if args.output is None else claim_file(args.output, MESH_FORMATS, overwrite=args.overwrite)
+    path = None if args.output is None else claim_file(args.output, MESH_SUFFIXES, overwrite=args.overwrite)
     if is_tiled(args.front):
         return pick_tiled(args, path)
     front = Front.load(args.front, model=args.model)

@@ -24,7 +24,15 @@ ROUNDING = 1e-9
 def score(args: argparse.Namespace) -> int:
     """Measure ``args.other`` against ``args.model``, place it against a front, and draw its error."""
     path = None if args.output is None else claim_file(args.output, PICTURES, overwrite=args.overwrite)
-    model = open_model(args.model, up=args.up, patch=args.patch, spacing=args.spacing, nodata=args.nodata)
+    model = open_model(
+        args.model,
+        up=args.up,
+        patch=args.patch,
+        spacing=args.spacing,
+        nodata=args.nodata,
+        window=args.window,
+        max_edge=args.max_edge,
+    )
     if args.weights is not None:
         model = model.with_weights(args.weights)
     front = None if args.front is None else Front.load(args.front, model=model)

@@ -22,7 +22,7 @@ from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, describe
 from meshsimp_pymoo.cli.tiled import simplify_tiled, wants_tiles
 from meshsimp_pymoo.front import Front, FrontSolution
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.results import claim_output
+from meshsimp_pymoo.results import claim_output, local_origin, mesh_suffix, refuse_format
 
 # What of the command line does not decide the results.
 UNRECORDED = ("command", "output", "overwrite", "quiet", "json", "model", "seed", "page")
@@ -47,6 +47,7 @@ def simplify(args: argparse.Namespace) -> int:
         return simplify_tiled(args)
     folder = claim_output(args.output, overwrite=args.overwrite)
     problem = _mesh_problem(args)
+    refuse_format(problem.model, args.format)
     _refuse_impossible(args, problem)
     found = _search(args, problem)
     if found is None:
@@ -55,7 +56,7 @@ def simplify(args: argparse.Namespace) -> int:
 
     settings = {key: value for key, value in vars(args).items() if key not in UNRECORDED}
     if not (args.time or args.evaluations):
-        settings["generations"] = args.generations or DEFAULT_GENERATIONS
+        settings["generations"] = _generations(args)
     run = {
         "settings": settings,
         "seed": args.seed,
@@ -95,6 +96,8 @@ def _mesh_problem(args: argparse.Namespace) -> MeshProblem:
         args.model,
         spacing=args.spacing,
         nodata=args.nodata,
+        window=args.window,
+        max_edge=args.max_edge,
         footprint=args.footprint,
         outside=args.outside,
         up=args.up,
@@ -106,6 +109,14 @@ def _mesh_problem(args: argparse.Namespace) -> MeshProblem:
     )
 
 
+def _generations(args: argparse.Namespace) -> int:
+    """Return the generations to run where neither time nor evaluations are given."""
+    from meshsimp_pymoo.memetic_search import sweep_generations
+
+    default = sweep_generations(args.population) if args.algorithm == "memetic" else DEFAULT_GENERATIONS
+    return int(args.generations or default)
+
+
 def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
     """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
     if args.time is not None:
@@ -113,7 +124,7 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
     elif args.evaluations is not None:
         termination = MaximumFunctionCallTermination(args.evaluations)
     else:
-        termination = MaximumGenerationTermination(args.generations or DEFAULT_GENERATIONS)
+        termination = MaximumGenerationTermination(_generations(args))
     algorithm = PRESETS[args.algorithm](pop_size=args.population)
     algorithm.setup(problem, termination=termination, seed=args.seed)
     start = time.perf_counter()
@@ -174,7 +185,8 @@ def _choose(args: argparse.Namespace, front: Front) -> tuple[FrontSolution | Non
 
 def _summarise(args: argparse.Namespace, problem: MeshProblem, found: _Found, chosen: FrontSolution | None) -> None:
     model, quality, folder = problem.model, found.front.quality, Path(args.output)
-    chosen_path = None if chosen is None else str(folder / f"chosen.{args.format}")
+    chosen_path = None if chosen is None else str(folder / f"chosen.{mesh_suffix(args.format)}")
+    origin = local_origin(model.file_points).tolist() if args.format == "glb" else [0.0, 0.0, 0.0]
     if args.json:
         summary = {
             "model": {
@@ -194,6 +206,8 @@ def _summarise(args: argparse.Namespace, problem: MeshProblem, found: _Found, ch
             "seconds": round(found.seconds, 3),
             "seed": args.seed,
         }
+        if any(origin):
+            summary["mesh_origin"] = origin
         print(json.dumps(summary, indent=2))
         return
     if args.quiet:
@@ -211,6 +225,9 @@ def _summarise(args: argparse.Namespace, problem: MeshProblem, found: _Found, ch
     fitted = f", {written} in refitted" if args.refit and written else ""
     page = ", report.html" if args.page else ""
     print(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + fitted)
+    if any(origin):
+        place = ", ".join(f"{value:.15g}" for value in origin)
+        print(f"origin of the glb meshes: ({place}); each file puts itself back there")
     if chosen is None:
         size = _round_size(found.front)
         print(f"take one of them: meshsimp pick {shlex.quote(str(folder))} --triangles {size} -o small.ply")

@@ -31,10 +31,12 @@ import importlib
 import inspect
 import math
 import os
+import sys
 import typing
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
@@ -43,7 +45,7 @@ from meshsimp_pymoo import datasets
 from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.baselines.meshlab import MESHLAB_METHODS
 from meshsimp_pymoo.geometry.error import MEASURES
-from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.geometry.load import ModelError, is_there
 from meshsimp_pymoo.geometry.model import OpenModel
 from meshsimp_pymoo.operators import OPERATORS
 from meshsimp_pymoo.problem import MeshProblem
@@ -64,16 +66,26 @@ __all__ = [
 ]
 
 # A configuration is some hundred lines; anything longer is another file, or an attack on the reader.
-MAX_BYTES = 1 << 20
+MAX_BYTES = 1 << 18
 # Values after all aliases are replaced by what they stand for: nested aliases grow exponentially.
 MAX_VALUES = 20_000
+# Lists and mappings inside each other; the reader's time grows with the square of them.
+MAX_DEPTH = 40
 MAX_NAME = 60
+MAX_FILE_NAME = 255
+# Whole numbers beyond this are not exact as floats any more, and no run is that long.
+MAX_WHOLE = 2**53
+MAX_REAL = 1e300
+# Parameters that decide how much memory and time a trial takes, and the most of them that can be meant.
+MOST = {"pop_size": 5_000, "n_offsprings": 5_000, "ref_dirs": 5_000, "n_neighbors": 5_000, "moves_per_vertex": 1_000}
 
 # Keys of `problem`, all arguments of MeshProblem.
 PROBLEM_OPTIONS = (
-    "footprint", "outside", "up", "patch", "spacing", "nodata", "pin", "objectives", "weights", "max_triangles",
-    "max_error",
-)  # fmt: skip
+    "footprint", "outside", "up", "patch", "spacing", "nodata", "window", "max_edge", "pin", "objectives", "weights",
+    "max_triangles", "max_error",
+)
+# Those that say how the file is read: what they do is in the model's content.
+READING_OPTIONS = ("up", "patch", "spacing", "nodata", "window", "max_edge")  # fmt: skip
 # What a pymoo algorithm calls the operator of a kind.
 ARGUMENT_OF_KIND = {kind: "eliminate_duplicates" if kind == "duplicates" else kind for kind in OPERATORS}
 # The operators an algorithm gets by import path where the file names none: the paper's.
@@ -89,6 +101,8 @@ BUDGET_KINDS = ("generations", "evaluations", "seconds")
 TRIAL_MODEL = "pyramid:9"
 TRIAL_VERTICES = 81
 TRIAL_GENERATIONS = 2
+# What a trial finds out does not depend on a large population; its time does.
+TRIAL_POPULATION = 100
 # Settings of an algorithm that do not change what it finds.
 WITHOUT_EFFECT = {"output", "display", "callback", "verbose", "termination", "seed", "evaluator"}
 
@@ -132,9 +146,8 @@ class ProblemConfig:
 
     def description(self) -> dict[str, Any]:
         """Return what decides the results: the model's content and the options in effect."""
-        reading = ("up", "patch", "spacing", "nodata")  # what they do is in the model's content already
         effective = {"footprint": "model", "outside": "nearest"} | {
-            key: value for key, value in self.options.items() if key not in reading
+            key: value for key, value in self.options.items() if key not in READING_OPTIONS
         }
         return {"model": self.model.hash, "options": effective}
 
@@ -239,9 +252,10 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
     Parameters
     ----------
     path : path
-        A YAML file, at most 1 MiB.
+        A YAML file, at most 256 KiB. The models that it names lie in the folder of models or below, and that folder in
+        the file's own or below: a file that came from elsewhere reads nothing else.
     folder : path, optional
-        Where the model files are, in place of what the file says.
+        Where the model files are, in place of what the file says: any folder.
 
     Raises
     ------
@@ -276,7 +290,7 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
 
 def problem_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options as arguments of `MeshProblem`; the model is open already and holds the weights."""
-    return {key: value for key, value in options.items() if key not in ("up", "patch", "spacing", "nodata", "weights")}
+    return {key: value for key, value in options.items() if key not in (*READING_OPTIONS, "weights")}
 
 
 def settings(part: Any) -> dict[str, Any]:
@@ -380,8 +394,11 @@ def _operator(entry: Entry, kind: str) -> OperatorConfig:
     else:
         name.try_to(lambda: _imported(spelled))
     target = _class_of(kind, spelled)
+    base = _pymoo_class(kind)
+    if not (inspect.isclass(target) and issubclass(target, base)):
+        name.fail(f"this is no pymoo {kind} operator (a class derived from {base.__module__}.{base.__name__})")
     _check_names(rest, target, spelled)
-    parameters = {key: value.plain() for key, value in rest.items()}
+    parameters = {key: _limited(key, value) for key, value in rest.items()}
     entry.try_to(lambda: target(**parameters), f"the {kind} operator {spelled!r} cannot be made")
     return OperatorConfig(name=spelled, parameters=parameters)
 
@@ -397,7 +414,7 @@ def _merged_over(
         values.fail(f"{owner} has no parameter {name!r}{_suggestion(name, known)}")
     if name in parameters:
         values.fail(f"{name!r} is in 'parameters' too; give it in one place")
-    items = [item.plain() for item in values.items()]
+    items = [_limited(name, item) for item in values.items()]
     if not items:
         values.fail("the list is empty; give at least one value")
     for place, item in enumerate(items):
@@ -413,7 +430,19 @@ def _arguments(entry: Entry, target: Any, owner: str) -> dict[str, Any]:
         if name in operators:
             value.fail(f"operators stand under 'operators', this one as {operators[name]!r}")
     _check_names(keys, target, owner)
-    return {name: value.plain() for name, value in keys.items()}
+    return {name: _limited(name, value) for name, value in keys.items()}
+
+
+def _limited(name: str, entry: Entry) -> Any:
+    """Return a parameter's value, unless it would let a trial take all memory or time."""
+    value = entry.plain()
+    if name in MOST and isinstance(value, (int, float)) and value > MOST[name]:
+        entry.fail(f"expected at most {MOST[name]:,}")
+    return value
+
+
+def _is_many(name: str, value: Any) -> bool:
+    return name in MOST and isinstance(value, int) and value > TRIAL_POPULATION
 
 
 def _check_names(keys: Mapping[str, Entry], target: Any, owner: str) -> None:
@@ -442,6 +471,8 @@ def _try_out(entry: Entry, config: AlgorithmConfig, problems: Sequence[ProblemCo
             ),
             f"the algorithm {config.name!r} cannot be used on the problem {problem.name!r}",
         )
+    few = {key: min(value, TRIAL_POPULATION) for key, value in config.parameters.items() if _is_many(key, value)}
+    small = replace(config, parameters={**config.parameters, **few})
     wanted = dict.fromkeys(problem.build().objectives for problem in problems)
     trials = [MeshProblem(TRIAL_MODEL, objectives=objectives, n_threads=1) for objectives in wanted]
     trials += [problem.build() for problem in problems if problem.model.n_vertices < TRIAL_VERTICES]
@@ -450,13 +481,15 @@ def _try_out(entry: Entry, config: AlgorithmConfig, problems: Sequence[ProblemCo
         def run(trial: MeshProblem = trial) -> None:
             from pymoo.optimize import minimize
 
-            result = minimize(
-                trial,
-                config.build(config.merged_values[0]),
-                ("n_gen", TRIAL_GENERATIONS),
-                seed=1,
-                copy_algorithm=False,
-            )
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
+                result = minimize(
+                    trial,
+                    small.build(config.merged_values[0]),
+                    ("n_gen", TRIAL_GENERATIONS),
+                    seed=1,
+                    copy_algorithm=False,
+                )
             if result.opt is not None and result.opt.get("F").shape[1:] != (2,):  # None: nothing feasible yet
                 raise ValueError("its result is no front of (error, triangles)")
 
@@ -468,9 +501,11 @@ def _seeds(entry: Entry) -> tuple[int, ...]:
     if not items:
         entry.fail("the list is empty; give at least one seed, as in [1, 2, 3]")
     seeds = [item.whole(0) for item in items]
-    for place, seed in enumerate(seeds):
-        if seed in seeds[:place]:
-            items[place].fail(f"the seed {seed} is there twice; a run is not to be counted twice")
+    seen: set[int] = set()
+    for item, seed in zip(items, seeds, strict=True):
+        if seed in seen:
+            item.fail(f"the seed {seed} is there twice; a run is not to be counted twice")
+        seen.add(seed)
     return tuple(seeds)
 
 
@@ -517,8 +552,18 @@ def _models_folder(entry: Entry | None, path: Path, given: str | os.PathLike[str
         return folder, entry
     if entry is None:
         return path.parent, None
+    _check_inside(entry, "of the configuration")
     # whether it exists is asked when a model is looked for in it: built-in models need no folder
     return path.parent / entry.text(), entry
+
+
+def _check_inside(entry: Entry, whose: str) -> None:
+    """Refuse a path that leads out of a folder, by any system's rules."""
+    text = entry.text()
+    if "\0" in text or any(path.anchor or ".." in path.parts for path in (PurePosixPath(text), PureWindowsPath(text))):
+        entry.fail(f"leads out of the folder {whose}; name the folder of the models by --models FOLDER instead")
+    if max(map(len, PurePosixPath(text).parts), default=0) > MAX_FILE_NAME:
+        entry.fail(f"is too long; names of files have at most {MAX_FILE_NAME} characters")
 
 
 def _problem(entry: Entry, shared: Mapping[str, Any], models: tuple[Path, Entry | None]) -> ProblemConfig:
@@ -544,10 +589,11 @@ def _model_path(entry: Entry, source: str, models: tuple[Path, Entry | None]) ->
     folder, named = models
     path = folder / source
     base = source.partition(":")[0]
-    if path.exists():
-        return str(path)
-    if base in datasets.names():
+    if base in datasets.names() and not is_there(path):
         return source
+    _check_inside(entry, "of models")
+    if is_there(path):
+        return str(path)
     if not Path(base).suffix and "/" not in source and os.sep not in source:
         near = _suggestion(base, datasets.names())
         entry.fail(f"there is neither a file {path} nor a built-in model of that name{near}")
@@ -582,6 +628,13 @@ def _option(key: str, entry: Entry) -> Any:
         return entry.text()
     if key == "max_triangles":
         return entry.whole(1)
+    if key == "max_edge":
+        return entry.real(0, strict=True)
+    if key == "window":
+        window = [item.whole(0) for item in entry.items()]
+        if len(window) != 4:
+            entry.fail("expected [column, row, columns, rows]")
+        return tuple(window)
     if key in ("nodata", "max_error"):
         return entry.real(0 if key == "max_error" else None)
     if key == "spacing":
@@ -625,6 +678,8 @@ def _class_of(kind: str, name: str) -> Any:
 
 def _imported(path: str) -> Any:
     module, _, name = path.rpartition(".")
+    if module.partition(".")[0] in sys.stdlib_module_names:
+        raise ValueError(f"{path!r} is no pymoo algorithm or operator; it is a part of Python, which is not imported")
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, ValueError) as problem:
@@ -632,6 +687,24 @@ def _imported(path: str) -> Any:
     except AttributeError:
         near = _suggestion(name, dir(importlib.import_module(module)))
         raise ValueError(f"the module {module} has no {name!r}{near}") from None
+
+
+def _pymoo_class(kind: str) -> type:
+    """Return the class that all of pymoo's operators of a kind derive from."""
+    from pymoo.core.crossover import Crossover
+    from pymoo.core.duplicate import DuplicateElimination
+    from pymoo.core.mutation import Mutation
+    from pymoo.core.repair import Repair
+    from pymoo.core.sampling import Sampling
+
+    classes = {
+        "sampling": Sampling,
+        "crossover": Crossover,
+        "mutation": Mutation,
+        "repair": Repair,
+        "duplicates": DuplicateElimination,
+    }
+    return classes[kind]
 
 
 def _algorithm_class(entry: Entry) -> Any:
@@ -719,8 +792,10 @@ class Entry:
             return action()
         except ConfigError:
             raise
-        except (KeyboardInterrupt, SystemExit, MemoryError):
-            raise
+        except MemoryError:
+            place = f"{self.place}: " if self.place else ""
+            prefix = f"{what}: " if what else ""
+            raise ConfigError(f"{self._where()}: {place}{prefix}does not fit into memory; make it smaller") from None
         except Exception as problem:
             reason = " ".join(str(problem).split()) or type(problem).__name__
             if not plain and not isinstance(problem, (ModelError, ValueError)):
@@ -804,16 +879,18 @@ class Entry:
     def whole(self, least: int) -> int:
         """Return a whole number."""
         value = self.plain()
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            self.fail(f"expected a whole number of at least {least}")
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MAX_WHOLE:
+            most = " and at most 2**53" if isinstance(value, int) and value > MAX_WHOLE else ""
+            self.fail(f"expected a whole number of at least {least}{most}")
         return int(value)
 
     def real(self, least: float | None, *, strict: bool = False) -> float:
         """Return a number, at least (or, strictly, more than) a limit."""
         value = self.plain()
-        number = not isinstance(value, bool) and isinstance(value, (int, float))
+        number = not isinstance(value, bool) and isinstance(value, (int, float)) and abs(value) < MAX_REAL
         if not number or (least is not None and (value < least or (strict and value == least))):
             limit = "" if least is None else f" {'of more than' if strict else 'of at least'} {least:g}"
+            limit += f" and below {MAX_REAL:g}" if isinstance(value, (int, float)) and abs(value) >= MAX_REAL else ""
             self.fail(f"expected a number{limit}")
         return float(value)
 
@@ -871,6 +948,7 @@ def _read(path: Path) -> Entry:
     except UnicodeDecodeError as problem:
         raise ConfigError(f"{path}: is no text in UTF-8 (byte {problem.start})") from None
     try:
+        _check_events(yaml.parse(text, Loader=yaml.SafeLoader), path)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as problem:
         mark = problem.problem_mark or problem.context_mark
@@ -889,6 +967,19 @@ def _read(path: Path) -> Entry:
             f"{path}: stands for {count:,} values once aliases are replaced; a configuration has at most {MAX_VALUES:,}"
         )
     return Entry(node, path)
+
+
+def _check_events(events: Iterable[Any], path: Path) -> None:
+    """Stop reading where a file has more values, or lists and mappings inside each other, than a configuration has."""
+    count = depth = 0
+    for event in events:
+        kind = type(event).__name__
+        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
+        count += not kind.endswith("EndEvent")
+        if depth > MAX_DEPTH:
+            raise ConfigError(f"{path}, line {event.start_mark.line + 1}: is nested too deeply for a configuration")
+        if count > MAX_VALUES:
+            raise ConfigError(f"{path}: holds more than {MAX_VALUES:,} values; a configuration has fewer")
 
 
 def _expanded(node: Node, counts: dict[int, int], open_nodes: set[int], path: Path) -> int:

@@ -19,6 +19,7 @@ References
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -1446,6 +1447,18 @@ def make_live(n_vertices: int) -> Live:
         tally=np.zeros(13, np.int64),
         amount=np.zeros(2, np.float64),
     )
+
+
+_local = threading.local()
+
+
+def lent_live(n_vertices: int) -> Live:
+    """Return this thread's books for a model of that size, with anything in them; to be used until the next call."""
+    held = getattr(_local, "live", None)
+    if held is None or held[0] != n_vertices:
+        held = (n_vertices, make_live(n_vertices))
+        _local.live = held
+    return held[1]
 
 
 def build(ground: Ground, live: Live, model: OpenModel, sites: np.ndarray) -> None:

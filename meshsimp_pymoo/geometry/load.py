@@ -2,7 +2,8 @@
 
 PLY, OBJ and OFF are read here, because they carry rows that users refer to (landmarks by file index), double
 precision and colours, and because texture seams must not tear the surface; every other mesh format is read by
-trimesh. Height grids (.npy, .npz, ESRI ASCII .asc) become two triangles per cell.
+trimesh. Height grids (.npy, .npz, ESRI ASCII .asc, GeoTIFF) become two triangles per cell, point clouds (XYZ, LAS, LAZ)
+their Delaunay triangulation in the plane; GeoTIFF and clouds are read next door, in `raster` and `cloud`.
 
 Each way in ends in :func:`build_source`, so a :class:`SourceMesh` always has finite vertices and faces that
 exist.
@@ -18,7 +19,7 @@ import re
 import struct
 import warnings
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -38,10 +39,15 @@ IntArray = npt.NDArray[np.int64]
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 # Grids are dispatched here; of the mesh formats, these three are read here and the rest by trimesh.
-GRID_SUFFIXES = (".asc", ".npy", ".npz")
+RASTER_SUFFIXES = (".tif", ".tiff")
+GRID_SUFFIXES = (".asc", ".npy", ".npz", *RASTER_SUFFIXES)
 OWN_SUFFIXES = (".obj", ".off", ".ply")
-# Points without faces; trimesh would read some of them, with a library that it does not bring along.
-POINT_SUFFIXES = (".xyz", ".pts", ".las", ".laz", ".pcd")
+# Points without faces, which are triangulated in the plane.
+TEXT_CLOUD_SUFFIXES = (".xyz", ".pts", ".txt", ".csv")
+CLOUD_SUFFIXES = (*TEXT_CLOUD_SUFFIXES, ".las", ".laz")
+
+# Mesh formats that are archives, and point clouds that trimesh would read with further libraries: neither is read.
+ARCHIVE_SUFFIXES = (".3mf", ".3dxml", ".zae", ".cbor", ".pcd")
 
 # Values that programs write where a grid has no sample; and from this size on a height is none.
 NODATA_HABITS = (-9999.0, 9999.0, -99999.0, -999.0, -32768.0, -32767.0, 32767.0, 65535.0)
@@ -53,6 +59,8 @@ HEADER_LIMIT = 1 << 20
 
 # Deflate cannot shrink data by more than 1032:1, so a .npz member that claims more is a forgery.
 DEFLATE_LIMIT = 1100
+# What an archive or a packed raster may unpack to, all in all; what is larger is to be read by windows.
+UNPACKED_LIMIT = 8 << 30
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
@@ -67,6 +75,10 @@ COLOR_NAMES = (
     ("red", "green", "blue", "alpha"),
     ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
 )
+
+
+# The part of a grid to take: column, row, columns, rows.
+Window = tuple[int, int, int, int]
 
 
 class ModelError(ValueError):
@@ -96,6 +108,9 @@ class SourceMesh:
     up : str or (float, float, float), optional
         What ``up="auto"`` stands for: ``"z"`` for grids, whose heights are known to be heights, and the
         viewing direction for a patch cut out along it. None: to be found out.
+    georeference : dict
+        Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``transform``,
+        ``window`` ...; plain data for run.json.
     """
 
     points: FloatArray
@@ -104,6 +119,7 @@ class SourceMesh:
     name: str
     rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     up: str | tuple[float, float, float] | None = None
+    georeference: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
@@ -117,13 +133,16 @@ def read_source(
     *,
     spacing: float | tuple[float, float] | None = None,
     nodata: float | None = None,
+    window: Window | None = None,
+    max_edge: float | None = None,
 ) -> SourceMesh:
-    """Read a mesh or a height grid; the suffix tells which.
+    """Read a mesh, a height grid or a point cloud; the suffix tells which.
 
     Parameters
     ----------
     path : str or path-like
-        .ply .obj .off, any other mesh format trimesh reads (.stl .glb ...), or a grid .npy .npz .asc. A scene
+        .ply .obj .off, any other mesh format trimesh reads (.stl .glb ...), a grid .npy .npz .asc .tif, or a cloud
+        .xyz .pts .txt .csv .las .laz. A scene
         of several meshes is read as one. Polygons are cut into triangle fans. STL and glTF repeat a vertex
         for every face or texture seam: there, vertices at exactly one position are merged (the first one's
         row and attributes stay). A .npz holds its heights under ``elevation`` (or as its only 2-D array),
@@ -131,7 +150,12 @@ def read_source(
     spacing : float or (dx, dy), optional
         Distance between grid columns and rows; default: what the file says, else 1. Grids only.
     nodata : float, optional
-        Height that marks missing samples, beside NaN; default: what an .asc says, else none. Grids only.
+        Height that marks missing samples, beside NaN; default: what an .asc or .tif says, else none. Grids only.
+    window : (column, row, columns, rows), optional
+        The part of a grid to take, from 0, as ``gdal_translate -srcwin`` has it. Grids only.
+    max_edge : float, optional
+        Longest edge in the plane of a triangle of a cloud [file units]; see
+        :func:`~meshsimp_pymoo.geometry.cloud.cloud_source`. Clouds only.
 
     Returns
     -------
@@ -146,29 +170,34 @@ def read_source(
     Warns
     -----
     ModelWarning
-        If faces that name a vertex twice were dropped, per-vertex data could not be kept, or a usual "no data"
-        value stands among the heights of a grid.
+        If faces that name a vertex twice were dropped, per-vertex data could not be kept, a usual "no data"
+        value stands among the heights of a grid, or points of a cloud share their place in the plane.
     """
     path = Path(path)
     name = str(path)
     suffix = path.suffix.lower()
     _check_file(path, name)
-    if suffix in GRID_SUFFIXES:
-        return _guarded(_read_grid, path, name, suffix, spacing, nodata)
-    if suffix in POINT_SUFFIXES:
+    is_grid, is_cloud = suffix in GRID_SUFFIXES, suffix in CLOUD_SUFFIXES
+    if not is_grid and not is_cloud and suffix not in (known := _known_mesh_suffixes()):
         raise ModelError(
-            f"{name}: a {suffix} file holds points without faces; triangulate them (in MeshLab or CloudCompare, say) "
-            "and save a mesh such as .ply, or save a height grid"
+            f"{name}: unknown suffix {suffix!r}; known are {' '.join(known)} for meshes, "
+            f"{' '.join(GRID_SUFFIXES)} for height grids and {' '.join(CLOUD_SUFFIXES)} for point clouds"
         )
-    if suffix not in (known := _known_mesh_suffixes()):
+    if not is_grid and not (spacing is None and nodata is None and window is None):
         raise ModelError(
-            f"{name}: unknown suffix {suffix!r}; known are {' '.join(known)} for meshes and "
-            f"{' '.join(GRID_SUFFIXES)} for height grids"
+            f"{name}: spacing, nodata and window describe height grids ({' '.join(GRID_SUFFIXES)}); leave them out"
         )
-    if spacing is not None or nodata is not None:
+    if not is_cloud and max_edge is not None:
         raise ModelError(
-            f"{name}: spacing and nodata describe height grids ({' '.join(GRID_SUFFIXES)}); leave them out"
+            f"{name}: max_edge is for point clouds ({' '.join(CLOUD_SUFFIXES)}), which have no faces of their own; "
+            "leave it out"
         )
+    if is_grid:
+        return _guarded(_read_grid, path, name, suffix, spacing, nodata, window)
+    if is_cloud:
+        from meshsimp_pymoo.geometry.cloud import read_cloud
+
+        return _guarded(read_cloud, path, name, suffix, max_edge)
     readers = {".ply": _read_ply, ".obj": _read_obj, ".off": _read_off}
     return _guarded(readers.get(suffix, _read_with_trimesh), path, name)
 
@@ -195,6 +224,7 @@ def grid_source(
     nodata: float | None = None,
     name: str = "grid",
     origin: tuple[float, float] = (0.0, 0.0),
+    window: Window | None = None,
 ) -> SourceMesh:
     """Turn a height grid into a triangle mesh, two counter-clockwise triangles per cell.
 
@@ -215,6 +245,8 @@ def grid_source(
         What messages call it.
     origin : (float, float)
         Position of sample (0, 0).
+    window : (column, row, columns, rows), optional
+        The part to take; positions and ``rows`` stay those of the whole grid.
 
     Returns
     -------
@@ -246,19 +278,79 @@ def grid_source(
     for label, step in (("dx", dx), ("dy", dy)):
         if not (np.isfinite(step) and step > 0):
             raise ModelError(f"{name}: the spacing {label} is {step}; give a positive number")
+    column, row, columns, rows = check_window(window, height.shape, name)
+    part = np.s_[row : row + rows, column : column + columns]
+    return grid_mesh(
+        height[part],
+        hidden[part],
+        lambda i, j: (origin[0] + j * dx, origin[1] - i * dy),
+        nodata=nodata,
+        name=name,
+        corner=(row, column),
+        file_columns=height.shape[1],
+    )
+
+
+def check_window(window: Window | None, shape: tuple[int, int], name: str) -> tuple[int, int, int, int]:
+    """Return (column, row, columns, rows) of the part of a grid of this shape to take; None: all of it."""
+    if window is None:
+        return 0, 0, shape[1], shape[0]
+    column, row, columns, rows = (int(value) for value in window)
+    if min(column, row) < 0 or min(columns, rows) < 2 or column + columns > shape[1] or row + rows > shape[0]:
+        raise ModelError(
+            f"{name}: the window {column},{row},{columns},{rows} (column, row, columns, rows) does not lie within its "
+            f"{shape[1]} columns and {shape[0]} rows, or is smaller than 2 x 2"
+        )
+    return column, row, columns, rows
+
+
+def grid_mesh(
+    height: npt.NDArray[Any],
+    hidden: npt.NDArray[np.bool_],
+    place: Callable[[Any, Any], tuple[Any, Any]],
+    *,
+    nodata: float | None,
+    name: str,
+    corner: tuple[int, int],
+    file_columns: int,
+    mirrored: bool = False,
+    georeference: dict[str, Any] | None = None,
+) -> SourceMesh:
+    """Turn a checked part of a height grid into a triangle mesh; see :func:`grid_source`.
+
+    Parameters
+    ----------
+    height : (rows, columns) real array
+        The part's heights.
+    hidden : (rows, columns) bool array
+        Samples known to be missing, beside NaN and ``nodata``.
+    place : callable
+        Position (x, y) of the samples in these rows and columns of the whole grid.
+    nodata, name
+        As there.
+    corner : (int, int)
+        Row and column of the part in the whole grid.
+    file_columns : int
+        Columns of the whole grid.
+    mirrored : bool
+        Rows run north, or columns west: then triangles are listed the other way round.
+    georeference : dict, optional
+        See :class:`SourceMesh`.
+    """
     if nodata is not None:
         # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
-        hidden |= height == (height.dtype.type(nodata) if height.dtype.kind == "f" else nodata)
-    hidden |= np.isnan(height)
-    z = height.astype(np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):
+            hidden = hidden | (height == (height.dtype.type(nodata) if height.dtype.kind == "f" else nodata))
+    hidden = hidden | np.isnan(height)
+    with np.errstate(invalid="ignore"):  # some kinds of NaN complain
+        z = height.astype(np.float64)
     if (infinite := np.isinf(z) & ~hidden).any():
         row, col = np.argwhere(infinite)[0]
         raise ModelError(
-            f"{name}: {infinite.sum()} of {z.size} heights are infinite (first: row {row}, column {col}); "
-            f"set them to NaN or name the value with nodata"
+            f"{name}: {infinite.sum()} of {z.size} heights are infinite (first: row {corner[0] + row}, column "
+            f"{corner[1] + col}); set them to NaN or name the value with nodata"
         )
     _warn_of_nodata(z[~hidden], name)
-    columns = z.shape[1]
     rows = np.flatnonzero(~hidden)
     vertex = np.full(z.shape, -1, np.int64)
     vertex.flat[rows] = np.arange(len(rows))
@@ -270,13 +362,16 @@ def grid_source(
     triangles[:, :, 1][se < 0] = np.stack([nw, sw, ne], axis=-1)[se < 0]
     faces = triangles.reshape(-1, 3)
     faces = faces[(faces >= 0).all(axis=1)]
-    east, north = origin[0] + rows % columns * dx, origin[1] - rows // columns * dy
+    if mirrored:
+        faces = faces[:, ::-1]
+    i, j = (start + at for start, at in zip(corner, np.divmod(rows, z.shape[1]), strict=True))
+    east, north = place(i, j)
     points = np.column_stack([east, north, z.flat[rows]])
     if len(faces) == 0:
         raise ModelError(
             f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
-    return build_source(points, faces, {}, name, rows=rows, up="z")
+    return build_source(points, faces, {}, name, rows=i * file_columns + j, up="z", georeference=georeference)
 
 
 def _warn_of_nodata(z: FloatArray, name: str) -> None:
@@ -303,6 +398,7 @@ def build_source(
     *,
     rows: IntArray | None = None,
     up: str | tuple[float, float, float] | None = None,
+    georeference: dict[str, Any] | None = None,
 ) -> SourceMesh:
     """Check arrays and make a :class:`SourceMesh` of them, whose fields the parameters are.
 
@@ -317,29 +413,14 @@ def build_source(
     ModelWarning
         If faces that name a vertex twice were dropped; they have no area.
     """
-    xyz = np.array(points, dtype=np.float64)
-    if xyz.ndim != 2 or xyz.shape[1] != 3:
-        raise ModelError(f"{name}: vertices have the shape {xyz.shape}; give (V, 3)")
+    xyz = check_points(points, name, rows)
     count = len(xyz)
-    if count < 4:
-        raise ModelError(f"{name}: has {count} vertices; at least 4 are needed")
     rows = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
-    finite = np.isfinite(xyz).all(axis=1)
-    if not finite.all():
-        first = int(np.argmin(finite))
-        where = ", ".join(f"{value:g}" for value in xyz[first])
-        raise ModelError(
-            f"{name}: {count - finite.sum()} of {count} vertices have NaN or infinite coordinates (first: "
-            "vertex "
-            f"{rows[first]} at {where}); delete them in a mesh editor"
-        )
-    if np.abs(xyz).max() > COORDINATE_LIMIT:
-        raise ModelError(
-            f"{name}: coordinates reach {np.abs(xyz).max():g}; rescale the model to below {COORDINATE_LIMIT:g}"
-        )
     triangles = np.asarray(faces)
     if triangles.size == 0:
-        raise ModelError(f"{name}: has {count} vertices but no faces; triangulate the points first")
+        raise ModelError(
+            f"{name}: has {count} vertices but no faces; triangulate the points first, or save them as .xyz"
+        )
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
         raise ModelError(f"{name}: faces are {triangles.dtype} of the shape {triangles.shape}; give integers (F, 3)")
     wrong = ((triangles < 0) | (triangles >= count)).any(axis=1)
@@ -365,10 +446,41 @@ def build_source(
         if array.ndim == 0 or len(array) != count:
             raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
         kept_attributes[key] = array
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up)
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}))
+
+
+def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:
+    """Return vertices (V, 3) as an array of their own, or raise what :func:`build_source` says of them."""
+    xyz = np.array(points, dtype=np.float64)
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise ModelError(f"{name}: vertices have the shape {xyz.shape}; give (V, 3)")
+    count = len(xyz)
+    if count < 4:
+        raise ModelError(f"{name}: has {count} vertices; at least 4 are needed")
+    finite = np.isfinite(xyz).all(axis=1)
+    if not finite.all():
+        first = int(np.argmin(finite))
+        where = ", ".join(f"{value:g}" for value in xyz[first])
+        raise ModelError(
+            f"{name}: {count - finite.sum()} of {count} vertices have NaN or infinite coordinates (first: "
+            f"vertex {first if rows is None else rows[first]} at {where}); delete them in a mesh editor"
+        )
+    if np.abs(xyz).max() > COORDINATE_LIMIT:
+        raise ModelError(
+            f"{name}: coordinates reach {np.abs(xyz).max():g}; rescale the model to below {COORDINATE_LIMIT:g}"
+        )
+    return xyz
 
 
 # ------------------------------------------------------------ files and messages
+
+
+def is_there(path: Path) -> bool:
+    """Tell whether there is something of this name; a name that no system takes is none."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _check_file(path: Path, name: str) -> None:
@@ -381,7 +493,9 @@ def _check_file(path: Path, name: str) -> None:
             raise ModelError(f"{name}: is not a regular file; save the model to one")
         if path.stat().st_size == 0:
             raise ModelError(f"{name}: is empty (0 bytes); export it again")
-    except OSError as error:
+    except ModelError:
+        raise
+    except (OSError, ValueError) as error:
         raise ModelError(f"{name}: cannot be read ({_reason(error)}); check the path and its permissions") from error
 
 
@@ -409,7 +523,8 @@ def _warn(message: str) -> None:
 def _known_mesh_suffixes() -> list[str]:
     from trimesh.exchange.load import mesh_formats
 
-    return sorted({f".{kind}" for kind in mesh_formats() if kind.isalnum()} - set(POINT_SUFFIXES) | set(OWN_SUFFIXES))
+    found = {f".{kind}" for kind in mesh_formats() if kind.isalnum()}
+    return sorted((found - set(CLOUD_SUFFIXES) - set(ARCHIVE_SUFFIXES)) | set(OWN_SUFFIXES))
 
 
 def _numbers(text: str, name: str) -> FloatArray:
@@ -1047,10 +1162,24 @@ def _check_gltf(path: Path, name: str, suffix: str) -> None:
         accessors = tree.get("accessors", [])
         # an accessor without a buffer view is all zeros: a few bytes that could ask for any amount of memory
         counts = [int(item.get("count", 0)) for item in accessors if "bufferView" not in item]
-    except (ValueError, AttributeError, TypeError) as error:
+        outside = [uri for uri in _gltf_uris(tree) if not _is_beside(uri)]
+    except (ValueError, AttributeError, TypeError, OverflowError, RecursionError) as error:
         raise ModelError(f"{name}: its JSON part cannot be read ({_reason(error)}); export the file again") from error
+    if outside:
+        raise ModelError(f"{name}: names {outside[0][:80]!r}, which is outside its folder; export it as .glb")
     if max(counts, default=0) > size:
         raise ModelError(f"{name}: declares {max(counts)} empty values in a file of {size} bytes; export it again")
+
+
+def _gltf_uris(tree: Any) -> list[str]:
+    """Return the names of the files that a glTF would read beside itself."""
+    uris = [item.get("uri") for key in ("buffers", "images") for item in tree.get(key, [])]
+    return [str(uri) for uri in uris if uri is not None and not str(uri).startswith("data:")]
+
+
+def _is_beside(uri: str) -> bool:
+    """Tell whether a URI is the name of a file in the same folder or below."""
+    return not re.search(r"[:\\%\0]|^/|(^|/)\.\.(/|$)", uri)
 
 
 # ---------------------------------------------------------------------------------------------- grids
@@ -1062,6 +1191,7 @@ def _read_grid(
     suffix: str,
     spacing: float | tuple[float, float] | None,
     nodata: float | None,
+    window: Window | None,
 ) -> SourceMesh:
     steps: tuple[float, float] | None = None
     if spacing is not None:
@@ -1070,13 +1200,20 @@ def _read_grid(
         except ValueError:
             raise ModelError(f"{name}: the spacing is {spacing!r}; give one number or (dx, dy)") from None
         steps = (float(values[0]), float(values[1]))
+    if suffix in RASTER_SUFFIXES:
+        from meshsimp_pymoo.geometry.raster import read_raster
+
+        return read_raster(path, name, steps, nodata, window)
     if suffix == ".asc":
-        return _read_asc(path, name, steps, nodata)
+        return _read_asc(path, name, steps, nodata, window)
     if suffix == ".npy":
         with path.open("rb") as stream:
             height = _read_npy(stream, path.stat().st_size, name)
-        return grid_source(height, *(steps or (1.0, 1.0)), nodata=nodata, name=name)
-    arrays = _read_npz(path, name)
+        return grid_source(height, *(steps or (1.0, 1.0)), nodata=nodata, name=name, window=window)
+    with path.open("rb") as stream:
+        arrays = read_npz(stream, name)
+    if not arrays:
+        raise ModelError(f"{name}: holds no arrays; save the heights as 'elevation'")
     if "elevation" in arrays:
         height = arrays["elevation"]
     else:
@@ -1087,7 +1224,7 @@ def _read_grid(
     if steps is None:
         dx = _scalar(arrays, "dx", 1.0, name)
         steps = (dx, _scalar(arrays, "dy", dx, name))
-    return grid_source(height, *steps, nodata=nodata, name=name)
+    return grid_source(height, *steps, nodata=nodata, name=name, window=window)
 
 
 def _scalar(arrays: dict[str, npt.NDArray[Any]], key: str, default: float, name: str) -> float:
@@ -1123,30 +1260,43 @@ def _read_npy(stream: IO[bytes], size: int, name: str) -> npt.NDArray[Any]:
         raise ModelError(f"{name}: is not a NumPy array file ({_reason(error)}); check the suffix") from error
 
 
-def _read_npz(path: Path, name: str) -> dict[str, npt.NDArray[Any]]:
+def read_npz(stream: IO[bytes], name: str) -> dict[str, npt.NDArray[Any]]:
+    """Read all arrays of a .npz, without pickles, after comparing what it declares with what it can hold.
+
+    Raises
+    ------
+    ModelError
+        If it is no whole archive, or declares more than its bytes can unpack to or than UNPACKED_LIMIT.
+    """
     arrays = {}
+    unpacked = 0
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(stream) as archive:
             for info in archive.infolist():
                 if not info.filename.endswith(".npy"):
                     continue
                 label = f"{name}: {info.filename}"
+                unpacked += info.file_size
                 if info.file_size > DEFLATE_LIMIT * max(info.compress_size, 1):
                     raise ModelError(
                         f"{label} declares {info.file_size} bytes packed into {info.compress_size}; save it again"
                     )
-                with archive.open(info) as stream:
-                    arrays[info.filename[:-4]] = _read_npy(stream, info.file_size, label)
-    except ModelError:
+                if unpacked > UNPACKED_LIMIT:
+                    raise ModelError(
+                        f"{label} makes it unpack to more than {UNPACKED_LIMIT >> 30} GiB; save the heights as .npy"
+                    )
+                with archive.open(info) as member:
+                    arrays[info.filename[:-4]] = _read_npy(member, info.file_size, label)
+    except (ModelError, MemoryError):
         raise
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+    except Exception as error:  # its directory and its packed data may be damaged in any way
         raise ModelError(f"{name}: is not a complete .npz file ({_reason(error)}); copy or save it again") from error
-    if not arrays:
-        raise ModelError(f"{name}: holds no arrays; save the heights as 'elevation'")
     return arrays
 
 
-def _read_asc(path: Path, name: str, steps: tuple[float, float] | None, nodata: float | None) -> SourceMesh:
+def _read_asc(
+    path: Path, name: str, steps: tuple[float, float] | None, nodata: float | None, window: Window | None
+) -> SourceMesh:
     """Read an ESRI ASCII grid: a line per key, then the rows of heights from north to south."""
     text = path.read_bytes().decode("utf-8", errors="replace")
     header: dict[str, float] = {}
@@ -1194,4 +1344,5 @@ def _read_asc(path: Path, name: str, steps: tuple[float, float] | None, nodata: 
         nodata=header.get("nodata_value", -9999.0) if nodata is None else nodata,  # ESRI's default
         name=name,
         origin=(west, south + (rows - 1) * dy),
+        window=window,
     )

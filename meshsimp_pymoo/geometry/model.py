@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from meshsimp_pymoo.geometry.error import SLIVER_HEIGHT
 from meshsimp_pymoo.geometry.footprint import Footprint, make_footprint
 from meshsimp_pymoo.geometry.hilbert import hilbert_keys
-from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, from_trimesh, read_source
+from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, Window, from_trimesh, read_source
 from meshsimp_pymoo.geometry.orient import Up, check_open_surface, front_patch, up_direction, upright_rotation
 from meshsimp_pymoo.geometry.predicates import exact_ranges
 
@@ -72,6 +72,9 @@ class OpenModel:
         What was found while checking the surface (see :func:`meshsimp_pymoo.geometry.orient.check_open_surface`).
     weights : (N,) float array, optional
         How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
+    georeference : dict
+        Where on Earth it is and how it was read, as far as the file says (see
+        :class:`~meshsimp_pymoo.geometry.load.SourceMesh`).
     """
 
     name: str
@@ -89,6 +92,7 @@ class OpenModel:
     unit: float
     facts: Any = field(default=None, repr=False)
     weights: FloatArray | None = None
+    georeference: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def n_vertices(self) -> int:
@@ -128,6 +132,15 @@ class OpenModel:
     def hull(self) -> IntArray:
         """Vertices on the convex hull in the plane, those inside its edges included, ascending."""
         return _on_hull(self.xy)
+
+    @cached_property
+    def border(self) -> IntArray:
+        """Vertices at edges of one face only, ascending."""
+        faces = self.faces.astype(np.int64)
+        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        edges.sort(axis=1)
+        key, count = np.unique(edges[:, 0] * self.n_vertices + edges[:, 1], return_counts=True)
+        return np.unique(np.stack(np.divmod(key[count == 1], self.n_vertices)))
 
     @cached_property
     def footprint(self) -> Footprint:
@@ -235,6 +248,8 @@ def load_model(
     patch: str | None = None,
     spacing: tuple[float, float] | None = None,
     nodata: float | None = None,
+    window: Window | None = None,
+    max_edge: float | None = None,
 ) -> OpenModel:
     """Read, check and orient a mesh.
 
@@ -250,6 +265,10 @@ def load_model(
         Sample distances of a height grid [units].
     nodata : float, optional
         Height that means "no sample" in a height grid.
+    window : (column, row, columns, rows), optional
+        The part of a height grid to take.
+    max_edge : float, optional
+        Longest edge in the plane of a triangle of a point cloud [units].
 
     Returns
     -------
@@ -265,7 +284,7 @@ def load_model(
     if isinstance(model, SourceMesh):
         source = model
     elif isinstance(model, (str, Path)):
-        source = read_source(model, spacing=spacing, nodata=nodata)
+        source = read_source(model, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
     elif hasattr(model, "vertices") and hasattr(model, "faces"):
         source = from_trimesh(model)
     else:
@@ -300,7 +319,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
     upright = upright[rows]
     offset = upright.min(axis=0)
     points = upright - offset
-    unit, xy = _unit_square(points)
+    unit, xy = unit_square(points)
     order = vector_order(xy, points[:, 2])
     rows = rows[order]
     place = np.full(len(used), -1, np.int32)
@@ -321,6 +340,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
         xy=xy,
         unit=unit,
         facts=facts,
+        georeference=source.georeference,
     )
 
 
@@ -328,7 +348,7 @@ def _take(attributes: Mapping[str, npt.NDArray[Any]], rows: IntArray) -> dict[st
     return {name: values[rows] for name, values in attributes.items()}
 
 
-def _unit_square(points: FloatArray) -> tuple[float, FloatArray]:
+def unit_square(points: FloatArray) -> tuple[float, FloatArray]:
     """Scale by a power of two into the unit square and round to multiples of 2**-52, so that differences are exact."""
     extent = float(np.ptp(points[:, :2], axis=0).max())
     unit = float(2.0 ** np.ceil(np.log2(extent)))

@@ -461,6 +461,7 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
         name=f"{source.name} (front patch)",
         rows=source.rows[used],
         up=(float(direction[0]), float(direction[1]), float(direction[2])),
+        georeference=source.georeference,
     )
 
 

@@ -1,31 +1,32 @@
-"""Move kept vertices to better places at a fixed size: simulated annealing on the live triangulation.
+"""Move kept vertices to better places at a given number of triangles: simulated annealing on the live triangulation.
 
 One move drops a kept vertex and keeps another one instead: a vertex one or two edges of the original mesh away, or one
-from a triangle with a large error. The change of the error is exact, so a move costs microseconds at any N.
+from a triangle with a large error. Some moves only drop one, and where there is room for more triangles one is added.
+The change of the error is exact and looks at the triangles touched only, so a move costs a microsecond or two at any N.
 """
 
 from __future__ import annotations
 
-import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from meshsimp_pymoo.baselines.greedy import _thin
+from meshsimp_pymoo.geometry.borrow import borrowed
 from meshsimp_pymoo.geometry.error import thread_pool
 from meshsimp_pymoo.geometry.live import (
+    N_EMITTED,
     N_SITES,
     Ground,
     Live,
     _total,
     build,
-    insert,
+    exchange,
+    lent_live,
     make_ground,
-    make_live,
-    remove,
-    try_insert,
-    try_remove,
+    try_exchange,
 )
 from meshsimp_pymoo.operators.requirements import summed_measure
 
@@ -33,14 +34,16 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.geometry.model import OpenModel
 
 # Share of the moves that go to a neighbour on the mesh; the others go to a triangle with a large error.
-NEAR_SHARE = 0.7
+NEAR_SHARE = 0.5
+# Share of the steps that add a vertex where there is room for two triangles, or for one, and that drop a vertex.
+FILL_SHARE = 0.2
+BORDER_SHARE = 0.02
+DROP_SHARE = 0.01
 # Triangles compared for a far move, and vertices compared for a change of size.
 FAR_TRIES = 4
-SIZE_TRIES = 30
-# The annealing ends at this share of the temperature it begins with.
-COOLING = 0.03
-
-_local = threading.local()
+SIZE_TRIES = 12
+# Rounds of changing the size that find no vertex before it is given up.
+FIT_FAILURES = 20
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -98,83 +101,141 @@ def _anneal(
     g: Ground,
     live: Live,
     movable: np.ndarray,
+    n_movable: int,
+    border: np.ndarray,
     indptr: np.ndarray,
     indices: np.ndarray,
     moves: int,
     hot: float,
+    cooling: float,
+    most: int,
     state: np.ndarray,
+    stop: np.ndarray,
     best_movable: np.ndarray,
-) -> float:
+) -> int:
+    """Walk among the subsets of at most ``most`` triangles; return the number of entries of ``best_movable``."""
+    g = borrowed(g)
+    live = borrowed(live)
+    movable = borrowed(movable)
+    border = borrowed(border)
+    indptr = borrowed(indptr)
+    indices = borrowed(indices)
+    state = borrowed(state)
     n = len(g.z)
-    best = _total(live)
-    best_movable[:] = movable
     site = live.site
-    now = best
+    count = live.tally
+    now = _total(live)
+    best = now
+    n_best = n_movable
+    best_movable[:n_best] = movable[:n_best]
+    kept_best = True  # whether best_movable holds the best state already
+    temperature = hot
     for step in range(moves):
-        temperature = hot * COOLING ** (step / moves)
-        q = _below(state, len(movable))
-        v = movable[q]
-        w = np.int64(v)
-        if _unit(state) < NEAR_SHARE:
-            for _ in range(1 + _below(state, 2)):
-                degree = indptr[w + 1] - indptr[w]
-                w = np.int64(indices[indptr[w] + _below(state, degree)])
+        if step % 64 == 0:
+            temperature = hot * cooling ** (step / moves)
+            if stop[0]:
+                break
+        slack = most - count[N_EMITTED]
+        kind = _unit(state)
+        q = _below(state, n_movable) if n_movable > 0 else 0
+        v = np.int64(-1)
+        w = np.int64(-1)
+        if slack > 0 and kind < (FILL_SHARE if slack > 1 else BORDER_SHARE):
+            # Room for a vertex more; where there is room for one triangle only, it must be on the border.
+            w = _urgent(g, live, n, state) if slack > 1 else np.int64(border[_below(state, len(border))])
+        elif n_movable == 0:
+            continue
         else:
-            w = _urgent(g, live, n, state)
-        if w < 0 or _taken(g.xy, site, w):
+            v = movable[q]
+            if kind < 1.0 - DROP_SHARE:
+                if _unit(state) < NEAR_SHARE:
+                    w = v
+                    for _ in range(1 + _below(state, 2)):
+                        degree = indptr[w + 1] - indptr[w]
+                        w = np.int64(indices[indptr[w] + _below(state, degree)])
+                else:
+                    w = _urgent(g, live, n, state)
+                if w < 0:
+                    continue
+        if w >= 0 and _taken(g.xy, site, w):
             continue
-        if not remove(g, live, v):
+        if v < 0 and w < 0:
             continue
-        without = _total(live)
-        change, _ = try_insert(g, live, w)
-        if without + change - now <= -temperature * np.log(_unit(state)):
-            insert(g, live, w)
+        limit = -temperature * np.log(_unit(state))
+        change, triangles = try_exchange(g, live, v, w, limit)
+        if not change <= limit or triangles > slack:
+            continue
+        if change > 0.0 and not kept_best and now <= best:
+            best_movable[:n_movable] = movable[:n_movable]
+            n_best = n_movable
+            kept_best = True
+        if not exchange(g, live, v, w):
+            continue
+        if v >= 0 and w >= 0:
             movable[q] = w
+        elif w >= 0:
+            movable[n_movable] = w
+            n_movable += 1
         else:
-            insert(g, live, v)
+            n_movable -= 1
+            movable[q] = movable[n_movable]
         now = _total(live)
         if now < best:
             best = now
-            best_movable[:] = movable
-    return best
+            kept_best = False
+    if not kept_best and now <= best:
+        best_movable[:n_movable] = movable[:n_movable]
+        n_best = n_movable
+    return n_best
 
 
 @njit(cache=True, nogil=True)
-def _resize(g: Ground, live: Live, fixed: np.ndarray, wanted: int, state: np.ndarray) -> None:
-    """Remove or insert sites, each the best of a few drawn at random, until there are ``wanted``."""
+def _fit(g: Ground, live: Live, fixed: np.ndarray, which: int, wanted: int, state: np.ndarray) -> None:
+    """Drop or add vertices, each the best of a few drawn, until ``tally[which]`` is ``wanted`` or just below it."""
+    g = borrowed(g)
+    live = borrowed(live)
     n = len(g.z)
+    count = live.tally
     failures = 0
-    while live.tally[N_SITES] != wanted and failures < 1000:
-        shrink = live.tally[N_SITES] > wanted
-        best = -1
+    while count[which] != wanted and failures < FIT_FAILURES:
+        shrink = count[which] > wanted
+        best_v = np.int64(-1)
+        best_w = np.int64(-1)
         least = np.inf
         for _ in range(SIZE_TRIES):
-            i = _below(state, n)
+            i = np.int64(_below(state, n))
+            v = np.int64(-1)
+            w = np.int64(-1)
             if shrink:
                 # The vertex drawn or the next site along the curve.
                 for _step in range(n):
                     i = i + 1 if i + 1 < n else 0
                     if live.site[i] and not fixed[i]:
+                        v = i
                         break
-                if not live.site[i] or fixed[i]:
+                if v < 0:
                     break
-                change, _ = try_remove(g, live, i)
             else:
-                i = _urgent(g, live, n, state)
-                if i < 0 or _taken(g.xy, live.site, i):
+                w = np.int64(_urgent(g, live, n, state))
+                if w < 0 or _taken(g.xy, live.site, w):
                     continue
-                change, _ = try_insert(g, live, i)
+            change, triangles = try_exchange(g, live, v, w, np.inf)
+            if not shrink and which == N_EMITTED and count[N_EMITTED] + triangles > wanted:
+                continue
             if change < least:
                 least = change
-                best = i
-        if best < 0:
+                best_v = v
+                best_w = w
+        if (best_v < 0 and best_w < 0) or not exchange(g, live, best_v, best_w):
             failures += 1
-            continue
-        if shrink:
-            if not remove(g, live, best):
-                failures += 1
-        else:
-            insert(g, live, best)
+
+
+def _thin_to(ground: Ground, live: Live, pinned: NDArray[np.bool_], triangles: int) -> None:
+    """Remove the vertices that add the least error until there are at most so many triangles."""
+    if live.tally[N_EMITTED] > triangles:
+        sites = np.flatnonzero(live.site[: len(pinned)])
+        n = len(sites) + 1
+        _thin(ground, live, sites, pinned, triangles, np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64))
 
 
 def relocate(
@@ -185,12 +246,15 @@ def relocate(
     moves: int,
     seed: int,
     size: int | None = None,
-    temperature: float = 0.2,
+    triangles: int | None = None,
+    temperature: float = 0.3,
+    cooling: float = 0.03,
     footprint: str = "model",
     outside: str = "nearest",
     measure: str = "error",
+    stop: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return a subset of the same size with less error, or ``kept`` itself: annealed moves, the best state seen.
+    """Return a subset of no more triangles with less error, or ``kept`` itself: annealed moves, the best state seen.
 
     Parameters
     ----------
@@ -201,17 +265,24 @@ def relocate(
     pinned : (N,) bool array
         Vertices that stay.
     moves : int
-        Number of moves to try, some microseconds each.
+        Number of moves to try, a microsecond or two each.
     seed : int
         Of the random moves, 1 or more.
     size : int, optional
-        Number of vertices to keep; vertices are added or dropped before the moves. By default as many as ``kept`` has.
+        Number of vertices to bring the subset to before the moves.
+    triangles : int, optional
+        Number of triangles to bring it to before the moves, which is not exceeded by them; by default as many as the
+        subset has.
     temperature : float
         Initial temperature, in units of the error per kept vertex. 0 accepts improvements only.
+    cooling : float
+        Share of the temperature that is left in the end; in between it falls geometrically.
     footprint, outside : str
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
     measure : {"error", "rms_error"}
         What is lowered: the sum of w_p d_p, or of w_p times the square of d_p.
+    stop : (1,) bool array, optional
+        The moves end soon after another thread has set it.
 
     Returns
     -------
@@ -219,11 +290,7 @@ def relocate(
         Kept vertices at the position of another kept one are left out: they are in no mesh.
     """
     n = model.n_vertices
-    held = getattr(_local, "live", None)
-    if held is None or held[0] != n:
-        held = (n, make_live(n))
-        _local.live = held
-    live = held[1]
+    live = lent_live(n)
     ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
     kept = kept | pinned
     sites = np.flatnonzero(kept)
@@ -232,16 +299,34 @@ def relocate(
     build(ground, live, model, sites)
     state = np.array([seed], np.uint64)
     if size is not None:
-        _resize(ground, live, pinned, size, state)
+        _fit(ground, live, pinned, N_SITES, size, state)
+    if triangles is not None:
+        _thin_to(ground, live, pinned, triangles)
+        _fit(ground, live, pinned, N_EMITTED, triangles, state)
     result = live.site[:n] == 1
-    movable = np.flatnonzero(result & ~pinned)
-    if len(movable) and moves > 0:
-        best = np.empty_like(movable)
-        hot = temperature * max(float(_total(live)), 0.0) / len(movable)
-        if np.isfinite(hot):
-            _anneal(ground, live, movable, *model.neighbours, moves, hot, state, best)
-            result = result & pinned
-            result[best] = True
+    rows = np.flatnonzero(result & ~pinned)
+    total = max(float(_total(live)), 0.0)
+    if moves > 0 and np.isfinite(total):
+        movable = np.empty(n, np.int64)
+        movable[: len(rows)] = rows
+        best = np.empty(n, np.int64)
+        n_best = _anneal(
+            ground,
+            live,
+            movable,
+            len(rows),
+            model.border,
+            *model.neighbours,
+            moves,
+            temperature * total / max(len(rows), 1),
+            cooling,
+            int(live.tally[N_EMITTED]) if triangles is None else triangles,
+            state,
+            np.zeros(1, np.bool_) if stop is None else stop,
+            best,
+        )
+        result &= pinned
+        result[best[:n_best]] = True
     return result
 
 
@@ -252,10 +337,13 @@ def relocate_all(
     random_state: np.random.Generator,
     *,
     sizes: NDArray[np.integer] | None = None,
-    temperature: float = 0.2,
+    triangles: NDArray[np.integer] | None = None,
+    temperature: float = 0.3,
+    cooling: float = 0.03,
 ) -> NDArray[np.bool_]:
     """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number."""
     measure = summed_measure(problem)
+    stop = np.zeros(1, np.bool_)
     seeds = random_state.integers(1, 2**63 - 1, size=len(X))
 
     def one(k: int) -> NDArray[np.bool_]:
@@ -266,11 +354,18 @@ def relocate_all(
             moves=int(moves[k]),
             seed=int(seeds[k]),
             size=None if sizes is None else int(sizes[k]),
+            triangles=None if triangles is None else int(triangles[k]),
             temperature=temperature,
+            cooling=cooling,
             footprint=problem.footprint,
             outside=problem.outside,
             measure=measure,
+            stop=stop,
         )
 
-    rows = list(thread_pool().map(one, range(len(X))))
+    try:
+        rows = list(thread_pool().map(one, range(len(X))))
+    except BaseException:  # Ctrl-C: the other threads are not to keep the process alive
+        stop[0] = True
+        raise
     return np.array(rows) if rows else X.copy()

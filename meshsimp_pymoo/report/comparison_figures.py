@@ -17,7 +17,7 @@ from meshsimp_pymoo.analysis import attainment_surfaces, selected_solutions
 from meshsimp_pymoo.geometry.error import mesh_deviation, simplify
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plot_error, plot_mesh, relief_exaggeration
-from meshsimp_pymoo.report.study import SCORINGS, Case, Study
+from meshsimp_pymoo.report.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.report.tables import WEIGHTS_SEED
 from meshsimp_pymoo.runs import classic_mesh
 
@@ -224,24 +224,31 @@ def _meshes(study: Study, case: Case, model: OpenModel) -> list[_Surface]:
         found = case.find(method, solution.error, solution.triangles)
         kept = np.unpackbits(found.run.arrays["kept"][found.row])[: model.n_vertices].astype(bool)
         mesh = simplify(model, kept, footprint=case.problem.footprint, outside=_outside(case))
-        title = f"{method}\n{mesh.quality.triangles:,} triangles, mean {mesh.quality.mean_error:.3g}"
-        shown.append(_Surface(title, model.points, mesh.faces, np.abs(mesh.deviation), mesh.covered))
+        deviation = np.abs(mesh.deviation)
+        title = _mesh_title(model, method, len(mesh.faces), deviation, mesh.covered)
+        shown.append(_Surface(title, model.points, mesh.faces, deviation, mesh.covered))
     for (name, method), run in study.classic_runs.items():
         if name == case.problem.name and method == "quadric_collapse":
             sizes = run.arrays["F"][:, 1]
             row = int(np.argmin(np.abs(np.log(np.maximum(sizes, 0.1) / size))))
             vertices, faces = classic_mesh(run, row)
             deviation, covered, _ = mesh_deviation(model, vertices, faces, outside=_outside(case))
-            title = (
-                f"MeshLab quadric\n{len(faces):,} triangles, mean {deviation.mean():.3g}\n"
-                f"{int((~covered).sum())} vertices uncovered"
-            )
+            title = _mesh_title(model, CLASSIC_NAMES[method], len(faces), deviation, covered)
             # pictures are centred on the mean of the points: these mirror images, which no face uses, make it
             # the original's, so that all meshes stand in the same place
             upright = model.to_local(vertices)
             mirrored = 2 * model.points.mean(axis=0) - upright
             shown.append(_Surface(title, np.concatenate([upright, mirrored]), faces, deviation, covered))
     return shown
+
+
+def _mesh_title(
+    model: OpenModel, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
+) -> str:
+    """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons."""
+    mean = np.average(deviation, weights=model.weights)
+    bare = len(covered) - np.count_nonzero(covered)
+    return f"{method}\n{triangles:,} triangles, mean {mean:.3g}\n{bare:,} vertices uncovered"
 
 
 def _outside(case: Case) -> str:

@@ -26,7 +26,7 @@ from scipy import stats
 
 from meshsimp_pymoo.analysis import ALPHA, holm
 from meshsimp_pymoo.report.study import CLASSIC_NAMES, SCORINGS, Case, Study
-from meshsimp_pymoo.report.tables import INDICATOR_NAMES, Table
+from meshsimp_pymoo.report.tables import INDICATOR_NAMES, Table, markdown_text
 
 __all__ = [
     "CLAIMS",
@@ -331,8 +331,14 @@ def page(study: Study, all_findings: Sequence[Finding]) -> str:
                     lines += [f"* {INDICATOR_NAMES[f.indicator]}: **{f.verdict}**. {f.numbers} {f.reason}".rstrip()]
                     background = f.background
             lines += ["", background, ""] if background else [""]
-    return "\n".join(lines).rstrip() + "\n"
+    return _joined(lines)
 
+
+def _joined(lines: Sequence[str]) -> str:
+    """Return the lines as a page on which no name, whatever is in it, is a tag or a link."""
+    text = "\n".join(lines).rstrip() + "\n"
+    # an entity is shown as its sign, but is no syntax
+    return text.replace("<", "&lt;").replace("](", "]&#40;").replace("[times.md]&#40;", "[times.md](")
 
 
 def _other_errors(study: Study) -> list[str]:
@@ -383,10 +389,11 @@ def times_page(study: Study) -> str:
         if moead is None or not rivals:
             lines += [f"**{UNDECIDED}**: the experiment lacks MOEA/D or all methods to compare it with.", ""]
             continue
-        lines += ["| model | " + " | ".join(study.methods) + " |", "|---|" + "---:|" * len(study.methods)]
+        headers = " | ".join(map(markdown_text, study.methods))
+        lines += [f"| model | {headers} |", "|---|" + "---:|" * len(study.methods)]
         for case in cases:
             cells = [f"{case.seconds(m).mean():.2f}" if m in case.runs else "" for m in study.methods]
-            lines.append(f"| {case.problem.name} | " + " | ".join(cells) + " |")
+            lines.append(f"| {markdown_text(case.problem.name)} | " + " | ".join(cells) + " |")
         tested = []
         for case in cases:
             for rival in rivals:
@@ -402,7 +409,7 @@ def times_page(study: Study) -> str:
             lines += [f"**{comparisons.better()}**. {numbers} {_time_reason(cases, moead, rivals)}", ""]
         else:
             lines += [f"**{UNDECIDED}**: no method has two runs.", ""]
-    return "\n".join(lines).rstrip() + "\n"
+    return _joined(lines)
 
 
 RIVALS_IN_TIME = ("nsga2_v1", "nsga2_v2", "weighted_ga_v1", "weighted_ga_v2")

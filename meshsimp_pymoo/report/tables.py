@@ -97,7 +97,7 @@ class Table:
         """Return the table for people, in GitHub's Markdown."""
         if self.shown is not None:
             return self.shown.markdown()
-        lines = [f"**{self.title}**", "", _piped(self.columns)]
+        lines = [f"**{markdown_text(self.title)}**", "", _piped(self.columns)]
         lines.append("|" + "|".join("---:" if right else "---" for right in self.right_aligned) + "|")
         lines += [_piped(row) for row in self.rounded_rows]
         return "\n".join(lines) + "\n"
@@ -389,7 +389,19 @@ def _rounded(cell: Cell) -> str:
 
 
 def _piped(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+    return "| " + " | ".join(markdown_text(cell) for cell in cells) + " |"
+
+
+def markdown_text(text: str) -> str:
+    r"""Return a text in which nothing is a tag, a link or the end of a cell to Markdown.
+
+    >>> markdown_text("<b> [a](javascript:b) | c_d 5 < 6")
+    '&lt;b> \\[a\\](javascript:b) \\| c_d 5 &lt; 6'
+    """
+    spelled = " ".join(text.split()).replace("<", "&lt;").replace("\\", "\\\\")
+    for sign in "|[]`":
+        spelled = spelled.replace(sign, f"\\{sign}")
+    return spelled
 
 
 def _escaped(text: str) -> str:

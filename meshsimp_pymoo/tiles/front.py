@@ -55,6 +55,8 @@ LEAST_CHANGE = 0.01
 ENOUGH_SAMPLES = 64
 # Where one tile holds everything, each solution has this share of vertices less than the one before.
 LAST_STEP = 0.1
+# How far above the wanted size the finest solution may be.
+ABOUT = 1.1
 SHIFTS = (0.0, 1 / 3, 2 / 3)
 
 # Called with (share done, what is being done).
@@ -267,7 +269,9 @@ def tiled_front(
     """
     setting = settings(grid, tile=tile, most=most)
     work = _Work(grid, tile, engine or Serial(), store or Memory(), progress or (lambda share, text: None))
-    samples, slope = work.start(setting["most"] // 2)
+    n_wanted = setting["most"] // 2
+    # A tile with few vertices could thin hardly any: all lie near its edge. So tiles this small begin finer.
+    samples, slope = work.start(max(n_wanted, grid.n_samples // ENOUGH_SAMPLES))
     level = np.full(len(samples), np.inf)
     slopes = [slope]
     n_kept, n_row = len(samples), len(samples)
@@ -292,6 +296,10 @@ def tiled_front(
     at = _above(slope, _ascending(at))
     level[np.searchsorted(samples, removed)] = at
     slopes += at[cuts - 1].tolist()
+    # what is finer than asked for was needed on the way only
+    n_left = len(level) - np.searchsorted(np.sort(level), slopes, side="right")
+    slopes = slopes[int(np.argmax(n_left <= max(ABOUT * n_wanted, len(grid.corners)))) :]
+    samples, level = samples[level > slopes[0]], level[level > slopes[0]]
     quality = work.measure(samples, level, slopes, threads)
     # a solution that is not better than a smaller one is none
     errors = np.array([q.error for q in quality])

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.experiment.config import ConfigError, read_experiment_file, settings
-from meshsimp_pymoo.operators import OAX, SubsetUniformCrossover
+from meshsimp_pymoo.experiment.config import PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
+from meshsimp_pymoo.operators import OAX, OPERATORS, SubsetUniformCrossover
 from meshsimp_pymoo.results import write_mesh
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -65,6 +67,12 @@ def test_the_papers_configuration_has_the_papers_numbers():
     assert merged == [tuple(k / 10 for k in range(11))] * 2
     for problem in experiment.problems:
         assert problem.options == {"footprint": "hull", "outside": "ignore", "pin": "corners"}
+
+
+def test_the_quick_configuration_names_all_that_can_stand_there():
+    words = set(re.findall(r"\w+", (CONFIGS / "quick.yaml").read_text(encoding="utf-8")))
+    assert words >= {*PROBLEM_OPTIONS, *PRESETS, *OPERATORS, *(name for kind in OPERATORS.values() for name in kind)}
+    assert words >= {"generations", "evaluations", "seconds"}
 
 
 def test_shared_options_hold_for_all_problems_and_a_problem_overrides_them(tmp_path):

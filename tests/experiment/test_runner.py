@@ -28,6 +28,7 @@ from meshsimp_pymoo.experiment.config import read_experiment_file
 from meshsimp_pymoo.experiment.runner import plan, run_experiment
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.report.comparison_figures import meshes_figure
 from meshsimp_pymoo.report.experiment import write_tables
 from meshsimp_pymoo.report.study import Study
 from meshsimp_pymoo.results import ResultError, write_mesh
@@ -457,6 +458,18 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     assert run_experiment(config, out).finished == 0
     write_tables(out)
     assert results(out) == before
+
+
+def test_pictures_say_of_every_mesh_how_much_of_the_model_it_abandons(reference):
+    study = Study(reference)
+    case = study.cases["Face", "6 generations", "searched"]
+    titles = {axes.get_title() for axes in meshes_figure(study, case).axes}
+    chosen = analysis.selected_solutions(case.runs, random_state=np.random.default_rng(1), optimal=case.optimal)
+    for method in ("N1", "N2", "G1"):
+        (solution,) = (s for s in chosen[method] if s.kind == "trade_off")
+        found = case.find(method, solution.error, solution.triangles)
+        size, mean = f"{solution.triangles:,.0f} triangles", f"mean {found.number('mean_error'):.3g}"
+        assert f"{method}\n{size}, {mean}\n{found.number('uncovered'):.0f} vertices uncovered" in titles
 
 
 # ------------------------------------------------------------------------------------------------ folders and shell

@@ -494,7 +494,6 @@ def test_too_few_vertices_and_no_faces_are_refused(tmp_path):
     assert "no faces" in refusal(write(tmp_path, "cloud.ply", cloud))
     head, rest = ascii_ply().split("element face 4\nproperty list uchar int vertex_indices\n")
     assert "no faces" in refusal(write(tmp_path, "faceless.ply", head + rest.split("3 0 1 4")[0]))
-    assert "without faces" in refusal(write(tmp_path, "a.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 2 1\n"))
     with pytest.raises(ModelError, match="all 1 faces"):
         build_source(POINTS, [[1, 1, 1]])
 
@@ -771,7 +770,23 @@ def test_heights_that_may_be_meant_are_not_warned_of(heights):
     grid_source(np.array(heights, float))
 
 
-@pytest.mark.parametrize("suffix", [".xyz", ".XYZ", ".las"])
-def test_points_without_faces_are_refused_with_the_way_out(tmp_path, suffix):
-    said = refusal(write(tmp_path, f"a{suffix}", "0 0 0\n1 0 0\n0 1 1\n1 1 0\n"))
-    assert f"a {suffix.lower()} file holds points without faces; triangulate them" in said
+@pytest.mark.parametrize("suffix", [".zip", ".3mf", ".zae", ".pcd"])
+def test_archives_are_not_unpacked(tmp_path, suffix):
+    assert f"unknown suffix '{suffix}'" in refusal(write(tmp_path, f"a{suffix}", binary_ply()))
+
+
+@pytest.mark.parametrize("uri", ["../secret.bin", "/etc/secret.bin", "file:///etc/passwd", "http://a/b", "a\\b"])
+def test_a_gltf_reads_no_file_outside_its_folder(tmp_path, uri):
+    inside = tmp_path / "in"
+    inside.mkdir()
+    mesh = trimesh.Trimesh(POINTS, FACES, process=False)
+    parts = trimesh.exchange.gltf.export_gltf(mesh)
+    for name, content in parts.items():
+        (inside / name).write_bytes(content)
+    assert len(read_source(inside / "model.gltf").faces) == 4
+    tree = json.loads(parts["model.gltf"])
+    (tmp_path / "secret.bin").write_bytes(parts[tree["buffers"][0]["uri"]])
+    tree["buffers"][0]["uri"] = uri
+    said = refusal(write(inside, "b.gltf", json.dumps(tree)))
+    assert repr(uri) in said
+    assert "outside its folder" in said

@@ -242,6 +242,14 @@ def test_any_size_can_be_cut_out_of_the_front(front, wanted):
     assert evaluate_subsets(MODEL, kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
 
 
+def test_a_front_that_begins_with_small_meshes_is_thinned_from_finer_ones(front):
+    small = tiled_front(GRID, tile=64, most=300)
+    assert 200 < small.quality[0].triangles <= 340
+    assert small.quality[0].triangles == pytest.approx(2 * len(small.samples), rel=0.2)
+    whole = thinning(MODEL)
+    assert small.quality[0].error < 1.03 * np.interp(small.quality[0].triangles, whole.triangles, whole.error)
+
+
 def test_a_mesh_of_one_triangle_and_a_finer_one_than_the_finest_are_refused(front):
     with pytest.raises(ValueError, match="at least 2 triangles, not 1"):
         front.slope_of(1)

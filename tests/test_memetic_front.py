@@ -1,0 +1,49 @@
+"""The memetic search finds the whole true front where that is known."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from enumerable_models import GENERATIONS, MOST_FREE, nondominated, random_problem, same_front, true_front
+from pymoo.optimize import minimize
+
+from meshsimp_pymoo import MeshProblem, memetic, thinning
+
+MODELS = range(20)
+
+
+@pytest.mark.parametrize("seed", MODELS)
+def test_memetic_finds_the_whole_front_of_a_model_that_can_be_enumerated(seed):
+    problem = random_problem(seed)
+    known = true_front(problem)
+    # A problem of its own, so that nothing which the enumeration left behind can help.
+    result = minimize(MeshProblem(problem.model), memetic(), ("n_gen", GENERATIONS), seed=seed)
+    np.testing.assert_allclose(nondominated(result.F), known, rtol=1e-12)
+    np.testing.assert_array_equal(problem.evaluate(result.X), result.F)
+
+
+def test_the_enumerated_front_agrees_with_its_definition():
+    problem = random_problem(0)
+    free = np.flatnonzero(~problem.pinned)
+    rows = []
+    for taken in itertools.chain.from_iterable(itertools.combinations(free, k) for k in range(len(free) + 1)):
+        kept = problem.pinned.copy()
+        kept[list(taken)] = True
+        quality = problem.quality(kept)
+        rows.append((quality.error, quality.triangles))
+    assert len(rows) == 2 ** len(free)
+    front = {(e, t) for e, t in rows if not any(a <= e and b <= t and (a, b) != (e, t) for a, b in rows)}
+    assert {tuple(row) for row in true_front(problem).tolist()} == front
+
+
+def test_the_models_differ_in_size_and_thinning_alone_misses_most_fronts():
+    """So the search has something to find."""
+    problems = [random_problem(seed) for seed in MODELS]
+    assert {int((~problem.pinned).sum()) for problem in problems} == set(range(3, MOST_FREE + 1))
+    missed = 0
+    for problem in problems:
+        nested = thinning(problem.model)
+        missed += not same_front(np.c_[nested.error, nested.triangles], true_front(problem), tolerance=1e-9)
+    assert missed > len(problems) / 2

@@ -1,0 +1,108 @@
+"""The benchmark of all methods runs, and compares what it says it compares."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshsimp_pymoo import thinning
+from meshsimp_pymoo.problem import open_model
+
+
+@pytest.fixture(scope="module")
+def quality():
+    path = Path(__file__).parent / "benchmarks" / "quality.py"
+    spec = importlib.util.spec_from_file_location("quality_benchmark", path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[spec.name]
+
+
+def test_it_scores_every_method_at_the_sizes_of_thinning(quality, tmp_path, capsys):
+    rows_file, tables = tmp_path / "quality.csv", tmp_path / "quality.md"
+    options = ["--models", "peaks:9", "--shares", "20", "50", "--budgets", "0.2", "0.4"]
+    assert quality.main([*options, "-o", str(rows_file), "-o", str(tables)]) == 0
+    with rows_file.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    model = open_model("peaks:9")
+    front = thinning(model)
+    for row in rows:
+        wanted = front.triangles[round(float(row["share"]) / 100 * 81) - len(front.base)]
+        assert int(row["wanted"]) == wanted
+        size = wanted if row["is_front"] == "True" else int(row["triangles"])
+        least = front.error[front.triangles <= size].min()
+        assert float(row["ratio"]) == pytest.approx(float(row["error"]) / least)
+        if row["method"] in ("thinning", "memetic 0.2 s", "memetic 0.4 s", "worst point", "NSGA-II v1"):
+            assert int(row["triangles"]) <= wanted
+    ratios = {(row["method"], row["share"]): float(row["ratio"]) for row in rows}
+    assert ratios["thinning", "20.0"] == pytest.approx(1.0)
+    assert ratios["worst point", "20.0"] >= ratios["memetic 0.4 s", "20.0"]
+    printed = capsys.readouterr().out
+    named = {row["method"] for row in rows}
+    for method in (*quality.TOOLS, *quality.PASSES, "NSGA-II v1", "memetic 0.2 s", "memetic 0.4 s"):
+        assert method in named or f"no {method}: " in printed
+    text = tables.read_text()
+    assert "| thinning, its error |" in text
+    assert "Search / rival" in text
+
+
+def test_variants_are_compared_with_the_first_one(quality, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(quality, "VARIANTS", {"full": {}, "few": {"pop_size": 5}})
+    results = tmp_path / "variants.csv"
+    options = ["--ablation", "--models", "peaks:9", "--budgets", "0.2", "--seeds", "1", "2", "--shares", "20"]
+    assert quality.main([*options, "-o", str(results)]) == 0
+    with results.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["variant"], row["seed"]) for row in rows] == [("full", "1"), ("full", "2"), ("few", "1"), ("few", "2")]
+    full, few = (np.log([float(r["ratio"]) for r in rows if r["variant"] == name]) for name in ("full", "few"))
+    assert full.mean() < -0.1
+    lines = [line.replace("┃", "│").split("│") for line in capsys.readouterr().out.splitlines()]
+    heading = next(cells for cells in lines if any("variant" in cell for cell in cells[1:2]))
+    column = next(k for k, cell in enumerate(heading) if "all / full" in cell)
+    line = next(cells for cells in lines if len(cells) > 2 and cells[1].strip() == "few")
+    assert float(line[column]) == pytest.approx(np.exp(few.mean() - full.mean()), abs=6e-4)
+
+
+def test_the_enumerated_models_are_reported(quality, capsys):
+    quality.main(["--enumerable", "1"])
+    assert "of 1 models" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("offset", [-7, 0, 5])
+def test_the_largest_mesh_that_fits_is_found_whatever_the_parameter_means(quality, offset):
+    calls = []
+
+    def make(target):
+        calls.append(target)
+        count = max(20, 2 * ((target * 3) // 4) + offset)
+        return np.zeros((3, 3)), np.zeros((count, 3), int), "file"
+
+    (_, faces, _), _, fits = quality.largest_at_most(make, 1001, 5000)
+    assert fits
+    assert 1001 - max(quality.NEAR, quality.NEAR_SHARE * 1001) <= len(faces) <= 1001
+    assert len(calls) <= quality.TRIES
+    (_, faces, _), _, fits = quality.largest_at_most(make, 10, 5000)
+    assert not fits
+    assert len(faces) == 20
+
+
+def test_a_front_gives_the_least_error_among_meshes_that_are_small_enough(quality):
+    curve = quality.Curve(np.array([5.0, 1.0, 3.0, 3.0]), np.array([2, 9, 6, 4]), lambda k: k, 0.0)
+    assert [curve.best(size) for size in (1, 2, 5, 8, 9)] == [None, 0, 3, 3, 1]
+    assert curve.value(1) == np.inf
+
+
+def test_a_mesh_that_is_not_what_its_front_says_is_an_error(quality):
+    model = open_model("peaks:7")
+    curve = quality.nested_curve(model, thinning)
+    curve.scored(10)
+    curve.error[10] *= 1.01
+    with pytest.raises(RuntimeError, match="a front says"):
+        curve.scored(10)
