@@ -302,8 +302,7 @@ def _read_las(path: Path, name: str, suffix: str) -> tuple[FloatArray, dict[str,
     withheld = 0
     try:
         backend = laspy.LazBackend.Lazrs if packed else None
-        # what overflows is infinite, and refused with its row
-        with np.errstate(all="ignore"), laspy.open(str(path), laz_backend=backend) as reader:
+        with laspy.open(str(path), laz_backend=backend) as reader:
             facts = _las_facts(reader.header)
             for chunk in reader.chunk_iterator(CHUNK_POINTS):
                 kept = np.asarray(chunk.withheld) == 0

@@ -502,7 +502,9 @@ def _check_file(path: Path, name: str) -> None:
 def _guarded(reader: Any, path: Path, name: str, *args: Any) -> SourceMesh:
     """Call a reader; whatever it meets in the file comes out as one line."""
     try:
-        return reader(path, name, *args)
+        # numbers that overflow become infinite, and are refused with their row
+        with np.errstate(over="ignore", invalid="ignore"):
+            return reader(path, name, *args)
     except ModelError:
         raise
     except OSError as error:

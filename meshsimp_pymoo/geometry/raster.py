@@ -89,7 +89,7 @@ def read_raster(
     import warnings
 
     try:
-        with warnings.catch_warnings(), rasterio.Env(**GDAL_SETTINGS), np.errstate(invalid="ignore", over="ignore"):
+        with warnings.catch_warnings(), rasterio.Env(**GDAL_SETTINGS):
             for kind in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
                 warnings.simplefilter("ignore", kind)
             with rasterio.open(str(path.resolve()), driver="GTiff") as raster:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import time
 from pathlib import Path
 
 import numpy as np
@@ -333,3 +334,60 @@ def test_a_tag_cannot_make_python_objects(tmp_path):
     assert "title" in line
     line = message(changed(tmp_path, seeds='[!!python/name:os.system ""]'))
     assert "seeds[0]" in line
+
+
+@pytest.mark.parametrize(
+    "model", ["../secret.ply", "/etc/secret.ply", "a/../../secret.ply", "C:\\\\a.ply", "a\\\\..\\\\..\\\\b.ply"]
+)
+def test_a_configuration_names_no_model_outside_the_folder_of_models(tmp_path, model):
+    (tmp_path / "in").mkdir()
+    line = message(changed(tmp_path / "in", problems=f'["{model}"]'))
+    assert "leads out of the folder of models" in line
+    line = message(changed(tmp_path / "in", folder=f'"{model}"', problems='["a.ply"]'))
+    assert "leads out of the folder of the configuration; name the folder of the models by --models" in line
+
+
+@pytest.mark.parametrize(
+    ("algorithms", "said"),
+    [
+        ("[{class: os.system}]", "is a part of Python, which is not imported"),
+        ("[{class: antigravity.X}]", "is a part of Python"),
+        ("[{preset: nsga2_v1, operators: {crossover: {name: subprocess.Popen, args: [touch, hurt]}}}]",
+         "is a part of Python"),
+        ("[{preset: nsga2_v1, operators: {crossover: {name: numpy.fromfile, file: hurt}}}]", "is no pymoo crossover"),
+        ("[{preset: nsga2_v1, operators: {mutation: pymoo.operators.sampling.rnd.FloatRandomSampling}}]",
+         "is no pymoo mutation operator"),
+    ],
+)  # fmt: skip
+def test_nothing_but_pymoos_own_kinds_is_called(tmp_path, algorithms, said, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert said in message(changed(tmp_path, algorithms=algorithms))
+    assert not (tmp_path / "hurt").exists()
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: 1000000000}}]"}, "expected at most 5,000"),
+        ({"algorithms": "[{class: pymoo.algorithms.moo.nsga3.NSGA3, parameters: {ref_dirs: 100000000}}]"},
+         "at most 5,000"),
+        ({"seeds": f"[{'9' * 400}]"}, "at most 2\\*\\*53"),
+        ({"budgets": f"[{{generations: {'9' * 400}}}]"}, "at most 2\\*\\*53"),
+        ({"budgets": f"[{{seconds: {'9' * 400}}}]"}, "below 1e\\+300"),
+        ({"problems": f"['{'x' * 300}.ply']"}, "too long"),
+    ],
+)  # fmt: skip
+def test_numbers_and_names_that_nobody_means_are_refused_at_once(tmp_path, parts, said):
+    path = changed(tmp_path, **parts)
+    with pytest.raises(ConfigError, match=said):
+        read_experiment_file(path)
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, "{" * 100_000, "- " * 100_000, "- a\n" * 60_000, "#\n" * 100_000,
+                                  "a:" * 100_000, '"' + "\\n" * 100_000])  # fmt: skip
+def test_the_reader_takes_no_longer_than_seconds_whatever_it_is_given(tmp_path, text):
+    path = write(tmp_path, text)
+    start = time.perf_counter()
+    with pytest.raises(ConfigError):
+        read_experiment_file(path)
+    assert time.perf_counter() - start < 5
