@@ -100,8 +100,8 @@ class DownTheLadder(Mating):
     ladder : SizeLadder
         The rungs.
     moves_per_vertex : float, optional
-        Moves for each kept vertex in the first sweep; twice as many in each later one, up to 1000. By default as many as
-        take some tens of seconds. With a time limit as many as fit.
+        Moves for each kept vertex in the first sweep; twice as many in each later one, up to 1000. By default as many
+        as take some tens of seconds. With a time limit as many as fit.
     n_chains : int
         Children in a generation, on rungs far apart.
     """
