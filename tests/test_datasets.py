@@ -219,7 +219,7 @@ def test_what_looks_like_a_file_is_looked_for_as_a_file(tmp_path):
 
 
 def test_spacing_is_for_grids_in_files():
-    with pytest.raises(ModelError, match="roof: spacing and nodata describe height grids in files"):
+    with pytest.raises(ModelError, match="roof: spacing, nodata, window and max_edge are for files"):
         find_source("roof", spacing=2.0)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from handmade import BUDGET, store
 
@@ -195,3 +197,19 @@ def test_seconds_change_nothing_but_the_times(tmp_path):
         )
     different = {str(path) for path in texts[0] if texts[0][path] != texts[1][path]}
     assert different == {"times.csv", "times.md"}
+
+
+@pytest.mark.parametrize(
+    "evil", [r"<img src=x onerror=alert(1)> [a](javascript:b) [c\](d) | `e`", r"[a\\](javascript:b)"]
+)
+def test_no_name_of_a_model_is_a_tag_or_a_link_in_markdown(tmp_path, evil):
+    out = study(tmp_path, {"N1": 1.0, "MD": 1.0}, models=(evil, "M2")).out
+    write_tables(out)
+    pages = {path.name: path.read_text() for path in out.rglob("*.md")}
+    assert {"findings.md", "times.md", "scores.md"} <= set(pages)
+    assert any("onerror" in text or "javascript" in text for text in pages.values())
+    for text in pages.values():
+        assert "<" not in text
+        # a link is an unescaped ] before a (
+        links = re.findall(r"(?<!\\)(?:\\\\)*\]\(\S*", text)
+        assert all(link == "](times.md)" for link in links), links
