@@ -219,11 +219,11 @@ class MemeticSearch(GeneticAlgorithm):
             ladder.rungs = np.unique(np.round(np.geomspace(low, max(high, low), self.pop_size)).astype(int))
         super()._initialize_advance(infills=infills, **kwargs)
 
-    def _infill(self) -> Population | None:
+    def _infill(self) -> Population:
         deadline = time_limit(self)
         if deadline is not None and deadline[1] <= 0.0:
             self.termination.force_termination = True
-            return None
+            return Population.create()
         children = self.mating.do(
             self.problem, self.pop, self.n_offsprings, algorithm=self, random_state=self.random_state
         )
@@ -231,10 +231,10 @@ class MemeticSearch(GeneticAlgorithm):
         self.idle = 0 if len(children) else self.idle + 1
         if self.idle >= max(IDLE, 2 * sweep_generations(self.pop_size)):
             self.termination.force_termination = True
-        return children if len(children) else None
+        return children
 
     def _advance(self, infills: Any = None, **kwargs: Any) -> None:
-        if infills is None:
+        if not len(infills):
             return
         self.pop = self.survival.do(
             self.problem,
