@@ -210,6 +210,11 @@ class MemeticSearch(GeneticAlgorithm):
         self.triangles = triangles
         self.idle = 0
 
+    def _setup(self, problem: Any, **kwargs: Any) -> None:
+        if problem.n_obj != 2:
+            raise ValueError(f"memetic() is for two objectives and the problem has {problem.n_obj}; use nsga3()")
+        super()._setup(problem, **kwargs)
+
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
         ladder = self.survival
         if ladder.rungs is None:

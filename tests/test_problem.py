@@ -198,10 +198,10 @@ def test_the_memetic_search_lowers_the_measure_of_the_problem():
     problem = MeshProblem("face:300", objectives=("rms_error", "triangles"))
     seeds = minimize(problem, memetic(12), ("n_gen", 1), seed=1)
     found = minimize(problem, memetic(12), ("n_gen", 8), seed=1)
-    sizes = seeds.F[:, 1]
-    best = np.array([found.F[found.F[:, 1] <= size, 0].min() for size in sizes])
-    assert (best <= seeds.F[:, 0]).all()
-    assert best.sum() < 0.97 * seeds.F[:, 0].sum()
+    ladder = seeds.pop.get("F")
+    best = np.array([found.F[found.F[:, 1] <= size, 0].min() for size in ladder[:, 1]])
+    assert (best <= ladder[:, 0]).all()
+    assert best.sum() < 0.97 * ladder[:, 0].sum()
     assert problem.quality(found.X[0]).rms_error == found.F[0, 0]
 
 

@@ -112,7 +112,7 @@ def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
     ("options", "message"),
     [
         (["--time", "5s"], "--time does not go with tiles"),
-        (["--algorithm", "memetic"], "--algorithm does not go with tiles"),
+        (["--algorithm", "nsga2_v1"], "--algorithm does not go with tiles"),
         (["--pin", "hull"], "--pin does not go with tiles"),
         (["--triangles", "1"], "at least 2 triangles"),
         (["--dask", "tcp://127.0.0.1:9"], "no Dask scheduler answers"),
