@@ -125,7 +125,7 @@ def thinning(
     removed = np.empty(n, np.int64)
     error = np.empty(n + 1)
     triangles = np.empty(n + 1, np.int64)
-    n_removed = _thin(ground, live, sites, fixed, least, removed, error, triangles)
+    n_removed = _thin(ground, live, sites, fixed, least, np.inf, removed, error, triangles)
     base = np.setdiff1d(sites, removed[:n_removed])
     return NestedFront(
         base,
@@ -260,10 +260,12 @@ def _thin(
     sites: np.ndarray,
     fixed: np.ndarray,
     least: int,
+    limit: float,
     removed: np.ndarray,
     error: np.ndarray,
     triangles: np.ndarray,
 ) -> int:
+    """Remove the vertex that adds the least error while that is at most ``limit`` and triangles exceed ``least``."""
     g = borrowed(g)
     live = borrowed(live)
     n_all = len(g.z)
@@ -284,7 +286,7 @@ def _thin(
     triangles[0] = live.tally[N_EMITTED]
     n_removed = 0
     around = np.empty(len(live.ring), np.int64)
-    while n > 0 and key[heap[0]] < np.inf and triangles[n_removed] > least:
+    while n > 0 and key[heap[0]] < np.inf and key[heap[0]] <= limit and triangles[n_removed] > least:
         v = heap[0]
         n -= 1
         heap[0] = heap[n]

@@ -235,7 +235,7 @@ def _thin_to(ground: Ground, live: Live, pinned: NDArray[np.bool_], triangles: i
     if live.tally[N_EMITTED] > triangles:
         sites = np.flatnonzero(live.site[: len(pinned)])
         n = len(sites) + 1
-        _thin(ground, live, sites, pinned, triangles, np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64))
+        _thin(ground, live, sites, pinned, triangles, np.inf, np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64))
 
 
 def relocate(

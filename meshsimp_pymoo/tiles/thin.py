@@ -22,20 +22,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from meshsimp_pymoo.baselines.greedy import _sift_down, _sift_up
-from meshsimp_pymoo.geometry.live import (
-    END,
-    N_EMITTED,
-    Ground,
-    Live,
-    _star,
-    _total,
-    build,
-    make_ground,
-    make_live,
-    remove,
-    try_remove,
-)
+from meshsimp_pymoo.baselines.greedy import _thin
+from meshsimp_pymoo.geometry.live import END, build, lent_live, make_ground
 from meshsimp_pymoo.geometry.model import OpenModel, vector_order
 from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD
 
@@ -120,7 +108,7 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     model = _model(tile, number, xy, z, None if weight is None else weight[order], corners)
     sites = np.flatnonzero(is_site)
     ground = make_ground(model, footprint="hull", outside="ignore")
-    live = make_live(len(z))
+    live = lent_live(len(z))
     build(ground, live, model, sites)
     fixed = np.isin(number, tile.corners) | ~is_ours
     # beyond the whole grid there is nothing that a circle could hold
@@ -130,7 +118,7 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     removed = np.empty(n, np.int64)
     error = np.empty(n + 1)
     triangles = np.empty(n + 1, np.int64)
-    n_removed = _thin_to(ground, live, sites, fixed, FORESIGHT * 2.0 * tile.limit, removed, error, triangles)
+    n_removed = _thin(ground, live, sites, fixed, 0, FORESIGHT * 2.0 * tile.limit, removed, error, triangles)
     level = hull_levels(triangles[0] - triangles[: n_removed + 1], error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
     return number[removed[:n_wanted]], level[:n_wanted]
@@ -296,63 +284,3 @@ def _fix_foreign(
             fixed[a] = True
             fixed[b] = True
             fixed[c] = True
-
-
-@njit(cache=True, nogil=True)
-def _thin_to(
-    g: Ground,
-    live: Live,
-    sites: np.ndarray,
-    fixed: np.ndarray,
-    limit: float,
-    removed: np.ndarray,
-    error: np.ndarray,
-    triangles: np.ndarray,
-) -> int:
-    """Remove the vertex whose removal adds the least error, while that is at most ``limit``; return how many went."""
-    n_all = len(g.z)
-    key = np.full(n_all, np.inf)
-    heap = np.empty(len(sites), np.int32)
-    at = np.full(n_all, -1, np.int32)
-    n = 0
-    for k in range(len(sites)):
-        v = sites[k]
-        if not fixed[v]:
-            key[v], _ = try_remove(g, live, v)
-            heap[n] = v
-            at[v] = n
-            n += 1
-    for k in range(n // 2 - 1, -1, -1):
-        _sift_down(heap, at, key, k, n)
-    error[0] = _total(live)
-    triangles[0] = live.tally[N_EMITTED]
-    n_removed = 0
-    around = np.empty(len(live.ring), np.int64)
-    while n > 0 and key[heap[0]] < np.inf and key[heap[0]] <= limit:
-        v = heap[0]
-        n -= 1
-        heap[0] = heap[n]
-        at[heap[0]] = 0
-        at[v] = -1
-        if n > 0:
-            _sift_down(heap, at, key, 0, n)
-        m = _star(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
-        for k in range(m):
-            around[k] = np.int64(live.ring[k])
-        if not remove(g, live, v):
-            continue
-        removed[n_removed] = v
-        n_removed += 1
-        error[n_removed] = _total(live)
-        triangles[n_removed] = live.tally[N_EMITTED]
-        for k in range(m):
-            w = around[k]
-            if w > LAST_INDEX or at[w] < 0:
-                continue
-            old = key[w]
-            key[w], _ = try_remove(g, live, w)
-            if key[w] < old:
-                _sift_up(heap, at, key, at[w])
-            else:
-                _sift_down(heap, at, key, at[w], n)
-    return n_removed
