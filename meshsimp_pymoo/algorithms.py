@@ -8,8 +8,8 @@ preset              algorithm                                     crossover
 `moead`             MOEA/D, Tchebycheff (Eq. 7), neighbourhood 20 uniform
 `weighted_ga_v1`    elitist GA on the weighted sum (Eq. 8)        uniform
 `weighted_ga_v2`    elitist GA on the weighted sum (Eq. 8)        OAX over L4
-`memetic`           not the paper's; thinning, local search (memetic)  half-plane
-`nsga3`             not the paper's; NSGA-III, three objectives   uniform
+`memetic`           not the paper's; annealing down a ladder       none
+`nsga3`             not the paper's; NSGA-III, three objectives uniform
 =================== ============================================= ==================
 
 The paper's all start from random subsets of every size, cross with probability 0.8, mutate by `NeighbourShift` with
