@@ -21,6 +21,7 @@ from meshsimp_pymoo.geometry.error import (
     FOOTPRINTS,
     MEASURES,
     OUTSIDES,
+    REGIONS,
     TRIANGLES,
     Quality,
     Simplified,
@@ -37,6 +38,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # Chromosomes whose numbers are remembered; each takes about 200 bytes.
 MEMO_SIZE = 100_000
+# Regions in which the error may be kept with each solution and each chromosome remembered.
+MOST_REGIONS = 4096
 # Numbers of each solution that pymoo keeps beside its objectives.
 REPORTED = ("error", "vertices", "mean_error", "rms_error", "max_error", "uncovered")
 # A landmark given by position is the nearest vertex, but not one farther away than this share of the diagonal.
@@ -111,6 +114,9 @@ class MeshProblem(ElementwiseProblem):
         Threads of the default runner; all cores by default.
     memo : int
         Number of chromosomes whose numbers are remembered, so that they are not triangulated again; 0: none.
+    regions : int
+        In how many regions, runs of the vector of equal length, the error is kept with each solution as well, for
+        :class:`~meshsimp_pymoo.operators.RegionCrossover`; none by default.
     elementwise_runner : callable, optional
         Any pymoo runner in place of the threads.
     **kwargs
@@ -122,6 +128,8 @@ class MeshProblem(ElementwiseProblem):
         The original mesh; it holds the weights.
     objectives : tuple of str
         Names of the columns of F.
+    regions : int
+        In how many regions the error is known; at most N.
     pinned : (N,) bool array
         Vertices that every mesh keeps.
     settings : dict
@@ -131,8 +139,9 @@ class MeshProblem(ElementwiseProblem):
     Notes
     -----
     ``out`` also holds ``error``, ``vertices``, ``mean_error``, ``rms_error``, ``max_error`` and ``uncovered``, whatever
-    the objectives, so that ``result.opt.get("max_error")`` works. A subset that emits no triangle is no mesh; it gets
-    the worst objectives, N times the diagonal and 2 N triangles, which any mesh dominates.
+    the objectives, so that ``result.opt.get("max_error")`` works; with ``regions`` also their errors,
+    ``region_error``. A subset that emits no triangle is no mesh; it gets the worst objectives, N times the diagonal and
+    2 N triangles, which any mesh dominates.
 
     Examples
     --------
@@ -160,6 +169,7 @@ class MeshProblem(ElementwiseProblem):
         max_error: float | None = None,
         n_threads: int | None = None,
         memo: int = MEMO_SIZE,
+        regions: int = 0,
         elementwise_runner: Callable[..., Any] | None = None,
         **kwargs: Any,
     ) -> None:
@@ -177,6 +187,8 @@ class MeshProblem(ElementwiseProblem):
             raise ValueError(f"max_triangles={max_triangles} leaves no mesh; give 1 or more")
         if max_error is not None and not max_error >= 0:
             raise ValueError(f"max_error={max_error} is no error; give 0 or more")
+        if not 0 <= regions <= MOST_REGIONS:
+            raise ValueError(f"regions={regions} is no number of regions; give 0 to {MOST_REGIONS}")
         self.objectives = _checked_objectives(objectives)
         self.settings: dict[str, Any] = {
             "up": up,
@@ -203,6 +215,7 @@ class MeshProblem(ElementwiseProblem):
         self.max_error = max_error
         self._memo: OrderedDict[bytes, FloatArray] = OrderedDict()
         self._memo_size = memo
+        self.regions = min(regions, self.model.n_vertices)
         super().__init__(
             n_var=self.model.n_vertices,
             n_obj=len(self.objectives),
@@ -223,7 +236,7 @@ class MeshProblem(ElementwiseProblem):
         out.update(self.outcome(self.evaluate_subsets(x[None, :], n_threads=1)[0]))
 
     def evaluate_subsets(self, X: npt.NDArray[Any], *, n_threads: int = 1) -> FloatArray:
-        """Evaluate chromosomes (P, N) together, each different one once; return the table (P, 6).
+        """Evaluate chromosomes (P, N) together, each different one once; return the table (P, 6 + regions).
 
         See :func:`meshsimp_pymoo.geometry.error.evaluate_subsets` for its columns. Pinned vertices are added first.
         """
@@ -253,7 +266,14 @@ class MeshProblem(ElementwiseProblem):
         return np.array([found[key] for key in keys])
 
     def _kernel(self, X: BoolArray, n_threads: int) -> FloatArray:
-        return evaluate_subsets(self.model, X, footprint=self.footprint, outside=self.outside, n_threads=n_threads)
+        return evaluate_subsets(
+            self.model,
+            X,
+            footprint=self.footprint,
+            outside=self.outside,
+            n_threads=n_threads,
+            regions=self.regions,
+        )
 
     def outcome(self, row: FloatArray) -> dict[str, Any]:
         """Turn one row of :meth:`evaluate_subsets` into pymoo's ``out``."""
@@ -272,6 +292,10 @@ class MeshProblem(ElementwiseProblem):
                 out["G"].append(F[-1] - self.max_triangles)
             if self.max_error is not None:
                 out["G"].append(F[0] - self.max_error)
+        if self.regions:
+            # No mesh: its error, that of the worst one, is spread evenly.
+            known = np.isfinite(row[REGIONS:])
+            out["region_error"] = np.where(known, row[REGIONS:], quality.error / self.regions)
         return out
 
     def as_quality(self, row: FloatArray) -> Quality:

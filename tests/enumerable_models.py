@@ -11,7 +11,7 @@ from meshsimp_pymoo.geometry.load import SourceMesh
 # 512 subsets at most.
 MOST_FREE = 9
 # Enough for a search to find the whole front of such a model.
-GENERATIONS = 20
+GENERATIONS = 40
 
 
 def random_source(seed):

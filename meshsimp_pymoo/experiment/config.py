@@ -82,7 +82,7 @@ MOST = {"pop_size": 5_000, "n_offsprings": 5_000, "ref_dirs": 5_000, "n_neighbor
 # Keys of `problem`, all arguments of MeshProblem.
 PROBLEM_OPTIONS = (
     "footprint", "outside", "up", "patch", "spacing", "nodata", "window", "max_edge", "pin", "objectives", "weights",
-    "max_triangles", "max_error",
+    "max_triangles", "max_error", "regions",
 )
 # Those that say how the file is read: what they do is in the model's content.
 READING_OPTIONS = ("up", "patch", "spacing", "nodata", "window", "max_edge")  # fmt: skip
@@ -473,8 +473,9 @@ def _try_out(entry: Entry, config: AlgorithmConfig, problems: Sequence[ProblemCo
         )
     few = {key: min(value, TRIAL_POPULATION) for key, value in config.parameters.items() if _is_many(key, value)}
     small = replace(config, parameters={**config.parameters, **few})
-    wanted = dict.fromkeys(problem.build().objectives for problem in problems)
-    trials = [MeshProblem(TRIAL_MODEL, objectives=objectives, n_threads=1) for objectives in wanted]
+    built = [problem.build() for problem in problems]
+    wanted = dict.fromkeys((problem.objectives, problem.regions) for problem in built)
+    trials = [MeshProblem(TRIAL_MODEL, objectives=names, regions=n, n_threads=1) for names, n in wanted]
     trials += [problem.build() for problem in problems if problem.model.n_vertices < TRIAL_VERTICES]
     for trial in trials:
 
@@ -626,7 +627,7 @@ def _option(key: str, entry: Entry) -> Any:
         return names
     if key == "weights":
         return entry.text()
-    if key == "max_triangles":
+    if key in ("max_triangles", "regions"):
         return entry.whole(1)
     if key == "max_edge":
         return entry.real(0, strict=True)

@@ -44,6 +44,8 @@ COVER_TOLERANCE = 1e-9
 
 # Columns of the table that evaluation fills, one row a subset.
 ERROR, TRIANGLES, VERTICES, SQUARES, MAXIMUM, UNCOVERED = range(6)
+# Columns from this one on, where asked for: the error by region, equal runs of the vector, which are patches in space.
+REGIONS = 6
 # What can be minimised besides the triangles, under the names that Quality gives them.
 MEASURES = ("error", "rms_error", "max_error")
 NO_SITE = 0xFFFFFFFF
@@ -295,6 +297,7 @@ def _measure_bare(
     ends, key = _outline(mesh, end, emitted)
     boxes = build_tree(site_xy, ends, len(key))
     stack = np.empty(64, np.int64)
+    n_regions = len(row) - REGIONS
     guess = 0
     for q in range(n_bare):
         i = bare[q]
@@ -325,6 +328,8 @@ def _measure_bare(
         row[SQUARES] += w * d * d
         if w > 0.0:
             row[MAXIMUM] = max(row[MAXIMUM], d)
+        if n_regions > 0:
+            row[REGIONS + i * n_regions // len(z)] += w * d
         if len(deviation) > 0:
             deviation[i] = d
             covered[i] = is_covered
@@ -341,7 +346,7 @@ def _evaluate_one(
     deviation: np.ndarray,
     covered: np.ndarray,
 ) -> int:
-    """Fill ``row`` with the six numbers of one subset; return the end of the triangles' records in the workspace."""
+    """Fill ``row`` with the numbers of one subset; return the end of the triangles' records in the workspace."""
     xy, z, corners, has_twins, unit, min_height, exact_area, exact_lift = model[:8]
     side, state, start, items, faces, weight = model[8:]
     sites, dropped, site_xy, site_z, inserted, mesh, emitted, stack, site_triangle = workspace
@@ -373,6 +378,7 @@ def _evaluate_one(
         row[SQUARES] = np.inf
         row[MAXIMUM] = np.inf
         row[UNCOVERED] = n_all
+        row[REGIONS:] = np.inf
         return end
     for j in range(n):
         site_triangle[j] = NO_SITE
@@ -382,6 +388,8 @@ def _evaluate_one(
             site_triangle[mesh[t + 1]] = t
             site_triangle[mesh[t + 2]] = t
     weighted = len(weight) > 0
+    n_regions = len(row) - REGIONS
+    row[REGIONS:] = 0.0
     total = 0.0
     squares = 0.0
     maximum = 0.0
@@ -423,9 +431,12 @@ def _evaluate_one(
             squares += w * d * d
             maximum = max(maximum, d) if w > 0.0 else maximum
         else:
+            w = 1.0
             total += d
             squares += d * d
             maximum = max(maximum, d)
+        if n_regions > 0:
+            row[REGIONS + i * n_regions // n_all] += w * d
         if len(deviation) > 0:
             deviation[i] = d
             covered[i] = True
@@ -475,6 +486,7 @@ def evaluate_subsets(
     footprint: str = "model",
     outside: str = "nearest",
     n_threads: int = 1,
+    regions: int = 0,
 ) -> np.ndarray:
     """Evaluate many subsets; this is the call that a search spends its time in.
 
@@ -490,12 +502,15 @@ def evaluate_subsets(
         What an uncovered vertex costs.
     n_threads : int
         Threads to share the rows among; the result is the same for any number.
+    regions : int
+        In how many runs of the vector the error is summed up separately too: vertex i is in region i * regions // N.
 
     Returns
     -------
-    (P, 6) float array
+    (P, 6 + regions) float array
         Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of w_p d_p squared, that is, w_p times the square of d_p),
-        MAXIMUM, UNCOVERED. A subset that emits no triangle has error, squares and maximum inf.
+        MAXIMUM, UNCOVERED, then the error of each region. A subset that emits no triangle has error, squares, maximum
+        and regions inf.
     """
     use_footprint, nearest = _rules(footprint, outside)
     rows = np.ascontiguousarray(np.atleast_2d(kept))
@@ -506,7 +521,7 @@ def evaluate_subsets(
     if not rows.flags.writeable:
         rows = rows.copy()
     arguments = model.kernel_arguments
-    table = np.empty((len(rows), 6))
+    table = np.empty((len(rows), REGIONS + regions))
 
     def evaluate(part: slice) -> None:
         workspace = _workspace(model.n_vertices)

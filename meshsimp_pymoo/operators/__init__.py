@@ -10,8 +10,10 @@ sampling   nested          `NestedSubsets`          thinned subsets of all sizes
 crossover  uniform         `SubsetUniformCrossover` every gene from either parent
 crossover  oax             `OAX`                    segments by main effects, orthogonal array
 crossover  half_plane      `HalfPlaneCrossover`     the sides of a random line, exchanged
+crossover  region          `RegionCrossover`        each region from the parent that does it for less
 mutation   neighbour_shift `NeighbourShift`         kept vertices move to neighbours
 mutation   relocation      `Relocation`             annealed moves of kept vertices
+mutation   size_step       `SizeStep`               some more vertices, or some fewer
 repair     pinned_corners  `PinnedCorners`          pinned vertices are kept
 duplicates packed          `PackedDuplicates`       exact duplicates out, by hashing
 ========== =============== ======================== ==========================================
@@ -24,16 +26,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from meshsimp_pymoo.operators.crossover import OAX, HalfPlaneCrossover, SubsetUniformCrossover
+from meshsimp_pymoo.operators.crossover import OAX, HalfPlaneCrossover, RegionCrossover, SubsetUniformCrossover
 from meshsimp_pymoo.operators.duplicates import PackedDuplicates
-from meshsimp_pymoo.operators.mutation import NeighbourShift, Relocation
+from meshsimp_pymoo.operators.mutation import NeighbourShift, Relocation, SizeStep
 from meshsimp_pymoo.operators.repair import PinnedCorners
 from meshsimp_pymoo.operators.sampling import NestedSubsets, RandomSubset
 
 OPERATORS: dict[str, dict[str, type[Any]]] = {
     "sampling": {"random_subset": RandomSubset, "nested": NestedSubsets},
-    "crossover": {"uniform": SubsetUniformCrossover, "oax": OAX, "half_plane": HalfPlaneCrossover},
-    "mutation": {"neighbour_shift": NeighbourShift, "relocation": Relocation},
+    "crossover": {
+        "uniform": SubsetUniformCrossover,
+        "oax": OAX,
+        "half_plane": HalfPlaneCrossover,
+        "region": RegionCrossover,
+    },
+    "mutation": {"neighbour_shift": NeighbourShift, "relocation": Relocation, "size_step": SizeStep},
     "repair": {"pinned_corners": PinnedCorners},
     "duplicates": {"packed": PackedDuplicates},
 }
@@ -47,6 +54,8 @@ __all__ = [
     "PackedDuplicates",
     "PinnedCorners",
     "RandomSubset",
+    "RegionCrossover",
     "Relocation",
+    "SizeStep",
     "SubsetUniformCrossover",
 ]

@@ -18,7 +18,7 @@ from pymoo.core.population import Population
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.operators import OPERATORS
 
-PROBLEM = MeshProblem("peaks:6")
+PROBLEM = MeshProblem("peaks:6", regions=12)
 CROSSOVERS = sorted(OPERATORS["crossover"])
 MUTATIONS = sorted(OPERATORS["mutation"])
 ALL = [(kind, name) for kind, table in OPERATORS.items() for name in table]
@@ -27,6 +27,7 @@ seeds = st.integers(0, 2**32 - 1)
 STRENGTH = {
     "neighbour_shift": lambda rate: {"prob_var": rate},
     "relocation": lambda rate: {"moves_per_vertex": 20 * rate, "temperature": 1.0},
+    "size_step": lambda rate: {"step": rate},
 }
 few = settings(max_examples=25, deadline=None)
 
