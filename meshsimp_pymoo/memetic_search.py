@@ -28,7 +28,7 @@ from pymoo.util.optimum import filter_optimum
 from meshsimp_pymoo.baselines.greedy import NestedFront, thinning
 from meshsimp_pymoo.geometry.error import thread_pool
 from meshsimp_pymoo.operators import NestedSubsets, PackedDuplicates, PinnedCorners
-from meshsimp_pymoo.operators.local_search import relocate_all
+from meshsimp_pymoo.operators.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.operators.requirements import summed_measure
 from meshsimp_pymoo.operators.sampling import nested_front
 
@@ -49,11 +49,11 @@ SECONDS_A_MOVE = 2e-6
 # Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs.
 LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
-# The search ends after so many generations, and two sweeps, that found nothing new.
-IDLE = 6
+# The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
+IDLE = 12
 # In the final front neighbours differ by this share of the error, with at most so many meshes between two rungs and so
 # many entries of their subsets in all.
-STEP = 0.015
+STEP = 0.008
 BETWEEN = 24
 ENTRIES = 2e8
 
@@ -104,6 +104,12 @@ class DownTheLadder(Mating):
         as take some tens of seconds. With a time limit as many as fit.
     n_chains : int
         Children in a generation, on rungs far apart.
+    inherit : bool
+        Whether a rung is given the mesh of the rung above, or goes on from its own.
+    heat : float
+        Factor of all temperatures; 0 accepts improvements only.
+    shares : MoveShares
+        How often each kind of move is tried.
     """
 
     def __init__(
@@ -112,12 +118,18 @@ class DownTheLadder(Mating):
         moves_per_vertex: float | None = None,
         *,
         n_chains: int = CHAINS,
+        inherit: bool = True,
+        heat: float = 1.0,
+        shares: MoveShares = USUAL_MOVES,
         **kwargs: Any,
     ) -> None:
         super().__init__(None, None, None, **kwargs)
         self.ladder = ladder
         self.moves_per_vertex = moves_per_vertex
         self.n_chains = n_chains
+        self.inherit = inherit
+        self.heat = heat
+        self.shares = shares
         self.sweep = 0
         self.step = 0
         self.moves_done = 0.0
@@ -143,8 +155,9 @@ class DownTheLadder(Mating):
         turn = np.array([chain[self.step] for chain in chains if self.step < len(chain)])
         turn = turn[rows[turn] >= 0]
         # A chain begins with its own first rung, shaken thoroughly, and hands the result down.
-        fresh = self.step == 0
+        fresh = self.step == 0 or not self.inherit
         temperature, cooling = FRESH if fresh else AGAIN
+        temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
         parents = rows[turn if fresh else turn + 1]
         work = self._work(problem, pop, rows)
         left = sum(work[chain[self.step :]].sum() for chain in chains)
@@ -158,6 +171,7 @@ class DownTheLadder(Mating):
             triangles=rungs[turn].astype(int),
             temperature=temperature,
             cooling=cooling,
+            shares=self.shares,
         )
         self.seconds += time.perf_counter() - begun
         self.moves_done += float(moves.sum())

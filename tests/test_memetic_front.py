@@ -9,7 +9,9 @@ import pytest
 from enumerable_models import GENERATIONS, MOST_FREE, nondominated, random_problem, same_front, true_front
 from pymoo.optimize import minimize
 
-from meshsimp_pymoo import MeshProblem, memetic, thinning
+from meshsimp_pymoo import MeshProblem, PackedDuplicates, memetic, thinning
+from meshsimp_pymoo.memetic_search import IDLE, DownTheLadder, SizeLadder
+from meshsimp_pymoo.operators.local_search import MoveShares
 
 MODELS = range(20)
 
@@ -47,3 +49,28 @@ def test_the_models_differ_in_size_and_thinning_alone_misses_most_fronts():
         nested = thinning(problem.model)
         missed += not same_front(np.c_[nested.error, nested.triangles], true_front(problem), tolerance=1e-9)
     assert missed > len(problems) / 2
+
+
+def test_the_search_ends_when_there_is_nothing_left_to_find():
+    """However many evaluations it may still use."""
+    problem = random_problem(2)
+    result = minimize(MeshProblem(problem.model), memetic(), ("n_eval", 10**9), seed=1)
+    assert result.algorithm.idle >= IDLE
+    np.testing.assert_allclose(nondominated(result.F), true_front(problem), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options", [{"inherit": False}, {"heat": 0.0}, {"shares": MoveShares(near=1.0, fill=0.0, drop=0.0)}], ids=str
+)
+def test_the_ways_of_making_children_can_be_chosen_and_none_is_worse_than_thinning(options):
+    problem = MeshProblem("peaks:15")
+    ladder = SizeLadder()
+    mating = DownTheLadder(ladder, eliminate_duplicates=PackedDuplicates(), **options)
+    result = minimize(problem, memetic(30, survival=ladder, mating=mating), ("n_gen", 6), seed=1)
+    usual = minimize(problem, memetic(30), ("n_gen", 6), seed=1)
+    thinned = thinning(problem.model)
+    assert not np.array_equal(result.F, usual.F)
+    for error, triangles in result.F:
+        fitting = thinned.triangles <= triangles
+        # the mesh may be one of thinning's own, whose error was added up in another order
+        assert error <= thinned.error[fitting].min() * (1 + 1e-9) or triangles not in ladder.rungs

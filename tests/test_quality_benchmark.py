@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import functools
 import importlib.util
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pymoo.optimize import minimize
 
-from meshsimp_pymoo import thinning
+from meshsimp_pymoo import MeshProblem, thinning
 from meshsimp_pymoo.problem import open_model
 
 
@@ -54,9 +56,10 @@ def test_it_scores_every_method_at_the_sizes_of_thinning(quality, tmp_path, caps
 
 
 def test_variants_are_compared_with_the_first_one(quality, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(quality, "VARIANTS", {"full": {}, "few": {"pop_size": 5}})
+    few = functools.partial(quality.ladder_search, 5)
+    monkeypatch.setattr(quality, "VARIANTS", {"full": quality.ladder_search, "few": few})
     results = tmp_path / "variants.csv"
-    options = ["--ablation", "--models", "peaks:9", "--budgets", "0.2", "--seeds", "1", "2", "--shares", "20"]
+    options = ["--ablation", "--models", "peaks:9", "--budgets", "1.5", "--seeds", "1", "2", "--shares", "20"]
     assert quality.main([*options, "-o", str(results)]) == 0
     with results.open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -68,6 +71,16 @@ def test_variants_are_compared_with_the_first_one(quality, monkeypatch, capsys, 
     column = next(k for k, cell in enumerate(heading) if "all / full" in cell)
     line = next(cells for cells in lines if len(cells) > 2 and cells[1].strip() == "few")
     assert float(line[column]) == pytest.approx(np.exp(few.mean() - full.mean()), abs=6e-4)
+
+
+def test_every_variant_searches_and_they_differ(quality):
+    problem = MeshProblem("peaks:9", regions=quality.REGIONS)
+    found = {}
+    for name, make in quality.VARIANTS.items():
+        result = minimize(problem, make(), ("n_gen", 3), seed=1)
+        assert len(result.F) > 3
+        found[name] = result.algorithm.evaluator.n_eval, np.sort(result.F[:, 0]).sum()
+    assert len(set(found.values())) == len(found)
 
 
 def test_the_enumerated_models_are_reported(quality, capsys):

@@ -7,7 +7,7 @@ The change of the error is exact and looks at the triangles touched only, so a m
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -33,12 +33,29 @@ from meshsimp_pymoo.operators.requirements import summed_measure
 if TYPE_CHECKING:
     from meshsimp_pymoo.geometry.model import OpenModel
 
-# Share of the moves that go to a neighbour on the mesh; the others go to a triangle with a large error.
-NEAR_SHARE = 0.5
-# Share of the steps that add a vertex where there is room for two triangles, or for one, and that drop a vertex.
-FILL_SHARE = 0.2
-BORDER_SHARE = 0.02
-DROP_SHARE = 0.01
+
+class MoveShares(NamedTuple):
+    """How often each kind of move is tried.
+
+    Attributes
+    ----------
+    near : float
+        Of the moves of a vertex those to a neighbour on the mesh; the others go to a triangle with a large error.
+    fill : float
+        Of the steps with room for two triangles those that add a vertex.
+    border : float
+        Of the steps with room for one triangle those that add a vertex on the border.
+    drop : float
+        Of the steps those that drop a vertex.
+    """
+
+    near: float = 0.5
+    fill: float = 0.2
+    border: float = 0.02
+    drop: float = 0.01
+
+
+USUAL_MOVES = MoveShares()
 # Triangles compared for a far move, and vertices compared for a change of size.
 FAR_TRIES = 4
 SIZE_TRIES = 12
@@ -109,6 +126,7 @@ def _anneal(
     hot: float,
     cooling: float,
     most: int,
+    shares: tuple,  # type: ignore[type-arg]
     state: np.ndarray,
     stop: np.ndarray,
     best_movable: np.ndarray,
@@ -122,6 +140,7 @@ def _anneal(
     indices = borrowed(indices)
     state = borrowed(state)
     n = len(g.z)
+    near, fill, on_border, drop = shares
     site = live.site
     count = live.tally
     now = _total(live)
@@ -140,15 +159,15 @@ def _anneal(
         q = _below(state, n_movable) if n_movable > 0 else 0
         v = np.int64(-1)
         w = np.int64(-1)
-        if slack > 0 and kind < (FILL_SHARE if slack > 1 else BORDER_SHARE):
+        if slack > 0 and kind < (fill if slack > 1 else on_border):
             # Room for a vertex more; where there is room for one triangle only, it must be on the border.
             w = _urgent(g, live, n, state) if slack > 1 else np.int64(border[_below(state, len(border))])
         elif n_movable == 0:
             continue
         else:
             v = movable[q]
-            if kind < 1.0 - DROP_SHARE:
-                if _unit(state) < NEAR_SHARE:
+            if kind < 1.0 - drop:
+                if _unit(state) < near:
                     w = v
                     for _ in range(1 + _below(state, 2)):
                         degree = indptr[w + 1] - indptr[w]
@@ -249,6 +268,7 @@ def relocate(
     triangles: int | None = None,
     temperature: float = 0.3,
     cooling: float = 0.03,
+    shares: MoveShares = USUAL_MOVES,
     footprint: str = "model",
     outside: str = "nearest",
     measure: str = "error",
@@ -277,6 +297,8 @@ def relocate(
         Initial temperature, in units of the error per kept vertex. 0 accepts improvements only.
     cooling : float
         Share of the temperature that is left in the end; in between it falls geometrically.
+    shares : MoveShares
+        How often each kind of move is tried.
     footprint, outside : str
         As in :func:`~meshsimp_pymoo.geometry.error.evaluate_subsets`.
     measure : {"error", "rms_error"}
@@ -321,6 +343,7 @@ def relocate(
             temperature * total / max(len(rows), 1),
             cooling,
             int(live.tally[N_EMITTED]) if triangles is None else triangles,
+            tuple(map(float, shares)),
             state,
             np.zeros(1, np.bool_) if stop is None else stop,
             best,
@@ -340,6 +363,7 @@ def relocate_all(
     triangles: NDArray[np.integer] | None = None,
     temperature: float = 0.3,
     cooling: float = 0.03,
+    shares: MoveShares = USUAL_MOVES,
 ) -> NDArray[np.bool_]:
     """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number."""
     measure = summed_measure(problem)
@@ -357,6 +381,7 @@ def relocate_all(
             triangles=None if triangles is None else int(triangles[k]),
             temperature=temperature,
             cooling=cooling,
+            shares=shares,
             footprint=problem.footprint,
             outside=problem.outside,
             measure=measure,

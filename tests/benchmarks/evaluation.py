@@ -1,7 +1,7 @@
 """How fast an evaluation and a run are, as ratios: both sides in one process, warm, in alternation.
 
-Run ``python tests/benchmarks/evaluation.py`` (about two minutes), or with ``--memory`` for the peak memory of a
-population of 100 at N = 1 000 000 alone.
+Run ``python tests/benchmarks/evaluation.py`` (about three minutes), with ``--moves`` for the live triangulation and the
+greedy passes alone, or with ``--memory`` for the peak memory of a population of 100 at N = 1 000 000 alone.
 """
 
 from __future__ import annotations
@@ -13,16 +13,22 @@ import subprocess
 import sys
 import time
 import warnings
+from functools import partial
 
 import numpy as np
+from numba import njit
 from pymoo.optimize import minimize
 from rich.console import Console
 from rich.table import Table
 from scipy.spatial import Delaunay
 
-from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo import MeshProblem, greedy_insertion, thinning
 from meshsimp_pymoo.algorithms import moead, nsga2_v1, nsga2_v2
+from meshsimp_pymoo.geometry.borrow import borrowed
 from meshsimp_pymoo.geometry.error import evaluate_subsets
+from meshsimp_pymoo.geometry.live import build, lent_live, make_ground, try_exchange
+from meshsimp_pymoo.geometry.load import grid_source
+from meshsimp_pymoo.geometry.model import load_model
 
 ROUNDS = 15
 CONSOLE = Console(width=110)
@@ -132,10 +138,74 @@ def runs():
     CONSOLE.print(table)
 
 
+@njit
+def _try_all(ground, live, old, new):
+    """Evaluate moves without making them; return how many can be made."""
+    ground = borrowed(ground)
+    live = borrowed(live)
+    possible = 0
+    for k in range(len(old)):
+        change, _ = try_exchange(ground, live, old[k], new[k], np.inf)
+        possible += change < np.inf
+    return possible
+
+
+def moves():
+    """Exact evaluations of tentative operations on one core, with 5 % of the vertices kept by thinning."""
+    columns = ("insert", "remove", "move anywhere", "move to a neighbour")
+    table = Table("model", "N", "kept", *columns, title="Tentative operations a second, exact, one core")
+    count, nothing = 20_000, -1
+    for name in ("jacksboro:12", "jacksboro:4", "jacksboro:1"):
+        model = MeshProblem(name).model
+        rng = np.random.default_rng(1)
+        nested = thinning(model)
+        kept = nested.kept(round(0.05 * model.n_vertices))
+        ground, live = make_ground(model), lent_live(model.n_vertices)
+        build(ground, live, model, np.flatnonzero(kept))
+        pinned = nested.kept(0)
+        old = rng.choice(np.flatnonzero(kept & ~pinned), count)
+        new = rng.choice(np.flatnonzero(~kept), count)
+        indptr, indices = model.neighbours
+        near = indices[indptr[old] + rng.integers(0, indptr[old + 1] - indptr[old])].astype(np.int64)
+        free = ~kept[near]
+        none = np.full(count, nothing)
+        cells = []
+        for gone, come in ((none, new), (old, none), (old, new), (old[free], near[free])):
+            _try_all(ground, live, gone[:10], come[:10])
+            call = partial(_try_all, ground, live, gone, come)
+            rounds = [seconds(call) / len(gone) for _ in range(5)]
+            cells.append(f"{1 / statistics.median(rounds):,.0f}")
+        table.add_row(name, f"{model.n_vertices}", "5%", *cells)
+    CONSOLE.print(table)
+
+
+def passes():
+    """One pass of thinning and of greedy insertion, all sizes, one core."""
+    table = Table("model", "N", "thinning s", "greedy insertion s", title="Greedy passes")
+    for model in (MeshProblem("jacksboro:1").model, million()):
+        model.kernel_arguments  # noqa: B018 - made once a model
+        table.add_row(
+            model.name,
+            f"{model.n_vertices}",
+            f"{seconds(lambda model=model: thinning(model)):.2f}",
+            f"{seconds(lambda model=model: greedy_insertion(model)):.2f}",
+        )
+    CONSOLE.print(table)
+
+
+def million():
+    """Return a rough terrain of a million samples: noise whose amplitude falls with the square of the frequency."""
+    n = 1000
+    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(n), np.fft.fftfreq(n)))
+    frequency[0, 0] = np.inf
+    noise = np.random.default_rng(1).normal(size=(n, n))
+    heights = np.fft.ifft2(np.fft.fft2(noise) * frequency**-2.0).real
+    heights = (heights - heights.min()) / np.ptp(heights) * 500
+    return load_model(grid_source(heights, 10.0, 10.0, name="noise 1000 x 1000"), up="z")
+
+
 def memory():
     """Peak memory of a population of 100 over a million vertices, three generations; in this process."""
-    from meshsimp_pymoo.geometry.load import grid_source
-
     x, y = np.meshgrid(np.linspace(0, 9, 1000), np.linspace(0, 9, 1000))
     problem = MeshProblem(grid_source(np.sin(x) * np.cos(y * 1.3) * 50, 10.0, 10.0), up="z")
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
@@ -152,13 +222,21 @@ def main() -> None:
     """Print all tables, or the memory line alone."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--memory", action="store_true", help="only the peak memory")
-    if parser.parse_args().memory:
+    parser.add_argument("--moves", action="store_true", help="only the live triangulation and the greedy passes")
+    options = parser.parse_args()
+    if options.memory:
         memory()
         return
     warnings.simplefilter("ignore")
+    if options.moves:
+        moves()
+        passes()
+        return
     evaluations()
     concave()
     runs()
+    moves()
+    passes()
     subprocess.run([sys.executable, __file__, "--memory"], check=True)
 
 

@@ -36,14 +36,34 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.algorithms.moo.sms import SMSEMOA
+from pymoo.core.sampling import Sampling
 from pymoo.optimize import minimize
 from rich.console import Console
 from rich.table import Table
 
-from meshsimp_pymoo import MeshProblem, greedy_insertion, memetic, nsga2_v1, thinning
+from meshsimp_pymoo import (
+    HalfPlaneCrossover,
+    MeshProblem,
+    NeighbourShift,
+    NestedSubsets,
+    PackedDuplicates,
+    PinnedCorners,
+    RegionCrossover,
+    Relocation,
+    SizeStep,
+    greedy_insertion,
+    memetic,
+    moead,
+    nsga2_v1,
+    thinning,
+)
 from meshsimp_pymoo.baselines.meshlab import MeshLabUnavailable, meshlab_available, quadric_collapse
 from meshsimp_pymoo.geometry.error import Quality, mesh_quality
 from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.memetic_search import DownTheLadder, SizeLadder
+from meshsimp_pymoo.operators.local_search import MoveShares
 from meshsimp_pymoo.problem import open_model
 
 BUILT_IN = ("jacksboro:11", "face:1000", "jacksboro:4", "topobathy", "jacksboro")
@@ -57,12 +77,76 @@ CLASSES = (
     ("large", sys.maxsize, (10.0, 120.0, 600.0)),
 )
 
-# Variants of the search to compare by --ablation: what each passes to memetic().
-VARIANTS: dict[str, dict] = {
-    "full": {},
+
+
+class RandomOfAllSizes(Sampling):
+    """Random subsets with sizes spread over the logarithm as those of the seeds are."""
+
+    def _do(self, problem, n_samples, *args, random_state, **kwargs):
+        free = np.flatnonzero(~problem.pinned)
+        X = np.tile(problem.pinned, (n_samples, 1))
+        for kept, size in zip(X, np.geomspace(1, len(free), n_samples).astype(int), strict=True):
+            kept[random_state.choice(free, size, replace=False)] = True
+        return X
+
+
+def ladder_search(pop_size=100, sampling=None, **options):
+    """Return the memetic search with another way of making children."""
+    ladder = SizeLadder()
+    mating = DownTheLadder(ladder, eliminate_duplicates=PackedDuplicates(), **options)
+    return memetic(pop_size, survival=ladder, mating=mating, sampling=sampling or NestedSubsets())
+
+
+def evolution(algorithm, *, sampling=None, crossover=None, mutation=None, **options):
+    """Return another algorithm with the operators that know the problem: seeds, half-planes, relocation."""
+    return algorithm(
+        pop_size=100,
+        sampling=sampling or NestedSubsets(),
+        crossover=crossover or HalfPlaneCrossover(),
+        mutation=mutation or Relocation(),
+        repair=PinnedCorners(),
+        eliminate_duplicates=PackedDuplicates(),
+        **options,
+    )
+
+
+def decomposition():
+    """Return MOEA/D with the same operators; it makes one child at a time."""
+    return moead(
+        normalised=True,
+        pop_size=100,
+        sampling=NestedSubsets(),
+        crossover=HalfPlaneCrossover(n_offsprings=1),
+        mutation=Relocation(),
+    )
+
+
+# Variants of the search to compare by --ablation; each is a function that makes the algorithm. The first line is what
+# memetic() is, those with "no" are without one of its parts; the others are other algorithms, and they likewise.
+VARIANTS = {
+    "memetic": ladder_search,
+    "no seeds": lambda: ladder_search(sampling=RandomOfAllSizes()),
+    "no inheritance": lambda: ladder_search(inherit=False),
+    "no annealing": lambda: ladder_search(heat=0.0),
+    "no near moves": lambda: ladder_search(shares=MoveShares(near=0.0)),
+    "no far moves": lambda: ladder_search(shares=MoveShares(near=1.0)),
+    "no filling": lambda: ladder_search(shares=MoveShares(fill=0.0)),
+    "no border moves": lambda: ladder_search(shares=MoveShares(border=0.0)),
+    "no dropping": lambda: ladder_search(shares=MoveShares(drop=0.0)),
+    "50 rungs": lambda: ladder_search(50),
+    "200 rungs": lambda: ladder_search(200),
+    "NSGA-II": lambda: evolution(NSGA2),
+    "NSGA-II, no seeds": lambda: evolution(NSGA2, sampling=RandomOfAllSizes()),
+    "NSGA-II, no crossover": lambda: evolution(NSGA2, crossover=HalfPlaneCrossover(prob=0.0)),
+    "NSGA-II, regions": lambda: evolution(NSGA2, crossover=RegionCrossover()),
+    "NSGA-II, no relocation": lambda: evolution(NSGA2, mutation=NeighbourShift()),
+    "NSGA-II, size steps": lambda: evolution(NSGA2, mutation=SizeStep()),
+    "SMS-EMOA": lambda: evolution(SMSEMOA),
+    "MOEA/D": decomposition,
 }
-ABLATION_MODELS = ("jacksboro:11", "face:1000", "jacksboro:4", "topobathy")
-ABLATION_SECONDS = 30.0
+REGIONS = 256
+ABLATION_MODELS = ("jacksboro:11", "face:1000", "jacksboro:4")
+ABLATION_SECONDS = 10.0
 ABLATION_SEEDS = (1, 2, 3)
 
 # A tool's mesh this close to the wanted size is not searched further: triangles, or this share of them.
@@ -199,9 +283,9 @@ def nested_curve(model, build):
     return Curve(nested.error, nested.triangles, lambda k: problem.quality(nested.kept(k)), seconds)
 
 
-def search_curve(model, algorithm, termination, seed):
+def search_curve(model, algorithm, termination, seed, regions=0):
     """Time a search, on a problem that knows nothing from earlier ones."""
-    problem = MeshProblem(model)
+    problem = MeshProblem(model, regions=regions)
     start = time.perf_counter()
     result = minimize(problem, algorithm, termination, seed=seed)
     seconds = time.perf_counter() - start
@@ -722,7 +806,7 @@ def ablation(options):
     say("compiling")
     warm_up([])
     for variant in variants:
-        minimize(MeshProblem("face:60"), memetic(**VARIANTS[variant]), ("time", 0.5), seed=1)
+        minimize(MeshProblem("face:60", regions=REGIONS), VARIANTS[variant](), ("time", 0.5), seed=1)
     ratios = defaultdict(dict)  # variant -> (model, seed, share) -> ratio
     notes = defaultdict(list)
     models = []
@@ -733,7 +817,7 @@ def ablation(options):
             # Variants in turn, so that what else the machine does meets all of them.
             for variant in variants:
                 say(f"{model.name}: {variant}, seed {seed}")
-                curve = search_curve(model, memetic(**VARIANTS[variant]), ("time", seconds), seed)
+                curve = search_curve(model, VARIANTS[variant](), ("time", seconds), seed, REGIONS)
                 notes[variant].append(int(curve.note.split()[0]))
                 for share, size in sizes.items():
                     ratios[variant][model.name, seed, share] = _ratio(curve.value(size), reference.value(size))
