@@ -49,7 +49,7 @@ class MoveShares(NamedTuple):
         Of the steps those that drop a vertex.
     """
 
-    near: float = 0.5
+    near: float = 0.9
     fill: float = 0.2
     border: float = 0.02
     drop: float = 0.01
