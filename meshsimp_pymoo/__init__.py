@@ -12,6 +12,7 @@ The data flow, which is also the order in which one part may import another::
     indicators     how good a front is
     analysis       many runs -> merged fronts, tables, choices
     results, runs  what a run leaves on disk
+    checkpoint     what a killed search goes on from
     display        what a search shows of itself
     tiles/         height grids too big for one piece
     report/        pictures, tables, findings

@@ -30,6 +30,7 @@ from meshsimp_pymoo.geometry.error import ERROR, TRIANGLES, Quality, Simplified
 from meshsimp_pymoo.geometry.load import ModelError
 from meshsimp_pymoo.geometry.refit import Refitted, refit_heights
 from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.operators.sampling import NestedSubsets, nested_front
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.results import (
     MESH_SUFFIXES,
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
     from meshsimp_pymoo.geometry.model import OpenModel
 
-__all__ = ["Front", "FrontSolution"]
+__all__ = ["Front", "FrontSolution", "starting_front"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -70,6 +71,9 @@ SETTINGS: dict[str, Any] = {
 }
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
+# What the front that a search started from is called, and how many of its thousands of points are drawn.
+START = "adaptive thinning (start)"
+START_POINTS = 200
 
 
 class FrontSolution:
@@ -238,6 +242,9 @@ class Front(Sequence[FrontSolution]):
         Where the front is stored.
     meshes : sequence of str, optional
         Path of each stored mesh relative to the folder; empty where there is none.
+    series : mapping of str to (n, 2) array, optional
+        Other fronts to compare with: the error that was minimised [model units] and triangles, by name. They are
+        drawn faintly behind this one and stored with it; more can be added to the attribute ``series``.
 
     Examples
     --------
@@ -262,11 +269,13 @@ class Front(Sequence[FrontSolution]):
         run: Mapping[str, Any] | None = None,
         folder: Path | None = None,
         meshes: Sequence[str] = (),
+        series: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
         self.quality = tuple(quality)
         self.kept: BoolArray = np.asarray(kept, dtype=bool)
         self.run = dict(run or {})
         self.folder = folder
+        self.series: dict[str, npt.ArrayLike] = dict(series or {})
         self._meshes = tuple(meshes) or ("",) * len(self.quality)
         self._problem = problem
         if not self.quality:
@@ -346,6 +355,7 @@ class Front(Sequence[FrontSolution]):
             )
         front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends)
         algorithm = getattr(result, "algorithm", None)
+        front.series |= starting_front(problem, algorithm)
         facts = {
             "algorithm": type(algorithm).__name__ if algorithm is not None else None,
             "seed": getattr(algorithm, "seed", None),
@@ -378,7 +388,9 @@ class Front(Sequence[FrontSolution]):
         names = [item.name for item in fields(Quality)]
         columns = [stored.quality[name].tolist() for name in names]
         quality = [Quality(**dict(zip(names, row, strict=True))) for row in zip(*columns, strict=True)]
-        front = cls(quality, stored.kept, run=stored.run, folder=stored.folder, meshes=stored.meshes)
+        front = cls(
+            quality, stored.kept, run=stored.run, folder=stored.folder, meshes=stored.meshes, series=stored.series
+        )
         if model is not None:
             front._problem = front._problem_of(model)
         return front
@@ -405,6 +417,7 @@ class Front(Sequence[FrontSolution]):
                 run=self.run,
                 folder=self.folder,
                 meshes=[self._meshes[row] for row in rows],
+                series=self.series,
             )
         row = operator.index(item)
         if not -len(self) <= row < len(self):
@@ -508,7 +521,7 @@ class Front(Sequence[FrontSolution]):
         from meshsimp_pymoo.report.figures import plot_front
 
         F = self.F
-        look: dict[str, Any] = {"knee": knee(F), "measure": self.objectives[0]}
+        look: dict[str, Any] = {"knee": knee(F), "measure": self.objectives[0], "series": self.series}
         return plot_front(F[:, [0, -1]], ax, **look | kwargs)
 
     def save(
@@ -563,7 +576,7 @@ class Front(Sequence[FrontSolution]):
             from meshsimp_pymoo.report.figures import front_figure, panel_rows
 
             F = self.F
-            shown = panel_rows(len(self), row, knee(F))
+            shown = panel_rows([q.triangles for q in self.quality], row, knee(F))
             figure = front_figure(
                 problem.model,
                 F[:, [0, -1]],
@@ -571,6 +584,7 @@ class Front(Sequence[FrontSolution]):
                 knee=knee(F),
                 chosen=row,
                 measure=self.objectives[0],
+                series=self.series,
             )
             figure.savefig(unfinished / "front.png")
             if page:
@@ -590,6 +604,7 @@ class Front(Sequence[FrontSolution]):
             mesh_format=mesh_format.lower(),
             chosen=row,
             refit=(lambda solution: self[solution].refitted) if refit else None,
+            series=self.series,
             run=record,
             extra=draw,
             overwrite=overwrite,
@@ -693,6 +708,33 @@ class Front(Sequence[FrontSolution]):
             if beside.is_file():
                 return beside
         return self.name
+
+
+def starting_front(problem: MeshProblem, algorithm: Any) -> dict[str, FloatArray]:
+    """Return the front that a search started from, by name, if its first population is one of adaptive thinning.
+
+    Parameters
+    ----------
+    problem : MeshProblem
+        What was searched, with two objectives.
+    algorithm : pymoo Algorithm, or None
+        The search.
+
+    Returns
+    -------
+    dict of str to (n, 2) float array
+        Error and triangles of at most START_POINTS of its solutions, spread over the logarithm of the size; empty where
+        the search started otherwise.
+    """
+    sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
+    if not isinstance(sampling, NestedSubsets) or problem.n_obj != 2:
+        return {}
+    F = nested_front(problem, sampling).F
+    F = non_dominated(F[F[:, 1] > 0])
+    F = F[np.argsort(F[:, 1])]
+    wanted = np.geomspace(F[0, 1], F[-1, 1], START_POINTS)
+    rows = np.searchsorted(F[:, 1], wanted, side="right") - 1
+    return {START: F[np.unique(np.maximum(rows, 0))]}
 
 
 def _is_feasible(problem: MeshProblem, row: FloatArray) -> bool:

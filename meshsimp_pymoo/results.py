@@ -7,9 +7,11 @@
     OUT/chosen.ply     the solution that was asked for, if one was
     OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
                        the columns REFIT_COLUMNS too
+    OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
     OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
     OUT/run.json       settings, seed, package versions, evaluations, seconds, hash of the model
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
+    OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.checkpoint`)
 
 All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
 the same front. Floats are written
@@ -20,6 +22,7 @@ flushed to the disk and then renamed, so that OUT is either complete or absent.
 from __future__ import annotations
 
 import csv
+import glob
 import io
 import json
 import os
@@ -30,8 +33,9 @@ import struct
 import warnings
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import metadata
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Any
@@ -47,20 +51,24 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.geometry.refit import Refitted
 
 __all__ = [
+    "CHECKPOINT",
     "FRONT_COLUMNS",
     "MESHES_BY_DEFAULT",
     "MESH_FORMATS",
     "MESH_SUFFIXES",
     "REFIT_COLUMNS",
+    "SERIES_COLUMNS",
     "ResultError",
     "StoredFront",
     "claim_file",
     "claim_output",
+    "is_unfinished",
     "local_origin",
     "mesh_arrays",
     "mesh_suffix",
     "new_file",
     "package_versions",
+    "put_back",
     "read_front",
     "refuse_format",
     "stays_inside",
@@ -85,6 +93,8 @@ FRONT_COLUMNS = (
     "mesh",
 )
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
+# The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
+SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
 MESH_FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
 # A LandXML file is called .xml everywhere; the name of the format is understood too.
@@ -92,10 +102,11 @@ MESH_SUFFIXES = (*MESH_FORMATS, "xml")
 SINGLE_PRECISION_LOSS = 1e-6  # share of the model's diagonal; a larger shift of a vertex is worth a warning
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
+CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 OWN_ENTRIES = (
     "front.csv", "front.npz", "front.png", "run.json", "meshes",
     "report.html", "tables", "figures", "times.csv", "refitted",
-    "nested.npz", "tiles",
+    "nested.npz", "tiles", "series.csv",
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
@@ -159,6 +170,8 @@ class StoredFront:
         The error with the best heights, NaN where it was not computed; None if heights were not fitted.
     refitted_meshes : tuple of str
         Path of each mesh with its best heights, relative to the folder; empty where there is none.
+    series : dict of str to (n, 2) float array
+        Other fronts to compare with: the error that was minimised [model units] and triangles, by name.
     """
 
     folder: Path
@@ -169,6 +182,7 @@ class StoredFront:
     run: dict[str, Any] = field(default_factory=dict)
     refitted_error: FloatArray | None = None
     refitted_meshes: tuple[str, ...] = ()
+    series: dict[str, FloatArray] = field(default_factory=dict)
 
     @property
     def F(self) -> FloatArray:
@@ -204,7 +218,11 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     if target.exists():
         if not overwrite:
             raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
-        foreign = sorted(e.name for e in target.iterdir() if e.name not in OWN_ENTRIES and e.stem not in CHOSEN)
+        foreign = sorted(
+            e.name
+            for e in target.iterdir()
+            if e.name not in OWN_ENTRIES and e.stem not in CHOSEN and not _of_unfinished(e.name)
+        )
         if foreign:
             raise ResultError(
                 f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
@@ -222,6 +240,34 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     return folder
 
 
+def is_unfinished(folder: str | os.PathLike[str]) -> bool:
+    """Tell whether a folder is there and holds nothing but what a search leaves that was killed."""
+    return Path(folder).is_dir() and all(_of_unfinished(entry.name) for entry in Path(folder).iterdir())
+
+
+def put_back(folder: str | os.PathLike[str], *, tidy: bool = False) -> None:
+    """Mend what a process left that was killed while it put results in place.
+
+    Parameters
+    ----------
+    folder : path
+        The folder of the results. If it is gone, and what it held before stands aside, that becomes the folder again.
+    tidy : bool
+        Remove unfinished results beside it too; only for who holds the folder.
+    """
+    target = Path(folder).resolve()
+    aside = f".{glob.escape(target.name)}.{'[0-9a-f]' * 8}"
+    if not target.exists() and (old := sorted(target.parent.glob(f"{aside}.old"))):
+        old[0].rename(target)
+    for unfinished in target.parent.glob(f"{aside}.partial") if tidy else ():
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _of_unfinished(name: str) -> bool:
+    stem = Path(CHECKPOINT).stem
+    return name in (CHECKPOINT, ".lock") or (name.startswith(f".{stem}.") and ".partial" in name)
+
+
 def write_front(
     folder: str | os.PathLike[str],
     model: OpenModel,
@@ -233,6 +279,7 @@ def write_front(
     mesh_format: str = "ply",
     chosen: int | None = None,
     refit: Callable[[int], Refitted] | None = None,
+    series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
     extra: Callable[[Path], None] | None = None,
     overwrite: bool = False,
@@ -265,6 +312,9 @@ def write_front(
         The best heights for the solution in this row of ``kept`` (see
         :func:`~meshsimp_pymoo.geometry.refit.refit_heights`). Each mesh that is written is then written with them
         too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
+    series : mapping of str to (n, 2) array, optional
+        Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
+        written to ``series.csv``.
     run : mapping, optional
         What to record in run.json beside the package versions and the model.
     extra : callable, optional
@@ -307,8 +357,11 @@ def write_front(
 
     folder = claim_output(folder, overwrite=overwrite)
     target = folder.resolve()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    partial = _partial_folder(target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        partial = _partial_folder(target)
+    except OSError as problem:
+        raise ResultError(f"{folder}: cannot be made ({_short(problem)}); name another folder") from None
     try:
         digits = max(3, len(str(len(order) - 1)))
         rows, single = [], 0.0
@@ -336,8 +389,10 @@ def write_front(
                         write_mesh(partial / f"chosen_refitted.{suffix}", *raised, **look)
             numbers = [_spelled(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
-        _warn_of_shift(model, mesh_format, single)
+        _warn_of_shift(model.name, model.diagonal, mesh_format, single)
         _write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
+        if series:
+            _write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
         _write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
         record = dict(run or {}) | {
@@ -361,8 +416,12 @@ def write_front(
         if extra is not None:
             extra(partial)
         _put_in_place(partial, target, folder, overwrite)
-    except BaseException:
+    except BaseException as problem:
         shutil.rmtree(partial, ignore_errors=True)
+        if isinstance(problem, OSError):
+            raise ResultError(
+                f"{folder}: cannot be written ({_short(problem)}); make room, or name another folder"
+            ) from None
         raise
     return folder
 
@@ -416,7 +475,8 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     if not isinstance(run, dict) or run.get("solutions") != count:
         raise ResultError(f"{record}: is not the record of this front of {count} solutions")
     _check_record(run, count, record)
-    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes)
+    series = _read_series(folder / "series.csv")
+    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series)
 
 
 def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
@@ -583,7 +643,7 @@ def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
     suffix = path.suffix.lower().lstrip(".")
     refuse_format(model, suffix)
     arrays = mesh_arrays(model, faces)
-    _warn_of_shift(model, suffix, _single_precision_shift(arrays[0]))
+    _warn_of_shift(model.name, model.diagonal, suffix, _single_precision_shift(arrays[0]))
     write_mesh(path, *arrays, **_written_frame(model, suffix))
 
 
@@ -618,7 +678,7 @@ def claim_file(path: str | os.PathLike[str], suffixes: Sequence[str], *, overwri
 
 
 @contextmanager
-def new_file(path: Path) -> Iterator[Path]:
+def new_file(path: Path, *, way_out: str = "name another file") -> Iterator[Path]:
     """Yield a hidden name beside ``path`` to write to; afterwards it is renamed to ``path``, or removed on an error."""
     partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.partial{path.suffix}")
     try:
@@ -626,13 +686,20 @@ def new_file(path: Path) -> Iterator[Path]:
         _flush(partial)
         partial.replace(path)
     except OSError as problem:
-        raise ResultError(f"{path}: cannot be written ({_short(problem)}); name another file") from None
+        raise ResultError(f"{path}: cannot be written ({_short(problem)}); {way_out}") from None
     finally:
-        partial.unlink(missing_ok=True)
+        # whatever stands in the way of that was said already
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
 
 
 def package_versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that decide the results; absent ones are left out."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
     versions = {"python": platform.python_version()}
     for package in PACKAGES:
         try:
@@ -642,10 +709,10 @@ def package_versions() -> dict[str, str]:
     return versions
 
 
-def _warn_of_shift(model: OpenModel, mesh_format: str, shift: float) -> None:
-    if mesh_format == "stl" and shift > SINGLE_PRECISION_LOSS * model.diagonal:
+def _warn_of_shift(name: str, diagonal: float, mesh_format: str, shift: float) -> None:
+    if mesh_format == "stl" and shift > SINGLE_PRECISION_LOSS * diagonal:
         warnings.warn(
-            f"{model.name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
+            f"{name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
             "[file units]; ply, obj and off keep them exactly, glb states a local origin",
             ModelWarning,
             stacklevel=3,
@@ -686,21 +753,52 @@ def _write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]
         writer.writerows(rows)
 
 
-def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
+def _csv_rows(path: Path, *headers: tuple[str, ...]) -> tuple[tuple[str, ...], list[list[str]]]:
+    """Return the header, one of those expected, and all rows, the header's first."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file, strict=True))
     except (OSError, UnicodeDecodeError, csv.Error) as problem:
         raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
     header = tuple(rows[0]) if rows else ()
-    if header not in (FRONT_COLUMNS, FRONT_COLUMNS + REFIT_COLUMNS):
-        raise ResultError(f"{path}: its first line must be {','.join(FRONT_COLUMNS)}")
+    if header not in headers:
+        raise ResultError(f"{path}: its first line must be {','.join(headers[0])}")
     if len(rows) == 1:
         raise ResultError(f"{path}: holds no solution")
-    columns: dict[str, npt.NDArray[Any]] = {}
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
             raise ResultError(f"{path}, line {line}: {len(row)} values instead of {len(header)}; the file is cut off")
+    return header, rows
+
+
+def _series_rows(series: Mapping[str, npt.ArrayLike]) -> Iterator[list[str]]:
+    for name, front in series.items():
+        F = np.asarray(front, dtype=np.float64)
+        if F.ndim != 2 or F.shape[1] != 2 or not len(F) or not np.isfinite(F).all():
+            raise ValueError(f"the series {name!r} is no front: (n, 2) finite numbers, error and triangles")
+        for error, triangles in F[np.lexsort((F[:, 0], F[:, 1]))]:
+            yield [name, _spelled("minimised", error), _spelled("triangles", triangles)]
+
+
+def _read_series(path: Path) -> dict[str, FloatArray]:
+    """Read other fronts back; none where there is no such file."""
+    if not path.exists():
+        return {}
+    series: dict[str, list[tuple[float, float]]] = {}
+    for line, (name, *numbers) in enumerate(_csv_rows(path, SERIES_COLUMNS)[1][1:], start=2):
+        try:
+            error, triangles = float(numbers[0]), int(numbers[1])
+        except ValueError:
+            raise ResultError(f"{path}, line {line}: {','.join(numbers)} is no error and number of triangles") from None
+        if not (0 <= error < np.inf and 0 <= triangles <= MOST_COUNTED):
+            raise ResultError(f"{path}, line {line}: {','.join(numbers)} is no error and number of triangles")
+        series.setdefault(name, []).append((error, triangles))
+    return {name: np.array(front, dtype=np.float64) for name, front in series.items()}
+
+
+def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
+    header, rows = _csv_rows(path, FRONT_COLUMNS, FRONT_COLUMNS + REFIT_COLUMNS)
+    columns: dict[str, npt.NDArray[Any]] = {}
     for at, column in enumerate(header):
         if column in ("mesh", "refitted_mesh"):
             continue

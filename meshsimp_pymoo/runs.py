@@ -6,6 +6,7 @@
     OUT/models/NAME.KEY.npz   the models as they were searched
     OUT/runs/NAME.KEY.json    the record of a run: description, versions, evaluations, seconds, checksums
     OUT/runs/NAME.KEY.npz     its arrays; no pickles
+    OUT/.checkpoints/KEY.npz  the state of a run that is not finished; see `meshsimp_pymoo.checkpoint`
 
 KEY is the hash of what the run is (model, problem, algorithm with all settings, seed, budget), so that a run
 is found again whatever it is called, and never mistaken for another. NAME is for people only.
@@ -382,8 +383,14 @@ def _put(path: Path, content: bytes) -> None:
     try:
         partial.write_bytes(content)
         partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
+    except BaseException as problem:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+        if isinstance(problem, OSError):
+            raise ResultError(
+                f"{path}: cannot be written ({_first_line(problem)}); mend that, and the same command does what is "
+                "missing"
+            ) from None
         raise
 
 

@@ -801,6 +801,17 @@ def test_completion_prints_a_script_that_knows_the_options(capsys, shell):
     assert all(word in script for word in (*COMMANDS, "triangles", "memetic"))
 
 
+@pytest.mark.parametrize("command", [["info"], ["completion", "bash"]])
+def test_a_reader_that_has_seen_enough_is_no_error(command):
+    process = subprocess.Popen(
+        [sys.executable, "-m", "meshsimp_pymoo.cli", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    process.stderr.close()
+    assert process.wait() == 0
+
+
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
 def test_bash_completes_a_command_an_option_and_a_choice(tmp_path, capsys):
     assert run("completion", "bash") == 0

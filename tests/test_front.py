@@ -17,10 +17,26 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
-from meshsimp_pymoo import Front, FrontOutput, MeshProblem, ResultError, moead, nsga2_v1, weighted_ga_v1
+from meshsimp_pymoo import (
+    Front,
+    FrontOutput,
+    HalfPlaneCrossover,
+    MeshProblem,
+    NeighbourShift,
+    NestedSubsets,
+    PinnedCorners,
+    ResultError,
+    greedy_insertion,
+    memetic,
+    moead,
+    nsga2_v1,
+    thinning,
+    weighted_ga_v1,
+)
 from meshsimp_pymoo.analysis import knee
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.display import errors_at, usual_sizes
+from meshsimp_pymoo.front import starting_front
 from meshsimp_pymoo.geometry.error import simplify
 from meshsimp_pymoo.indicators import hypervolume_ratio
 from meshsimp_pymoo.report.figures import plot_mesh
@@ -220,6 +236,47 @@ def test_a_front_that_was_read_can_be_saved_again_with_the_same_bytes(stored, tm
     Front.load(stored).save(tmp_path / "again", meshes=5, chosen=Front.load(stored).knee().solution)
     for name in ("front.csv", "front.npz", "front.png", "chosen.ply"):
         assert (tmp_path / "again" / name).read_bytes() == (stored / name).read_bytes()
+
+
+def test_a_search_that_starts_from_thinning_shows_what_it_gained(tmp_path):
+    problem = MeshProblem("peaks:12")
+    algorithm = NSGA2(
+        pop_size=20, sampling=NestedSubsets(), crossover=HalfPlaneCrossover(), mutation=NeighbourShift(),
+        repair=PinnedCorners(),
+    )  # fmt: skip
+    front = Front.from_result(minimize(problem, algorithm, ("n_gen", 3), seed=1))
+    ((name, start),) = front.series.items()
+    assert name == "adaptive thinning (start)"
+    thinned = thinning(problem.model).F
+    assert {tuple(row) for row in start} <= {tuple(row) for row in thinned}
+    assert start[0, 1] == thinned[thinned[:, 1] > 0, 1].min()
+    assert (np.diff(start[:, 1]) > 0).all()
+    assert (np.diff(start[:, 0]) < 0).all()
+    front.series["greedy"] = greedy_insertion(problem.model, most=20).F[1:]
+    folder = front.save(tmp_path / "out", meshes=0)
+    again = Front.load(folder)
+    assert list(again.series) == [name, "greedy"]
+    assert np.array_equal(again.series[name], start)
+    assert [line.get_label() for line in again[2:5].plot().get_lines()][:2] == [name, "greedy"]
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert '"series":[{"name":"adaptive thinning (start)","x":[2.0,' in text
+    again.save(tmp_path / "again", meshes=0)
+    assert (tmp_path / "again" / "series.csv").read_bytes() == (folder / "series.csv").read_bytes()
+
+
+def test_a_search_from_random_subsets_has_no_other_front_beside_it(front, stored):
+    assert front.series == {}
+    assert not (stored / "series.csv").exists()
+
+
+def test_of_a_large_model_the_start_is_drawn_from_points_spread_over_the_sizes():
+    problem = MeshProblem("peaks:40")
+    (start,) = starting_front(problem, memetic()).values()
+    assert 100 < len(start) <= 200
+    assert len(thinning(problem.model).F) > 1500
+    upper = start[start[:, 1] > 20, 1]
+    assert (upper[1:] / upper[:-1]).max() < 1.2
+    assert start[-1].tolist() == [0.0, 2 * 39**2]
 
 
 def test_nothing_is_overwritten_unasked(front, tmp_path):

@@ -77,6 +77,19 @@ def test_a_front_reads_back_as_it_was_written(tmp_path, model, solutions):
     assert stored.run["versions"]["numpy"] == np.__version__
 
 
+def test_other_fronts_are_stored_beside_it_sorted_by_triangles(tmp_path, model, solutions):
+    others = {"greedy, worst point": [[0.1, 9], [1 / 3, 4]], 'a "b"': [[7.0, 2]]}
+    stored = read_front(write(tmp_path / "out", model, solutions, series=others))
+    assert {name: F.tolist() for name, F in stored.series.items()} == {
+        "greedy, worst point": [[1 / 3, 4.0], [0.1, 9.0]], 'a "b"': [[7.0, 2.0]]
+    }  # fmt: skip
+    assert read_front(write(tmp_path / "alone", model, solutions)).series == {}
+    assert not (tmp_path / "alone" / "series.csv").exists()
+    for wrong in ([1.0, 2.0], [[1.0, np.nan]], np.zeros((0, 2))):
+        with pytest.raises(ValueError, match="the series 'x' is no front"):
+            write(tmp_path / "wrong", model, solutions, series={"x": wrong})
+
+
 def test_meshes_stand_where_the_front_says_and_are_the_solutions(tmp_path, model, solutions):
     folder = write(tmp_path / "out", model, solutions)
     stored = read_front(folder)
@@ -483,6 +496,18 @@ def spoil_run(folder):
 
 
 DAMAGE = {
+    "another series": (
+        lambda f: (f / "series.csv").write_text("name,error\na,1\n"),
+        r"series\.csv: its first line must be series,minimised,triangles",
+    ),
+    "a word in a series": (
+        lambda f: (f / "series.csv").write_text("series,minimised,triangles\na,1.5,2\na,much,7\n"),
+        r"series\.csv, line 3: much,7 is no error and number of triangles",
+    ),
+    "an error in a series that is no number": (
+        lambda f: (f / "series.csv").write_text("series,minimised,triangles\na,nan,2\n"),
+        r"series\.csv, line 2: nan,2 is no error",
+    ),
     "no csv": (lambda f: (f / "front.csv").unlink(), r"front\.csv: cannot be read \(No such file"),
     "cut csv": (
         cut("front.csv", 0.5),

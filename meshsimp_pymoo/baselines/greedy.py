@@ -74,6 +74,11 @@ class NestedFront:
     def __len__(self) -> int:
         return len(self.error)
 
+    @property
+    def F(self) -> np.ndarray:
+        """Error and triangles of every subset, (M + 1, 2), as pymoo writes objectives."""
+        return np.column_stack([self.error, self.triangles])
+
     def kept(self, k: int) -> np.ndarray:
         """Return subset k as a bool array (N,)."""
         if not 0 <= k < len(self):

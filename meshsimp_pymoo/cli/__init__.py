@@ -16,13 +16,19 @@ is quick.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 from meshsimp_pymoo.cli.arguments import UsageError, make_parser
-from meshsimp_pymoo.cli.terminal import BAD_INPUT, INTERRUPTED, interruptible, say, warnings_as_lines
+from meshsimp_pymoo.cli.terminal import BAD_INPUT, INTERRUPTED, OK, interruptible, say, warnings_as_lines
 
 __all__ = ["main"]
+
+NO_MEMORY = "the work does not fit into memory; take a part of the model, a smaller population, or tiles (--tile)"
+# What Python says where there is no room for the stack of another thread.
+NO_THREAD = "can't start new thread"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -41,14 +47,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         args = make_parser().parse_args(argv)
         with warnings_as_lines(), interruptible():
-            return int(args.command(args))
+            code = int(args.command(args))
+            sys.stdout.flush()
+            return code
+    except BrokenPipeError:  # whoever reads our output has seen enough of it: meshsimp info | head -3
+        with suppress(OSError, ValueError):  # and Python shall not try again at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OK
     except KeyboardInterrupt:
         say("interrupted; nothing is written")
         return INTERRUPTED
     except MemoryError:
-        say("the work does not fit into memory; take a part of the model, a smaller population, or tiles (--tile)")
+        say(NO_MEMORY)
         return BAD_INPUT
     except Exception as problem:
+        if str(problem) == NO_THREAD:
+            say(NO_MEMORY)
+            return BAD_INPUT
         if not isinstance(problem, _input_errors()):
             raise
         say(" ".join(str(problem).split()))

@@ -209,13 +209,14 @@ def _add_simplify(commands: Any) -> None:
     search.add_argument(
         "--threads", type=_whole(1), metavar="N", help="(default: all cores; the results do not depend on it)"
     )
+    _add_checkpoint(search, "the state of the search is saved in OUT", " (tiles are always saved)")
 
     tiles = simplify.add_argument_group("big height grids, thinned tile by tile in bounded memory")
     tiles.add_argument(
         "--tile",
         type=_tile,
         metavar="N|none",
-        help="samples along one side of a tile (default: 512, for .npy and .asc from 2 million samples on)",
+        help="samples along one side of a tile (default: 512, for .npy, .asc and .tif from 2 million samples on)",
     )
     tiles.add_argument("--pieces", action="store_true", help="write the chosen mesh in pieces, one for each tile")
     _add_worker_options(tiles)
@@ -354,6 +355,7 @@ def _add_run(commands: Any) -> None:
     run.add_argument("config", metavar="CONFIG.yaml")
     run.add_argument("-o", "--output", metavar="OUT", help="folder to make or to continue (default: CONFIG_results)")
     _add_worker_options(run)
+    _add_checkpoint(run, "the state of every run is saved", "; algorithms given by import path may begin anew")
     run.add_argument(
         "--models", metavar="FOLDER", help="where the model files are, in place of the configuration's folder"
     )
@@ -420,6 +422,16 @@ def _add_worker_options(parser: Any) -> None:
     workers.add_argument("--jobs", type=_whole(1), metavar="N", help="processes (default: one for each core)")
     workers.add_argument(
         "--dask", metavar="ADDRESS", help="scheduler of a Dask cluster that does the work, such as tcp://host:8786"
+    )
+
+
+def _add_checkpoint(parser: Any, what: str, besides: str) -> None:
+    parser.add_argument(
+        "--checkpoint",
+        type=_interval,
+        default=60.0,
+        metavar="T|none",
+        help=f"how often {what}, so that the same command goes on after a crash{besides} (default: 60s)",
     )
 
 
@@ -499,6 +511,10 @@ def _duration(text: str) -> float:
     if not match or match[2] not in SECONDS or float(match[1]) == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a duration; write 60s, 10min or 1h")
     return float(match[1]) * SECONDS[match[2]]
+
+
+def _interval(text: str) -> float | None:
+    return None if text == "none" else _duration(text)
 
 
 def _spacing(text: str) -> tuple[float, float]:

@@ -35,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
                 jobs=jobs,
                 engine=open_until_done.enter_context(_cluster(args.dask)) if args.dask else None,
                 progress=lambda work, total, text: show(work / max(total, 1e-9), text),
+                checkpoint=args.checkpoint,
             )
         seconds = time.perf_counter() - start
         if not (args.quiet or args.json):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import re
 import shlex
 import time
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,15 +19,43 @@ from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.algorithms import PRESETS
+from meshsimp_pymoo.checkpoint import (
+    CheckpointError,
+    Checkpoints,
+    NotResumable,
+    difference,
+    read_checkpoint,
+    restore,
+)
 from meshsimp_pymoo.cli.arguments import DEFAULT_GENERATIONS, UsageError
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, described, progress, say, stop_if_interrupted
+from meshsimp_pymoo.cli.terminal import (
+    BAD_INPUT,
+    INTERRUPTED,
+    OK,
+    TARGET_MISSED,
+    described,
+    progress,
+    say,
+    stop_if_interrupted,
+)
 from meshsimp_pymoo.cli.tiled import simplify_tiled, wants_tiles
-from meshsimp_pymoo.front import Front, FrontSolution
+from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.results import claim_output, local_origin, mesh_suffix, refuse_format
+from meshsimp_pymoo.results import (
+    CHECKPOINT,
+    ResultError,
+    claim_output,
+    is_unfinished,
+    local_origin,
+    mesh_suffix,
+    package_versions,
+    put_back,
+    refuse_format,
+)
+from meshsimp_pymoo.runs import locked
 
 # What of the command line does not decide the results.
-UNRECORDED = ("command", "output", "overwrite", "quiet", "json", "model", "seed", "page")
+UNRECORDED = ("command", "output", "overwrite", "quiet", "json", "model", "seed", "page", "checkpoint")
 
 
 @dataclass
@@ -45,11 +75,25 @@ def simplify(args: argparse.Namespace) -> int:
         args.output = f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
     if wants_tiles(args):
         return simplify_tiled(args)
-    folder = claim_output(args.output, overwrite=args.overwrite)
+    folder = _claim(args)
     problem = _mesh_problem(args)
     refuse_format(problem.model, args.format)
     _refuse_impossible(args, problem)
-    found = _search(args, problem)
+    with _Kept(args, folder, problem) as kept:
+        return _search_and_write(args, folder, problem, kept)
+
+
+def _claim(args: argparse.Namespace) -> Path:
+    """Return the folder to make: a new one, one with a checkpoint, or with ``--overwrite`` one with old results."""
+    folder = Path(args.output)
+    put_back(folder)
+    if is_unfinished(folder) and (args.checkpoint is not None or not (folder / CHECKPOINT).exists()):
+        return folder
+    return claim_output(folder, overwrite=args.overwrite)
+
+
+def _search_and_write(args: argparse.Namespace, folder: Path, problem: MeshProblem, kept: _Kept) -> int:
+    found = _search(args, problem, kept)
     if found is None:
         say("interrupted before the first generation was complete; nothing is written")
         return INTERRUPTED
@@ -66,16 +110,24 @@ def simplify(args: argparse.Namespace) -> int:
         "interrupted": found.interrupted,
     }
     chosen, missed = _choose(args, found.front)
-    found.front.save(
-        folder,
-        overwrite=args.overwrite,
-        meshes=args.meshes,
-        mesh_format=args.format,
-        chosen=chosen,
-        refit=args.refit,
-        page=args.page,
-        run=run,
-    )
+    try:
+        found.front.save(
+            folder,
+            # the folder of our own checkpoint gives way to the results
+            overwrite=args.overwrite or kept.is_held or (is_unfinished(folder) and not kept.path.exists()),
+            meshes=args.meshes,
+            mesh_format=args.format,
+            chosen=chosen,
+            refit=args.refit,
+            page=args.page,
+            run=run,
+        )
+    except (ResultError, KeyboardInterrupt) as stop:
+        if not (kept.is_held and kept.path.exists()):
+            raise
+        reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
+        say(f"{reason}; the same command goes on from the checkpoint in {folder}")
+        return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
     _summarise(args, problem, found, chosen)
     if found.interrupted:
         say(f"interrupted after {found.generations} generations; {folder} holds the front so far")
@@ -117,8 +169,8 @@ def _generations(args: argparse.Namespace) -> int:
     return int(args.generations or default)
 
 
-def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
-    """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
+def _set_up(args: argparse.Namespace, problem: MeshProblem) -> Any:
+    """Return the algorithm before its first generation."""
     if args.time is not None:
         termination: Any = TimeBasedTermination(args.time)
     elif args.evaluations is not None:
@@ -126,9 +178,116 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
     else:
         termination = MaximumGenerationTermination(_generations(args))
     algorithm = PRESETS[args.algorithm](pop_size=args.population)
-    algorithm.setup(problem, termination=termination, seed=args.seed)
+    return algorithm.setup(problem, termination=termination, seed=args.seed)
+
+
+class _Kept:
+    """The checkpoints of a search, in the folder of its results; it holds the folder as long as there is one.
+
+    Parameters
+    ----------
+    args : Namespace
+        The command line.
+    folder : Path
+        Where the results go.
+    problem : MeshProblem
+        What is searched.
+    """
+
+    def __init__(self, args: argparse.Namespace, folder: Path, problem: MeshProblem) -> None:
+        self.args = args
+        self.folder = folder
+        self.problem = problem
+        self.path = folder / CHECKPOINT
+        self.is_held = False
+        self._checkpoints: Checkpoints | None = None
+        self._until_done = ExitStack()
+        self._warned = False
+
+    def __enter__(self) -> _Kept:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._until_done.close()
+
+    @property
+    def what(self) -> dict[str, Any]:
+        """What the search is: all that decides its results."""
+        args, versions = self.args, package_versions()
+        budget = {name: getattr(args, name) for name in ("time", "evaluations")}
+        if not any(budget.values()):
+            budget["generations"] = _generations(args)
+        return {
+            "model": self.problem.model.hash,
+            "pinned vertices": hashlib.sha256(self.problem.pinned.tobytes()).hexdigest(),
+            "measure": self.problem.objectives,
+            **{name: getattr(args, name) for name in ("footprint", "outside", "algorithm", "population", "seed")},
+            **budget,
+            **{name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")},
+        }
+
+    def begin(self) -> tuple[Any, float]:
+        """Return the algorithm, where its checkpoint left it if there is one, and the seconds it took before."""
+        args = self.args
+        algorithm, before = _set_up(args, self.problem), 0.0
+        if args.checkpoint is None:
+            return algorithm, before
+        if self.path.exists():
+            self._hold()
+            try:
+                stored = read_checkpoint(self.path)
+                if other := difference(stored.what, self.what):
+                    raise CheckpointError(f"{self.path}: belongs to another search ({other})")
+                restore(stored, algorithm)
+                before = stored.seconds
+                if not args.quiet:
+                    say(
+                        f"{self.folder} holds a search that was stopped after {algorithm.n_iter - 1} generations, "
+                        f"{algorithm.evaluator.n_eval:,} evaluations, {before:.0f} s; going on from there"
+                    )
+            except CheckpointError as problem:
+                if not args.overwrite:
+                    raise ResultError(
+                        f"{problem}; name another folder, or allow overwriting (--overwrite) to begin anew"
+                    ) from None
+                algorithm = _set_up(args, self.problem)
+        try:
+            self._checkpoints = Checkpoints(self.path, algorithm, self.what, interval=args.checkpoint, before=before)
+        except NotResumable as problem:
+            self._warn(problem)
+        return algorithm, before
+
+    def keep(self, *, last: bool = False) -> None:
+        """Save the state if it is time; at the end of the search, if it was long enough to be worth it."""
+        checkpoints = self._checkpoints
+        if checkpoints is None or not (checkpoints.due() or (last and self.is_held)):
+            return
+        try:
+            self._hold()
+            checkpoints.save()
+        except (CheckpointError, NotResumable, OSError) as problem:
+            self._warn(problem)
+
+    def _warn(self, problem: Exception) -> None:
+        """Say once what is wrong with the checkpoints; the search is worth more."""
+        if not self._warned:
+            say(f"warning: {problem}; the search goes on without a checkpoint")
+        self._warned = True
+
+    def _hold(self) -> None:
+        """Make the folder, if need be, and keep other processes away from it."""
+        if not self.is_held:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._until_done.enter_context(locked(self.folder))
+            self.is_held = True
+            put_back(self.folder, tidy=True)
+
+
+def _search(args: argparse.Namespace, problem: MeshProblem, kept: _Kept) -> _Found | None:
+    """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
+    algorithm, before = kept.begin()
     start = time.perf_counter()
-    found, generations, interrupted = None, 0, False
+    found, generations, interrupted = algorithm.opt, (algorithm.n_iter or 1) - 1, False
     with progress(args.quiet, problem.model) as show:
         try:
             while algorithm.has_next():
@@ -136,6 +295,8 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
                 algorithm.next()
                 found, generations = algorithm.opt, algorithm.n_iter - 1
                 show(algorithm.termination.perc, algorithm.evaluator.n_eval, found.get("F"))
+                kept.keep()
+            kept.keep(last=True)
         except KeyboardInterrupt:
             interrupted = True
     if found is None:
@@ -148,7 +309,8 @@ def _search(args: argparse.Namespace, problem: MeshProblem) -> _Found | None:
             f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "
             "inside its outline; search longer, or pass --footprint hull"
         ) from None
-    return _Found(front, generations, algorithm.evaluator.n_eval, time.perf_counter() - start, interrupted)
+    front.series |= starting_front(problem, algorithm)
+    return _Found(front, generations, algorithm.evaluator.n_eval, before + time.perf_counter() - start, interrupted)
 
 
 def _refuse_impossible(args: argparse.Namespace, problem: MeshProblem) -> None:

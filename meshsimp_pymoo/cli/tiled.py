@@ -13,12 +13,22 @@ from typing import Any
 
 from meshsimp_pymoo.cli.arguments import UsageError
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
-from meshsimp_pymoo.engines import EngineError, open_engine
-from meshsimp_pymoo.results import ResultError, claim_output
+from meshsimp_pymoo.engines import Engine, EngineError, open_engine
+from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.results import ResultError, claim_output, mesh_suffix, refuse_format
 from meshsimp_pymoo.runs import locked
-from meshsimp_pymoo.tiles.front import TILE, Folder, TiledFront, settings, tiled_front
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
-from meshsimp_pymoo.tiles.output import read_tiled_front, stored_model, write_tiled_front, write_welded
+from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
+from meshsimp_pymoo.tiles.grid import HeightGrid, count_samples, open_grid
+from meshsimp_pymoo.tiles.memory import check_memory
+from meshsimp_pymoo.tiles.output import (
+    WORK,
+    clear_up,
+    read_tiled_front,
+    restore,
+    stored_model,
+    write_tiled_front,
+    write_welded,
+)
 
 # From this many samples on, a grid is thinned tile by tile without being asked.
 TILED_FROM = 2_000_000
@@ -29,19 +39,18 @@ UNKNOWN: dict[str, Any] = {
     "generations": None,
     "algorithm": "memetic",
     "pin": None,
-    "window": None,
     "max_edge": None,
     "patch": None,
     "weights": None,
     "refit": False,
+    "objectives": ("error", "triangles"),
 }
-WORK = "tiles"
 
 
 def wants_tiles(args: argparse.Namespace) -> bool:
     """Tell whether the model is to be thinned tile by tile: because it was asked for, or because it is big."""
     if args.tile is None:
-        count = count_samples(args.model)
+        count = count_samples(args.model, window=args.window)
         return count is not None and count >= TILED_FROM
     return bool(args.tile)
 
@@ -49,48 +58,48 @@ def wants_tiles(args: argparse.Namespace) -> bool:
 def simplify_tiled(args: argparse.Namespace) -> int:
     """Thin the height grid ``args.model`` tile by tile and write its front to a new folder."""
     _refuse_unknown(args)
+    restore(Path(args.output))
     out = _claim(args)
     start = time.perf_counter()
-    grid = open_grid(args.model, spacing=args.spacing, nodata=args.nodata, up=args.up)
+    grid = open_grid(args.model, spacing=args.spacing, nodata=args.nodata, window=args.window, up=args.up)
+    if grid.model is not None:
+        refuse_format(grid.model, args.format)
     tile = args.tile or TILE
-    most = args.triangles if args.triangles and args.triangles > _usual_most(grid, tile) else None
+    most = max(args.triangles or 2, usual_most(grid))
+    jobs = args.jobs or os.cpu_count() or 1
+    check_memory(grid, tile=tile, most=most, jobs=jobs, remote=args.dask is not None)
     try:
         what = settings(grid, tile=tile, most=most)
     except ValueError as problem:
+        if isinstance(problem, ModelError):
+            raise
         raise UsageError(str(problem)) from None
-    if args.overwrite:
-        _forget_other(out / WORK, what)
-    threads = args.threads or os.cpu_count() or 1
     made_now = not out.exists()
     try:
-        store = Folder(out / WORK, what)
-        with locked(out), open_engine(args.jobs, args.dask) as engine, bar(args.quiet, Path(grid.name).name) as show:
-            front = tiled_front(
-                grid, tile=tile, most=most, engine=engine, store=store, threads=threads, progress=show
-            )
-            front, chosen, missed = _choose(args, front, threads)
-            run = {
-                "settings": {key: getattr(args, key) for key in ("spacing", "nodata", "up", "triangles", "max_error",
-                "mean_error", "pick", "format")} | {"tile": tile, "most": what["most"]},
-                "seconds": round(time.perf_counter() - start, 3),
-            }  # fmt: skip
-            write_tiled_front(
-                out,
-                front,
-                meshes=args.meshes,
-                mesh_format=args.format,
-                chosen=chosen,
-                piece_size=tile if args.pieces else None,
-                run=run,
-            )
+        out.mkdir(parents=True, exist_ok=True)
+        with locked(out), open_engine(jobs, args.dask) as engine, bar(args.quiet, Path(grid.name).name) as show:
+            clear_up(out)
+            if args.overwrite:
+                _forget_other(out / WORK, what)
+            front, chosen, missed = _thin(args, out, grid, what, engine, show, start)
     except EngineError as problem:
-        raise ResultError(f"{problem}; finished tiles are in {out}, the same command goes on") from None
+        goes_on = f"; finished tiles are in {out}, the same command goes on" if _has_pieces(out) else ""
+        raise ResultError(f"{problem}{goes_on}") from None
+    except MemoryError:
+        raise ResultError(
+            f"{grid.name}: the work does not fit into memory; use smaller tiles (--tile {max(LEAST_TILE, tile // 2)}), "
+            "fewer processes (--jobs 1) or fewer triangles"
+        ) from None
+    except OSError as problem:
+        raise ResultError(f"{out}: cannot be used ({problem.strerror or problem}); name another folder") from None
     except KeyboardInterrupt:
-        if made_now and not any((out / WORK).glob("*.npz")):
-            shutil.rmtree(out, ignore_errors=True)
+        if made_now and not _has_pieces(out):
             raise
         say(f"interrupted; finished tiles are in {out}, the same command goes on")
         return INTERRUPTED
+    finally:
+        if made_now and _is_unfinished(out) and not _has_pieces(out):
+            shutil.rmtree(out, ignore_errors=True)
     _summarise(args, out, front, chosen, time.perf_counter() - start)
     if missed:
         say(f"{out} holds a front, but no chosen mesh: {missed}")
@@ -98,15 +107,72 @@ def simplify_tiled(args: argparse.Namespace) -> int:
     return OK
 
 
+def _thin(
+    args: argparse.Namespace,
+    out: Path,
+    grid: HeightGrid,
+    what: dict[str, Any],
+    engine: Engine,
+    show: Any,
+    start: float,
+) -> tuple[TiledFront, int | None, str]:
+    """Thin the grid, choose and write; return the front, the solution chosen, and why there is none."""
+    tile, threads = what["tile"], args.threads or os.cpu_count() or 1
+    front = tiled_front(
+        grid,
+        tile=tile,
+        most=what["most"],
+        engine=engine,
+        store=Folder(out / WORK, what),
+        threads=threads,
+        progress=show,
+    )
+    front, chosen, missed = _choose(args, front, threads)
+    recorded = ("spacing", "nodata", "window", "up", "triangles", "max_error", "mean_error", "pick", "format")
+    run = {
+        "settings": {key: getattr(args, key) for key in recorded} | {"tile": tile, "most": what["most"]},
+        "seconds": round(time.perf_counter() - start, 3),
+    }
+
+    def draw(unfinished: Path) -> None:
+        from matplotlib.figure import Figure
+
+        from meshsimp_pymoo.analysis import knee
+        from meshsimp_pymoo.report.figures import plot_front
+
+        figure = Figure(figsize=(7.0, 5.0), dpi=110, layout="constrained")
+        axes = figure.subplots()
+        plot_front(front, axes, knee=int(knee(front.F)), chosen=chosen, n_points=grid.n_samples)
+        rows, columns = grid.shape
+        axes.set_title(f"{Path(grid.name).name}: {rows:,} x {columns:,} samples", loc="left")
+        figure.savefig(unfinished / "front.png")
+
+    _claim(args)  # somebody may have put something else there meanwhile, which would be replaced
+    write_tiled_front(
+        out,
+        front,
+        meshes=args.meshes,
+        mesh_format=args.format,
+        chosen=chosen,
+        piece_size=tile if args.pieces else None,
+        run=run,
+        extra=draw,
+    )
+    return front, chosen, missed
+
+
+def _has_pieces(out: Path) -> bool:
+    return any((out / WORK).glob("*.npz"))
+
+
 def _refuse_unknown(args: argparse.Namespace) -> None:
     for name, nothing in UNKNOWN.items():
         if getattr(args, name, nothing) != nothing:
+            option = {"objectives": "measure"}.get(name, name.replace("_", "-"))
             raise UsageError(
-                f"--{name.replace('_', '-')} does not go with tiles, which are thinned and not searched; leave it out, "
+                f"--{option} does not go with tiles, which are thinned and not searched; leave it out, "
                 "or do without tiles (--tile none)"
             )
-
-
     if args.triangles == 1:
         raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
 
@@ -114,8 +180,11 @@ def _refuse_unknown(args: argparse.Namespace) -> None:
 def _claim(args: argparse.Namespace) -> Path:
     """Return the folder to make: a new one, one with unfinished tiles, or with ``--overwrite`` an old one."""
     out = Path(args.output)
-    unfinished = out.is_dir() and {entry.name for entry in out.iterdir()} <= {WORK, ".lock"}
-    return out if unfinished else claim_output(out, overwrite=args.overwrite)
+    return out if _is_unfinished(out) else claim_output(out, overwrite=args.overwrite)
+
+
+def _is_unfinished(out: Path) -> bool:
+    return out.is_dir() and {entry.name for entry in out.iterdir()} <= {WORK, ".lock"}
 
 
 def _forget_other(work: Path, what: dict[str, Any]) -> None:
@@ -123,11 +192,7 @@ def _forget_other(work: Path, what: dict[str, Any]) -> None:
     try:
         Folder(work, what)
     except ResultError:
-        shutil.rmtree(work)
-
-
-def _usual_most(grid: Any, tile: int) -> int:
-    return int(settings(grid, tile=max(tile, 64))["most"])
+        shutil.rmtree(work, ignore_errors=True)
 
 
 def pick_tiled(args: argparse.Namespace, path: Path | None) -> int:
@@ -168,9 +233,8 @@ def _choose(args: argparse.Namespace, front: TiledFront, threads: int) -> tuple[
     if args.triangles is not None:
         if args.triangles < quality[-1].triangles:
             return front, None, f"its smallest mesh has {quality[-1].triangles} triangles"
-        slope = front.slope_of(args.triangles)
-        front = front.with_slope(slope, threads=threads)
-        return front, front.slope.tolist().index(slope), ""
+        front, row = front.with_triangles(args.triangles, threads=threads)
+        return front, row, ""
     if args.pick == "knee":
         from meshsimp_pymoo.analysis import knee
 
@@ -189,7 +253,7 @@ def _choose(args: argparse.Namespace, front: TiledFront, threads: int) -> tuple[
 def _summarise(args: argparse.Namespace, out: Path, front: TiledFront, chosen: int | None, seconds: float) -> None:
     grid, quality = front.grid, front.quality
     solution = None if chosen is None else len(front) - 1 - chosen
-    path = str(out / "chosen") if args.pieces else str(out / f"chosen.{args.format}")
+    path = str(out / "chosen") if args.pieces else str(out / f"chosen.{mesh_suffix(args.format)}")
     if args.json:
         summary = {
             "model": {
@@ -218,4 +282,4 @@ def _summarise(args: argparse.Namespace, out: Path, front: TiledFront, chosen: i
     if chosen is not None:
         print(f"chosen: {path} (solution {solution}): {described(quality[chosen])}")
     written = len(list(out.glob("meshes/*")))
-    print(f"written: {out}: front.csv, nested.npz" + (f", {written} in meshes" if written else ""))
+    print(f"written: {out}: front.csv, nested.npz, front.png" + (f", {written} in meshes" if written else ""))

@@ -7,8 +7,9 @@ its budget (some adapt to the share of it that is left), so there each budget is
 is every budget in seconds.
 
 Each run is written as soon as it is finished, by the process that made it (see `meshsimp_pymoo.runs`), so
-that nothing depends on this process living on. Results depend on neither the number of processes nor the
-order of the runs, except under a budget in seconds.
+that nothing depends on this process living on. While a search goes on, its state is saved every minute or so (see
+`meshsimp_pymoo.checkpoint`): one that was killed goes on from there, to the same bytes. Results depend on neither the
+number of processes nor the order of the runs, except under a budget in seconds.
 
 Arrays of an evolutionary run: see `meshsimp_pymoo.runs.StoredRun`. Arrays of a classic method on a model:
 ``asked`` (R,), the numbers of triangles asked for; ``F``, ``vertices``, ``mean_error``, ... of the meshes
@@ -19,7 +20,9 @@ paper's series of reductions; and the meshes, one after the other: ``mesh_vertic
 
 from __future__ import annotations
 
+import contextlib
 import os
+import shutil
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -35,6 +38,16 @@ from meshsimp_pymoo.baselines.meshlab import (
     meshlab_available,
     meshlab_front,
     reductions,
+)
+from meshsimp_pymoo.checkpoint import (
+    INTERVAL,
+    CheckpointError,
+    Checkpoints,
+    NotResumable,
+    Stored,
+    difference,
+    read_checkpoint,
+    restore,
 )
 from meshsimp_pymoo.engines import Engine, EngineError, Processes, Serial
 from meshsimp_pymoo.experiment.config import (
@@ -72,6 +85,9 @@ OVERHEAD_VERTICES = 600
 WORK_PER_SECOND = 1e7
 # Work of a classic method on a model, in evaluations.
 BASELINE_EVALUATIONS = 2000
+
+# The folder, inside the experiment's, of the state of searches that are not finished.
+CHECKPOINTS = ".checkpoints"
 
 QUALITY_COLUMNS = ("vertices", "mean_error", "rms_error", "max_error", "uncovered")
 
@@ -118,6 +134,19 @@ class Task:
         value = f" / {merged}={self.merged_value}" if merged else ""
         return f"{self.problem} / {self.algorithm.name}{value} / seed {self.seed}"
 
+    @property
+    def search(self) -> dict[str, Any]:
+        """What the search is; the same, whichever of its runs are finished."""
+        description: dict[str, Any] = dict(self.descriptions[0])
+        if self.is_shared:
+            del description["budget"]
+        return description
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether all budgets are moments of the same search; else there is but one of them."""
+        return _is_shared(self.algorithm, self.budgets[0])
+
     def without(self, finished: Collection[str]) -> Task:
         """Return the task without runs that are finished."""
         left = [k for k, key in enumerate(self.keys) if key not in finished]
@@ -158,6 +187,7 @@ def run_experiment(
     engine: Engine | None = None,
     folder: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
+    checkpoint: float | None = INTERVAL,
 ) -> Done:
     """Do all runs of an experiment that are not finished yet.
 
@@ -178,6 +208,9 @@ def run_experiment(
         Where the model files are, in place of what the configuration says.
     progress : callable, optional
         Told about the progress.
+    checkpoint : float or None
+        Seconds between two savings of the state of each search; None: it is not saved. A search that is done out of
+        reach of this folder (on a cluster), or whose algorithm holds what cannot be saved, begins anew after a crash.
 
     Returns
     -------
@@ -208,7 +241,9 @@ def run_experiment(
         shown = _Shown(progress, sum(task.work for task in missing) + sum(classic_work.values()))
         own = Serial() if jobs == 1 or len(missing) < 2 else Processes(min(jobs, len(missing)))
         with own:
-            _perform_all(missing, experiment, store, engine or own, shown)
+            _perform_all(missing, experiment, store, engine or own, shown, checkpoint)
+        with contextlib.suppress(OSError):
+            shutil.rmtree(out / CHECKPOINTS)
         rows, skipped, computed = _classic(experiment, tasks, store, shown, classic_work)
         write_experiment(out, content | {"classic": rows, "skipped": list(skipped)})
         asked = {key for task in tasks for key in task.keys} | {row["key"] for row in rows}
@@ -248,7 +283,12 @@ def plan(experiment: Experiment) -> list[Task]:
 
 
 def perform(
-    task: Task, model: OpenModel, options: Mapping[str, Any]
+    task: Task,
+    model: OpenModel,
+    options: Mapping[str, Any],
+    *,
+    checkpoint: Path | None = None,
+    interval: float = INTERVAL,
 ) -> Iterator[tuple[int, dict[str, npt.NDArray[Any]], dict[str, Any]]]:
     """Search, and yield each run of a task when its budget is reached.
 
@@ -260,6 +300,10 @@ def perform(
         The model.
     options : mapping
         The options of its problem.
+    checkpoint : Path, optional
+        File for the state of the search. If there is one, the search goes on from there; it is removed at the end.
+    interval : float
+        Seconds between two savings.
 
     Yields
     ------
@@ -272,18 +316,32 @@ def perform(
     from pymoo.termination.max_time import TimeBasedTermination
 
     problem = MeshProblem(model, **problem_arguments(options), n_threads=1)
-    algorithm = task.algorithm.build(task.merged_value)
-    termination: Any = NoTermination()
-    if len(task.budgets) == 1:
-        budget = task.budgets[0]
-        terminations = {
-            "generations": MaximumGenerationTermination,
-            "evaluations": MaximumFunctionCallTermination,
-            "seconds": TimeBasedTermination,
-        }
-        termination = terminations[budget.kind](budget.amount)
+
+    def set_up() -> Any:
+        termination: Any = NoTermination()
+        if len(task.budgets) == 1:
+            budget = task.budgets[0]
+            terminations = {
+                "generations": MaximumGenerationTermination,
+                "evaluations": MaximumFunctionCallTermination,
+                "seconds": TimeBasedTermination,
+            }
+            termination = terminations[budget.kind](budget.amount)
+        return task.algorithm.build(task.merged_value).setup(problem, termination=termination, seed=task.seed)
+
     start = time.perf_counter()
-    algorithm.setup(problem, termination=termination, seed=task.seed)
+    algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
+    if stored is not None:
+        try:
+            restore(stored, algorithm)
+            start -= float(stored.facts["seconds"])
+        except CheckpointError as damage:
+            warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=2)
+            algorithm = set_up()
+    keeper = None
+    if checkpoint is not None:
+        with contextlib.suppress(NotResumable):
+            keeper = Checkpoints(checkpoint, algorithm, _search_and_versions(task), interval=interval)
     left = list(range(len(task.budgets)))
     set_aside = 0.0  # seconds spent on runs already yielded
     while left:
@@ -312,6 +370,46 @@ def perform(
                 yield k, _front_arrays(problem, algorithm.opt), facts
                 left.remove(k)
         set_aside = time.perf_counter() - start - seconds
+        if left and keeper is not None and keeper.due():
+            try:
+                keeper.save(seconds=seconds, generations=int(generations), evaluations=int(evaluations))
+            except (CheckpointError, NotResumable) as trouble:
+                warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
+                keeper = None
+            set_aside = time.perf_counter() - start - seconds
+    if checkpoint is not None:
+        with contextlib.suppress(OSError):
+            checkpoint.unlink(missing_ok=True)
+
+
+def _search_and_versions(task: Task) -> dict[str, Any]:
+    """Return what a checkpoint of a task belongs to."""
+    versions = package_versions()
+    return {name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")} | {
+        "search": fingerprint(task.search)
+    }
+
+
+def _checkpoint_of(task: Task, folder: Path) -> Path:
+    return folder / CHECKPOINTS / f"{fingerprint(task.search)}.npz"
+
+
+def _usable_checkpoint(task: Task, path: Path) -> Stored | None:
+    """Return a task's checkpoint; None if there is none, or it is past a run that is missing; name a damaged one."""
+    if not path.exists():
+        return None
+    try:
+        stored = read_checkpoint(path)
+        if other := difference(stored.what, _search_and_versions(task)):
+            raise CheckpointError(f"{path}: belongs to another search ({other})")
+        if any(stored.facts[budget.kind] >= budget.amount for budget in task.budgets):
+            return None
+    except (CheckpointError, KeyError, TypeError) as damage:
+        warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=3)
+        with contextlib.suppress(OSError):
+            path.unlink()
+        return None
+    return stored
 
 
 def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[Any]]:
@@ -353,9 +451,13 @@ def _quality_arrays(quality: Sequence[Quality]) -> dict[str, npt.NDArray[Any]]:
 
 def _moments(algorithm: AlgorithmConfig, budgets: Sequence[Budget]) -> list[tuple[Budget, ...]]:
     """Return the budgets that one search can serve, together."""
-    together = tuple(b for b in budgets if algorithm.preset and b.kind != "seconds")
+    together = tuple(b for b in budgets if _is_shared(algorithm, b))
     alone = [(b,) for b in budgets if b not in together]
     return ([together] if together else []) + alone
+
+
+def _is_shared(algorithm: AlgorithmConfig, budget: Budget) -> bool:
+    return bool(algorithm.preset) and budget.kind != "seconds"
 
 
 def _work(problem: ProblemConfig, algorithm: AlgorithmConfig, budgets: Sequence[Budget]) -> float:
@@ -467,13 +569,22 @@ class _Shared:
 
     problems: Mapping[str, tuple[OpenModel, dict[str, Any]]]
     folder: Path | None
+    checkpoint: float | None
 
 
 def _perform_all(
-    tasks: Sequence[Task], experiment: Experiment, store: RunStore, engine: Engine, shown: _Shown
+    tasks: Sequence[Task],
+    experiment: Experiment,
+    store: RunStore,
+    engine: Engine,
+    shown: _Shown,
+    checkpoint: float | None,
 ) -> None:
     problems = {problem.name: (problem.model, dict(problem.options)) for problem in experiment.problems}
-    shared = _Shared(problems, store.folder if engine.shares_files else None)
+    shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint)
+    if shared.folder is not None and checkpoint is not None:
+        for task in tasks:  # damage is named here, not by the processes
+            _usable_checkpoint(task, _checkpoint_of(task, store.folder.parent))
     if shown.progress is not None:
         shown.progress(0.0, shown.total, "")
     # big ones first, so that all workers end together
@@ -492,7 +603,7 @@ def _perform_all(
 def _work_on(task: Task, shared: _Shared) -> list[Any]:
     """Do a task; return the records of its runs, or, where the folder is out of reach, all that is to be written."""
     if shared.folder is not None:
-        return list(_perform_and_write(task, shared.problems, shared.folder))
+        return list(_perform_and_write(task, shared, shared.folder))
     model, options = shared.problems[task.problem]
     return [
         (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
@@ -500,12 +611,13 @@ def _work_on(task: Task, shared: _Shared) -> list[Any]:
     ]
 
 
-def _perform_and_write(
-    task: Task, problems: Mapping[str, tuple[OpenModel, dict[str, Any]]], folder: Path
-) -> list[Path]:
-    model, options = problems[task.problem]
+def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
+    model, options = shared.problems[task.problem]
+    saved: dict[str, Any] = {}
+    if shared.checkpoint is not None:
+        saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
     paths = []
-    for k, arrays, facts in perform(task, model, options):
+    for k, arrays, facts in perform(task, model, options, **saved):
         label = f"{task.label} / {task.budgets[k].name}"
         paths.append(write_run(folder, label, task.descriptions[k], arrays, facts))
     return paths

@@ -12,7 +12,7 @@ lowest line is 0 where a solution is exact.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -51,8 +51,11 @@ LIGHT = (-0.5, 0.6, 0.75)  # to the light, in the frame of the picture: from the
 AMBIENT = 0.22  # brightness of what faces away from the light
 CLAY = (0.90, 0.84, 0.77)  # colour of a mesh that has none of its own
 LINE, MARK = "#2b5c8a", "#c8452f"
+BESIDE, BESIDE_LINES = "#8b9099", ("-", "--", ":", "-.")  # other fronts, behind the one that counts
 UNCOVERED = "#0072B2"  # vertices that no triangle covers, on the yellow to black of the error
 PANELS = 3  # meshes beside a front
+# Their places on the logarithm of the size: meshes of a handful of triangles show little.
+PANEL_SHARES = (0.5, 0.7, 0.9)
 ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
 # From this many triangles on, edges are not outlined: in a panel of some 400 pixels they would cover the
 # shading.
@@ -71,6 +74,7 @@ def plot_front(
     marked: Sequence[int] = (),
     n_points: float | None = None,
     measure: str = "error",
+    series: Mapping[str, npt.ArrayLike] | None = None,
 ) -> Axes:
     """Draw a front: error against triangles.
 
@@ -89,6 +93,8 @@ def plot_front(
         drawn instead of the sum.
     measure : str
         What the first column of F is: "error" (a sum), "rms_error" or "max_error".
+    series : mapping of str to (n, 2) array, optional
+        Other fronts to draw faintly behind this one, by name, in the same measure.
 
     Returns
     -------
@@ -100,11 +106,14 @@ def plot_front(
         raise ValueError(f"a front has the shape (solutions, 2): error and triangles; this one has {F.shape}")
     ax = ax if ax is not None else _new_axes((6.4, 4.8))
     as_mean = measure == "error" and n_points is not None
-    error = F[:, 0] / (n_points if as_mean and n_points else 1.0)
-    triangles = F[:, 1]
-    order = np.lexsort((error, triangles))
-    # A solution holds until the next larger one: between two points the better of both is the left one.
-    ax.step(triangles[order], error[order], where="post", color=LINE, linewidth=1, alpha=0.45)
+    unit = np.array([n_points if as_mean and n_points else 1.0, 1.0])
+    error, triangles = (F / unit).T
+    drawn = [F / unit]
+    for k, (name, front_beside) in enumerate((series or {}).items()):
+        beside = np.asarray(front_beside, dtype=np.float64) / unit
+        _steps(ax, beside, color=BESIDE, linewidth=1.2, linestyle=BESIDE_LINES[k % len(BESIDE_LINES)], label=name)
+        drawn.append(beside)
+    _steps(ax, F / unit, color=LINE, linewidth=1, alpha=0.45)
     ax.plot(triangles, error, "o", color=LINE, markersize=4, label=f"{len(F)} solution{'s' * (len(F) != 1)}")
     letters = dict(zip(marked, "abcdefgh", strict=False))
     if knee is not None:
@@ -126,8 +135,8 @@ def plot_front(
             zorder=5,
         )
     what = "mean error per vertex" if as_mean else measure.replace("_", " ")
-    front_axes(ax, np.column_stack([error, triangles]), label=f"{what} [model units]")
-    if knee is not None or chosen is not None:
+    front_axes(ax, np.vstack(drawn), label=f"{what} [model units]")
+    if knee is not None or chosen is not None or series:
         for handle in ax.legend(frameon=False).get_lines():
             handle.set_markersize(min(handle.get_markersize(), 9))
     return ax
@@ -305,6 +314,7 @@ def front_figure(
     knee: int | None = None,
     chosen: int | None = None,
     measure: str = "error",
+    series: Mapping[str, npt.ArrayLike] | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the front of a simplification beside the original and a few of the simplified meshes.
@@ -319,8 +329,8 @@ def front_figure(
         At most PANELS solutions to show, in the order of the panels; see :func:`panel_rows`.
     knee, chosen : int, optional
         Rows of ``F`` to mark.
-    measure : str
-        What the first column of F is; see :func:`plot_front`.
+    measure, series
+        What the first column of F is, and other fronts to draw behind it; see :func:`plot_front`.
     title : str, optional
         By default the model's name and size.
 
@@ -339,7 +349,8 @@ def front_figure(
     left, right = halves[0]
     front = left.subplots()
     letters = [row for row, _ in meshes]
-    plot_front(F, front, knee=knee, chosen=chosen, marked=letters, n_points=model.total_weight, measure=measure)
+    marks: dict[str, Any] = {"knee": knee, "chosen": chosen, "marked": letters}
+    plot_front(F, front, **marks, n_points=model.total_weight, measure=measure, series=series)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
     front.set_title(title or f"{PurePath(model.name).name}: {size}", loc="left")
 
@@ -362,28 +373,30 @@ def front_figure(
     return figure
 
 
-def panel_rows(count: int, *wanted: int | None) -> list[int]:
-    """Return the rows of a front to draw as meshes: PANELS of them, spread over the front, the wanted among them.
+def panel_rows(triangles: npt.ArrayLike, *wanted: int | None) -> list[int]:
+    """Return the rows of a front to draw as meshes: PANELS of them, spread over the sizes, the wanted among them.
 
     Parameters
     ----------
-    count : int
-        How many solutions it has.
+    triangles : (S,) array
+        Sizes of the solutions, ascending.
     *wanted : int or None
         Rows that must be shown, such as the chosen one and the knee, the most important first.
 
     Examples
     --------
-    >>> panel_rows(11), panel_rows(11, 10, None, 7), panel_rows(2)
-    ([2, 5, 8], [2, 7, 10], [0, 1])
+    >>> sizes = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024]
+    >>> panel_rows(sizes), panel_rows(sizes, 10, None, 4), panel_rows([2, 4])
+    ([5, 7, 9], [4, 7, 10], [0, 1])
     """
-    even = [round((count - 1) * share) for share in np.linspace(0.2, 0.8, PANELS)]
+    size = np.log(np.maximum(np.asarray(triangles, dtype=np.float64), 1.0))
+    even = (size[0] + (size[-1] - size[0]) * np.array(PANEL_SHARES)).tolist()
     rows = list(dict.fromkeys(row for row in wanted if row is not None))[:PANELS]
     for row in rows:  # each takes the place of the nearest
-        even.remove(min(even, key=lambda other: abs(other - row)))
-    found = {*rows, *even}
-    while len(found) < min(PANELS, count):  # a short front
-        found.add(max(range(count), key=lambda row: min(abs(row - other) for other in found)))
+        even.remove(min(even, key=lambda other: abs(other - size[row])))
+    found = {*rows, *(int(np.argmin(abs(size - other))) for other in even)}
+    while len(found) < min(PANELS, len(size)):  # a short front
+        found.add(max(range(len(size)), key=lambda row: min(abs(row - other) for other in found)))
     return sorted(found)
 
 
@@ -455,6 +468,12 @@ def hillshade(triangles: FloatArray) -> FloatArray:
     cosine = normal @ (np.array(LIGHT) / np.linalg.norm(LIGHT))
     lit = np.divide(cosine, length, out=np.full_like(length, -1.0), where=length > 0)
     return AMBIENT + (1 - AMBIENT) * (0.5 + 0.5 * np.clip(lit, -1.0, 1.0))
+
+
+def _steps(ax: Axes, F: FloatArray, **look: Any) -> None:
+    """Draw a front as a line: a solution holds until the next larger one, which is better from there on."""
+    error, triangles = F[np.lexsort((F[:, 0], F[:, 1]))].T
+    ax.step(triangles, error, where="post", **look)
 
 
 def _new_axes(size: tuple[float, float]) -> Axes:

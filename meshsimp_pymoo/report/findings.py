@@ -18,7 +18,7 @@ significant by the raw p-value, as the paper counts, is always said too.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Sized
 from dataclasses import dataclass
 
 import numpy as np
@@ -648,9 +648,8 @@ def what_was_run(study: Study) -> str:
     """Return the size of the experiment in one line."""
     content = study.content
     return (
-        f"{len(study.problems)} models, {len(study.methods)} algorithms "
-        f"({', '.join(study.methods)}), {len(content['seeds'])} seeds, budgets: {', '.join(study.budgets)}; "
-        f"{len(study.all_runs):,} runs."
+        f"{_counted(study.problems, 'model')}, {_counted(study.methods, 'algorithm')} ({', '.join(study.methods)}), "
+        f"{_counted(content['seeds'], 'seed')}, budgets: {', '.join(study.budgets)}; {_counted(study.all_runs, 'run')}."
     )
 
 
@@ -670,6 +669,10 @@ def reservations(study: Study) -> list[str]:
 def _mean(values: Iterable[float]) -> str:
     array = np.array(list(values), dtype=float)
     return f"{array.mean():.4g}" if np.isfinite(array).all() else "infinity"
+
+
+def _counted(items: Sized, what: str) -> str:
+    return f"{len(items):,} {what}{'s' * (len(items) != 1)}"
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -82,10 +82,9 @@ def write_page(
     *,
     folder: str | os.PathLike[str],
     knee: int,
-    series: Mapping[str, npt.ArrayLike] | None = None,
 ) -> Path:
     """Write ``report.html`` to the folder of a front, whole or not at all; see :func:`simplification_page`."""
-    content = simplification_page(front, problem, folder=folder, knee=knee, series=series)
+    content = simplification_page(front, problem, folder=folder, knee=knee)
     path = front.folder / "report.html"
     with new_file(path) as unfinished:
         unfinished.write_text(content, encoding="utf-8", newline="\n")
@@ -98,7 +97,6 @@ def simplification_page(
     *,
     folder: str | os.PathLike[str],
     knee: int,
-    series: Mapping[str, npt.ArrayLike] | None = None,
     limit: int = PAGE_BYTES,
 ) -> str:
     """Return the page of a front.
@@ -107,15 +105,13 @@ def simplification_page(
     ----------
     front : StoredFront
         The front as it was written. Its record (``run.json``) says which solution was chosen; the page opens with that
-        one, else with the knee.
+        one, else with the knee. Its ``series`` are drawn faintly behind it.
     problem : MeshProblem
         What the solutions are solutions of; their meshes are made anew from it.
     folder : path
         The folder of the front, as a shell command shall name it.
     knee : int
         The row of the best compromise.
-    series : mapping of str to (n, 2) array, optional
-        Other fronts to draw faintly behind this one, (error, triangles) by name: seeds, baselines.
     limit : int
         Size of the page that is not exceeded if it can be helped, by leaving out meshes [bytes].
 
@@ -146,11 +142,13 @@ def simplification_page(
         "folder": shlex.quote(os.fspath(folder)),
         "measure": problem.objectives[0],
         "columns": columns,
-        "meshes": front.meshes,
+        "meshes": _mesh_files(front, chosen),
         "refitted_meshes": front.refitted_meshes,
         "knee": knee,
         "chosen": chosen,
-        "series": [_series(label, other) for label, other in (series or {}).items()],
+        "series": [
+            {"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()} for name, F in front.series.items()
+        ],
         "model": {
             "vertices": model.n_vertices,
             "triangles": len(model.faces),
@@ -268,10 +266,12 @@ def _by_importance(count: int, first: Sequence[int]) -> list[int]:
     return list(order)
 
 
-def _series(name: str, front: npt.ArrayLike) -> dict[str, Any]:
-    F = np.atleast_2d(np.asarray(front, dtype=np.float64))
-    F = F[np.lexsort((F[:, 0], F[:, 1]))]
-    return {"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()}
+def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
+    """Return the file of each mesh, relative to the folder; the chosen one may have no other than ``chosen.ply``."""
+    files = list(front.meshes)
+    if chosen is not None and not files[chosen]:
+        files[chosen] = next((path.name for path in sorted(front.folder.glob("chosen.*"))), "")
+    return files
 
 
 def _what_is_thinned(model: OpenModel, held: _Embedded, missing: int) -> Iterator[str]:

@@ -1,10 +1,13 @@
 """Models too big for one piece: a height grid is thinned tile by tile, in bounded memory, to one front of whole meshes.
 
 ======  ================================================================================================
-grid    :class:`~meshsimp_pymoo.tiles.grid.HeightGrid`: samples by windows, from a memory map or in memory
+grid    :class:`~meshsimp_pymoo.tiles.grid.HeightGrid`: samples by windows, from a memory map, a GeoTIFF or in memory
 thin    a tile's own front, with all beyond the tile fixed
 front   the phases: tiles merged by marginal analysis, then cut elsewhere, until one tile holds everything
+coarse  the smallest solutions, whose vertices are moved on the whole grid
 weld    the mesh of a solution as one piece or as tiles, and its error over all samples
+memory  what the tiles need, and what there is
+output  what is left on disk, and how a mesh is taken from it
 ======  ================================================================================================
 
 How the tiles meet. A mesh here is what it is everywhere in this package: the Delaunay triangulation of its vertices,

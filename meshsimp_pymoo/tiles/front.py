@@ -10,7 +10,9 @@ The vertices along the tiles' edges were fixed, too many of them. So the same is
 third of their side, and by two thirds: whatever lay along an edge lies inside a tile in one of three phases. From then
 on each phase thins to a somewhat larger slope, cut otherwise than the one before. Every phase ends with one row of the
 front, a subset of the row before. When few vertices are left, tiles grow: every second row and column of samples then
-stands for the others, and so on, until one tile holds the whole; it is thinned to the end.
+stands for the others, and so on, until one tile holds the whole; it is thinned to the end. The vertices of the
+smallest solutions are moved then, each solution's for itself (see `meshsimp_pymoo.tiles.coarse`): these alone are no
+subsets of the ones before.
 
 The errors of the front are measured afterwards, for each row over all samples.
 
@@ -23,6 +25,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -34,6 +37,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.engines import Engine, Serial
 from meshsimp_pymoo.geometry.error import Quality
 from meshsimp_pymoo.results import ResultError, new_file
+from meshsimp_pymoo.tiles.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
 from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.thin import Tile, thin_tile
 from meshsimp_pymoo.tiles.weld import measure, weld
@@ -58,6 +62,7 @@ LAST_STEP = 0.1
 # How far above the wanted size the finest solution may be.
 ABOUT = 1.1
 SHIFTS = (0.0, 1 / 3, 2 / 3)
+LOST = "a finished tile was stored, but is gone or damaged; start the same call again"
 
 # Called with (share done, what is being done).
 Progress = Callable[[float, str], None]
@@ -65,7 +70,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True, eq=False)
 class TiledFront:
-    """A nested front of a height grid, from fine to coarse.
+    """A front of a height grid, from fine to coarse, nested but for its smallest solutions.
 
     Attributes
     ----------
@@ -79,6 +84,8 @@ class TiledFront:
         The slope of each solution, ascending: it keeps the samples of higher level.
     quality : tuple of Quality
         Measured over all samples; triangles descending, error ascending.
+    moved : tuple of (v,) int array or None, optional
+        The samples of each solution whose vertices were moved, ascending; None where they were not.
     """
 
     grid: HeightGrid
@@ -86,6 +93,11 @@ class TiledFront:
     level: FloatArray
     slope: FloatArray
     quality: tuple[Quality, ...]
+    moved: tuple[IntArray | None, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.moved:
+            object.__setattr__(self, "moved", (None,) * len(self.quality))
 
     def __len__(self) -> int:
         return len(self.quality)
@@ -99,12 +111,11 @@ class TiledFront:
         """Return the numbers of the samples that a solution keeps, ascending."""
         if not 0 <= row < len(self):
             raise ValueError(f"there is no solution {row}; the front has the solutions 0 to {len(self) - 1}")
-        return self.samples[self.level > self.slope[row]]
+        moved = self.moved[row]
+        return self.samples[self.level > self.slope[row]] if moved is None else moved
 
     def slope_of(self, triangles: int) -> float:
-        """Return the least slope whose mesh has at most so many triangles.
-
-        On a rectangle V vertices, B of them on its sides, have 2 V - 2 - B Delaunay triangles.
+        """Return the least slope whose thinned mesh has at most so many triangles.
 
         Raises
         ------
@@ -113,11 +124,8 @@ class TiledFront:
         """
         if triangles < 2:
             raise ValueError(f"a mesh of {self.grid.name} has at least 2 triangles, not {triangles}")
-        rows, columns = self.grid.shape
-        row, column = np.divmod(self.samples, columns)
-        inside = (row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1)
         order = np.argsort(-self.level, kind="stable")
-        count = np.cumsum(1 + inside[order]) - 2
+        count = np.cumsum(_weight(self.grid, self.samples[order])) - 2
         level = self.level[order]
         # all samples of one level go together
         last = np.flatnonzero(np.r_[level[1:] < level[:-1], True])
@@ -136,7 +144,35 @@ class TiledFront:
             self,
             slope=np.insert(self.slope, at, slope),
             quality=(*self.quality[:at], quality, *self.quality[at:]),
+            moved=(*self.moved[:at], None, *self.moved[at:]),
         )
+
+    def with_triangles(self, triangles: int, *, threads: int = 1) -> tuple[TiledFront, int]:
+        """Return the front with a solution of at most so many triangles, and its row.
+
+        Raises
+        ------
+        ValueError
+            If it is less than 2, the least there is.
+        """
+        slope = self.slope_of(triangles)
+        front = self.with_slope(slope, threads=threads)
+        row = front.slope.tolist().index(slope)
+        if front is self or not 2 < triangles <= SEARCHED:
+            return front, row
+        coarse = CoarseGrid(self.grid)
+        samples = np.sort(coarse.samples[move(coarse.task(front.kept(row), triangles))])
+        quality = measure(self.grid, weld(self.grid, samples), n_threads=threads)
+        sizes = [q.triangles for q in self.quality]
+        if quality.error < front.quality[row].error and (
+            (row == 0 or quality.triangles < sizes[row - 1]) and (row == len(sizes) or quality.triangles > sizes[row])
+        ):
+            front = replace(
+                front,
+                quality=(*front.quality[:row], quality, *front.quality[row + 1 :]),
+                moved=(*front.moved[:row], samples, *front.moved[row + 1 :]),
+            )
+        return front, row
 
 
 class Memory:
@@ -178,37 +214,49 @@ class Folder:
     def __init__(self, path: Path, what: dict[str, Any]) -> None:
         self.path = path
         record = path / "what.json"
-        text = json.dumps(what, indent=1, sort_keys=True) + "\n"
-        if record.exists() and record.read_text(encoding="utf-8") != text:
+        text = (json.dumps(what, indent=1, sort_keys=True) + "\n").encode("ascii")
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            found = record.read_bytes() if record.exists() else None
+        except OSError as problem:
+            raise ResultError(f"{path}: cannot be made ({problem.strerror}); name another folder") from None
+        if found not in (None, text):
             raise ResultError(
                 f"{path}: holds unfinished tiles of another model or of other settings; name another folder, or allow "
                 "overwriting (--overwrite) to begin anew"
             )
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-        except OSError as problem:
-            raise ResultError(f"{path}: cannot be made ({problem.strerror}); name another folder") from None
-        if not record.exists():
+        if found is None:
             with new_file(record) as partial:
-                partial.write_text(text, encoding="utf-8")
+                partial.write_bytes(text)
 
     def get(self, name: str) -> dict[str, npt.NDArray[Any]] | None:
         """Return a piece; None if there is none, or it is damaged."""
         try:
             with (self.path / f"{name}.npz").open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-                return {key: file[key] for key in file.files}
+                pieces = {key: file[key] for key in file.files}
+            # an archive can lose an entry and look whole
+            return pieces if sorted(pieces) == pieces.pop("names").tolist() else None
+        except MemoryError:
+            raise
         except Exception:  # absent, cut off or with flipped bits, which the archive's checksums tell: done again
             return None
 
     def put(self, name: str, **arrays: npt.NDArray[Any]) -> None:
         """Keep a piece."""
-        with new_file(self.path / f"{name}.npz") as partial:
-            np.savez(partial, **arrays)  # type: ignore[arg-type]
+        way_out = "what is finished stays there: mend that, and the same call goes on"
+        with new_file(self.path / f"{name}.npz", way_out=way_out) as partial:
+            np.savez(partial, names=np.array(sorted([*arrays, "names"])), **arrays)  # type: ignore[arg-type]
 
     def drop(self, start: str) -> None:
         """Remove the pieces whose names begin like this."""
         for path in self.path.glob(f"{start}*.npz"):
-            path.unlink(missing_ok=True)
+            with suppress(OSError):  # it is in nobody's way
+                path.unlink()
+
+
+def usual_most(grid: HeightGrid) -> int:
+    """Return the triangles of the finest solution where nothing else is asked for."""
+    return max(2, min(int(FINEST * grid.n_triangles), MOST_TRIANGLES))
 
 
 def settings(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> dict[str, Any]:
@@ -226,10 +274,11 @@ def settings(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> 
     return {
         "model": grid.hash,
         "tile": tile,
-        "most": most or max(2, min(int(FINEST * grid.n_triangles), MOST_TRIANGLES)),
+        "most": most or usual_most(grid),
         "slope_step": SLOPE_STEP,
         "enough_samples": ENOUGH_SAMPLES,
-        "format": 1,
+        "searched": [SEARCHED, SAMPLES, MOVES],
+        "format": 2,
     }
 
 
@@ -300,17 +349,37 @@ def tiled_front(
     n_left = len(level) - np.searchsorted(np.sort(level), slopes, side="right")
     slopes = slopes[int(np.argmax(n_left <= max(ABOUT * n_wanted, len(grid.corners)))) :]
     samples, level = samples[level > slopes[0]], level[level > slopes[0]]
-    quality = work.measure(samples, level, slopes, threads)
+    moved = work.move([samples[level > at] for at in slopes])
+    quality = work.measure(
+        [samples[level > at] if new is None else new for at, new in zip(slopes, moved, strict=True)], threads
+    )
     # a solution that is not better than a smaller one is none
-    errors = np.array([q.error for q in quality])
-    best = errors < np.r_[np.minimum.accumulate(errors[::-1])[::-1][1:], np.inf]
+    rows: list[int] = []
+    for row in reversed(range(len(slopes))):
+        if not rows or (
+            quality[row].triangles > quality[rows[-1]].triangles and quality[row].error < quality[rows[-1]].error
+        ):
+            rows.append(row)
+    rows.reverse()
     return TiledFront(
         grid,
         samples,
         level,
-        np.array(slopes)[best],
-        tuple(q for q, is_best in zip(quality, best, strict=True) if is_best),
+        np.array(slopes)[rows],
+        tuple(quality[row] for row in rows),
+        tuple(moved[row] for row in rows),
     )
+
+
+def _weight(grid: HeightGrid, samples: IntArray) -> IntArray:
+    """Return how many triangles each sample is worth: V vertices, B of them on the sides, have 2 V - 2 - B triangles.
+
+    So the sum less 2 is the number of Delaunay triangles of a subset with the corners.
+    """
+    rows, columns = grid.shape
+    row, column = np.divmod(samples, columns)
+    weight: IntArray = 1 + ((row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1))
+    return weight
 
 
 def _above(slope: float, level: FloatArray) -> FloatArray:
@@ -414,7 +483,7 @@ class _Work:
         """Return what a tile's task needs to know."""
         grid, n_columns = self.grid, self.grid.shape[1]
         top, bottom, left, right = box
-        rows, columns = _strided(top, bottom, stride), _strided(left, right, stride)
+        rows, columns = strided(top, bottom, stride), strided(left, right, stride)
         sites = site_xy = site_z = None
         if kept is not None:
             low, high = np.searchsorted(kept, [top * n_columns, (bottom + 1) * n_columns])
@@ -459,9 +528,7 @@ class _Work:
         for k in range(len(boxes)):
             piece = self.store.get(f"{name}_{k}")
             if piece is None:
-                raise ResultError(
-                    f"{self.grid.name}: a finished tile was stored, but is gone or damaged; start the same call again"
-                )
+                raise ResultError(f"{self.grid.name}: {LOST}")
             yield k, piece["removed"], piece["level"]
 
     def start(self, n_vertices: int) -> tuple[IntArray, float]:
@@ -516,21 +583,46 @@ class _Work:
             self.store.put("finish", **stored)
         return stored["removed"], stored["level"]
 
-    def measure(self, samples: IntArray, level: FloatArray, slopes: list[float], threads: int) -> list[Quality]:
-        """Measure the solutions of these slopes over all samples."""
+    def move(self, solutions: list[IntArray]) -> list[IntArray | None]:
+        """Move the vertices of those of the solutions that are small, but for the smallest there is."""
+        small = [
+            k
+            for k, kept in enumerate(solutions)
+            if len(kept) > len(self.grid.corners) and int(_weight(self.grid, kept).sum()) - 2 <= SEARCHED
+        ]
+        moved: list[IntArray | None] = [None] * len(solutions)
+        if not small:
+            return moved
+        coarse = CoarseGrid(self.grid)
+        missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
+        tasks = (
+            coarse.task(solutions[k], int(_weight(self.grid, solutions[k]).sum()) - 2) for k in missing
+        )
+        for place, rows in self.engine.each(_move, tasks):
+            self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
+            self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
+        for k in small:
+            piece = self.store.get(f"moved_{k:04d}")
+            if piece is None:
+                raise ResultError(f"{self.grid.name}: {LOST}")
+            moved[k] = piece["samples"]
+        return moved
+
+    def measure(self, solutions: list[IntArray], threads: int) -> list[Quality]:
+        """Measure solutions over all samples."""
         quality = []
-        for k, slope in enumerate(slopes):
+        for k, kept in enumerate(solutions):
             name = f"quality_{k:04d}"
             stored = self.store.get(name)
             if stored is None:
-                q = measure(self.grid, weld(self.grid, samples[level > slope]), n_threads=threads)
+                q = measure(self.grid, weld(self.grid, kept), n_threads=threads)
                 numbers = (q.error, q.triangles, q.vertices, q.mean_error, q.rms_error, q.max_error, q.uncovered)
                 self.store.put(name, numbers=np.array(numbers, np.float64))
             else:
                 error, triangles, vertices, mean, rms, most, uncovered = stored["numbers"].tolist()
                 q = Quality(error, int(triangles), int(vertices), mean, rms, most, int(uncovered))
             quality.append(q)
-            self.progress(0.8 + 0.2 * (k + 1) / len(slopes), f"solution {k + 1} of {len(slopes)} measured")
+            self.progress(0.8 + 0.2 * (k + 1) / len(solutions), f"solution {k + 1} of {len(solutions)} measured")
         return quality
 
 
@@ -538,10 +630,8 @@ def _thin(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
     return thin_tile(task)
 
 
-def _strided(first: int, last: int, stride: int) -> IntArray:
-    """Every stride-th number from first to last, and the last."""
-    numbers = np.arange(first, last + 1, stride, dtype=np.int64)
-    return numbers if numbers[-1] == last else np.append(numbers, last)
+def _move(task: Coarse, shared: None) -> IntArray:
+    return move(task)
 
 
 def _bins(level: FloatArray) -> IntArray:

@@ -1,4 +1,4 @@
-"""A height grid that is read by windows: a memory map, an array, or a model in memory whose vertices are a grid."""
+"""A height grid read by windows: a memory map, a GeoTIFF, an array, or a model in memory whose vertices are a grid."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.datasets import find_source
-from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.geometry.load import RASTER_SUFFIXES, ModelError, Window, check_window
 from meshsimp_pymoo.geometry.model import OpenModel, build_model
 from meshsimp_pymoo.geometry.predicates import exact_ranges
 
@@ -25,6 +25,20 @@ IntArray = npt.NDArray[np.int64]
 BAND_SAMPLES = 2_000_000
 # The lines of an ESRI ASCII grid that say what it is are the first few hundred bytes.
 HEADER_BYTES = 2000
+
+
+class Heights(Protocol):
+    """An array of two dimensions, or what is read like one: by slices, or by arrays of rows and columns."""
+
+    @property
+    def shape(self) -> Any:
+        """Rows and columns."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of the heights."""
+
+    def __getitem__(self, key: Any) -> Any: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +52,7 @@ class HeightGrid:
     ----------
     name : str
         Where it came from, for messages.
-    heights : (R, C) array or memory map of a real type
+    heights : (R, C) array, memory map or GeoTIFF of a real type
         Row 0 is the northernmost [file units].
     file_x : (C,) float array
         Where the columns are, ascending [file units].
@@ -50,15 +64,24 @@ class HeightGrid:
         Row of each sample in ``model.points``.
     nodata : float, optional
         Height that means "no sample"; a grid that has any cannot be tiled.
+    corner : (int, int)
+        Row and column of the first sample in the file.
+    file_columns : int, optional
+        Columns of the file; None: those of the grid.
+    georeference : dict
+        Where on Earth it is, as far as the file says; see :class:`~meshsimp_pymoo.geometry.load.SourceMesh`.
     """
 
     name: str
-    heights: npt.NDArray[Any]
+    heights: Heights
     file_x: FloatArray
     file_y: FloatArray
     model: OpenModel | None = None
     row_of: IntArray | None = None
     nodata: float | None = None
+    corner: tuple[int, int] = (0, 0)
+    file_columns: int | None = None
+    georeference: dict[str, Any] = field(default_factory=dict, repr=False)
     x: FloatArray = field(init=False, repr=False)
     y: FloatArray = field(init=False, repr=False)
     unit: float = field(init=False, repr=False)
@@ -124,8 +147,14 @@ class HeightGrid:
         ModelError
             If one of them is no number: a grid with gaps cannot be cut into tiles.
         """
-        part = self.heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        values = np.array(part[np.ix_(rows - rows[0], columns - columns[0])], np.float64)
+        left, right = columns[0], columns[-1] + 1
+        values = np.empty((len(rows), len(columns)))
+        # every sixteenth row, say, of a whole file: what lies between is not to be held at once
+        band = (rows - rows[0]) // max(1, BAND_SAMPLES // (right - left))
+        for group in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(band)) + 1):
+            top, bottom = rows[group[0]], rows[group[-1]] + 1
+            part = self.heights[top:bottom, left:right]
+            values[group] = part[np.ix_(rows[group] - top, columns - left)]
         self._check(values, rows, columns)
         return values
 
@@ -156,12 +185,15 @@ class HeightGrid:
         """Return the row of each sample in the file."""
         if self.model is not None and self.row_of is not None:
             return self.model.source_index[self.row_of[samples]]
-        return samples
+        row, column = np.divmod(samples, self.shape[1])
+        found: IntArray = (row + self.corner[0]) * (self.file_columns or self.shape[1]) + column + self.corner[1]
+        return found
 
     def samples_of_rows(self, rows: IntArray) -> IntArray:
         """Return the samples of rows of the file; the inverse of :meth:`source_rows`."""
         if self.model is None or self.row_of is None:
-            return rows
+            row, column = np.divmod(rows, self.file_columns or self.shape[1])
+            return (row - self.corner[0]) * self.shape[1] + column - self.corner[1]
         source = self.model.source_index[self.row_of]
         order = np.argsort(source)
         return order[np.searchsorted(source[order], rows)]
@@ -177,8 +209,9 @@ class HeightGrid:
             row = int(rows[i]) if np.ndim(rows) else rows + int(i)
             column = int(columns[j]) if np.ndim(columns) else columns + int(j)
             raise ModelError(
-                f"{self.name}: has no height at row {row}, column {column}; only a grid without gaps can be cut into "
-                "tiles: fill them, cut them off, or leave the tiles out"
+                f"{self.name}: has no height at row {row + self.corner[0]}, column {column + self.corner[1]}; only a "
+                "grid without gaps can be cut into tiles: fill them, take a part without (--window), or leave the "
+                "tiles out (--tile none)"
             )
 
 
@@ -187,6 +220,7 @@ def open_grid(
     *,
     spacing: float | tuple[float, float] | None = None,
     nodata: float | None = None,
+    window: Window | None = None,
     up: Any = "auto",
 ) -> HeightGrid:
     """Open a height grid for work by tiles.
@@ -194,12 +228,14 @@ def open_grid(
     Parameters
     ----------
     model : path, built-in name, (R, C) array, OpenModel or HeightGrid
-        A ``.npy`` file is mapped into memory and read by windows only; any other file is read whole first. A model's
-        vertices must be all the crossings of rows and columns, and nothing else.
+        A ``.npy`` file is mapped into memory and a GeoTIFF opened, and both are read by windows only; any other file is
+        read whole first. A model's vertices must be all the crossings of rows and columns, and nothing else.
     spacing : float or (dx, dy), optional
-        Distances of the samples; 1 by default [units].
+        Distances of the samples; those of the file, or 1, by default [units].
     nodata : float, optional
         Height that means "no sample"; where there is one, the grid is refused.
+    window : (column, row, columns, rows), optional
+        The part to take; places and rows stay those of the whole file.
     up : optional
         Direction of the height, for meshes; see :func:`~meshsimp_pymoo.geometry.model.load_model`.
 
@@ -213,23 +249,40 @@ def open_grid(
     if isinstance(model, OpenModel):
         return _grid_of_model(model)
     if not isinstance(model, (str, os.PathLike)):
-        return _grid_of_array(np.asanyarray(model), "grid", spacing, nodata)
+        return _grid_of_array(np.asanyarray(model), "grid", spacing, nodata, window)
     path = Path(model)
-    if path.suffix.lower() == ".npy" and path.is_file():
-        if up not in ("auto", "z", "+z"):
-            raise ModelError(f"{path}: heights of a grid are along z; leave up={up!r} out")
-        return _grid_of_array(_map_array(path), str(path), spacing, nodata)
-    return _grid_of_model(build_model(find_source(model, spacing=spacing, nodata=nodata), up=up))
+    by_windows = path.suffix.lower() in (".npy", *RASTER_SUFFIXES) and path.is_file()
+    if by_windows and up not in ("auto", "z", "+z"):
+        raise ModelError(f"{path}: heights of a grid are along z; leave up={up!r} out")
+    if by_windows and path.suffix.lower() == ".npy":
+        return _grid_of_array(_map_array(path), str(path), spacing, nodata, window)
+    if by_windows:
+        return _grid_of_raster(path, spacing, nodata, window)
+    return _grid_of_model(build_model(find_source(model, spacing=spacing, nodata=nodata, window=window), up=up))
 
 
-def count_samples(model: str | os.PathLike[str]) -> int | None:
-    """Return the number of samples of a ``.npy`` or ``.asc`` file from its header alone; None for anything else."""
+def count_samples(model: str | os.PathLike[str], *, window: Window | None = None) -> int | None:
+    """Return the number of samples of a grid file, or of a part of it, from its header alone; None for anything else.
+
+    Parameters
+    ----------
+    model : path
+        A ``.npy``, ``.asc``, ``.tif`` or ``.tiff`` file.
+    window : (column, row, columns, rows), optional
+        The part.
+    """
     path = Path(model)
     suffix = path.suffix.lower()
-    if suffix not in (".npy", ".asc") or not path.is_file():
+    if suffix not in (".npy", ".asc", *RASTER_SUFFIXES) or not path.is_file():
         return None
+    if window is not None:
+        return int(window[2]) * int(window[3])
     if suffix == ".npy":
         return int(_map_array(path).size)
+    if suffix in RASTER_SUFFIXES:
+        from meshsimp_pymoo.geometry.raster import count_raster_samples
+
+        return count_raster_samples(path, str(path))
     with path.open("rb") as file:
         header = file.read(HEADER_BYTES).decode("utf-8", errors="replace").lower()
     sizes = [re.search(rf"^[ \t]*{key}[ \t]+(\d+)", header, re.MULTILINE) for key in ("nrows", "ncols")]
@@ -251,7 +304,11 @@ def _map_array(path: Path) -> npt.NDArray[Any]:
 
 
 def _grid_of_array(
-    heights: npt.NDArray[Any], name: str, spacing: float | tuple[float, float] | None, nodata: float | None
+    heights: npt.NDArray[Any],
+    name: str,
+    spacing: float | tuple[float, float] | None,
+    nodata: float | None,
+    window: Window | None = None,
 ) -> HeightGrid:
     if isinstance(heights, np.ma.MaskedArray):
         if np.ma.getmaskarray(heights).any():
@@ -261,12 +318,48 @@ def _grid_of_array(
         raise ModelError(f"{name}: heights have the type {heights.dtype}; give real numbers")
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise ModelError(f"{name}: heights have the shape {heights.shape}; give a grid of at least 2 x 2")
-    dx, dy = np.broadcast_to(np.asarray(1.0 if spacing is None else spacing, np.float64), 2)
+    dx, dy = _steps(name, spacing) or (1.0, 1.0)
     for label, step in (("dx", dx), ("dy", dy)):
         if not (np.isfinite(step) and step > 0):
             raise ModelError(f"{name}: the spacing {label} is {step}; give a positive number")
-    rows, columns = heights.shape
-    return HeightGrid(name, heights, np.arange(columns) * dx, 0.0 - np.arange(rows) * dy, nodata=nodata)
+    column, row, columns, rows = check_window(window, heights.shape, name)
+    return HeightGrid(
+        name,
+        heights[row : row + rows, column : column + columns],
+        np.arange(column, column + columns, dtype=np.float64) * dx,
+        0.0 - np.arange(row, row + rows, dtype=np.float64) * dy,
+        nodata=nodata,
+        corner=(row, column),
+        file_columns=heights.shape[1],
+    )
+
+
+def _grid_of_raster(
+    path: Path, spacing: float | tuple[float, float] | None, nodata: float | None, window: Window | None
+) -> HeightGrid:
+    from meshsimp_pymoo.geometry.raster import RasterHeights
+
+    heights = RasterHeights(path, str(path), _steps(str(path), spacing), nodata, window)
+    return HeightGrid(
+        str(path),
+        heights,
+        heights.x,
+        heights.y,
+        corner=heights.corner,
+        file_columns=heights.file_columns,
+        georeference=heights.georeference,
+    )
+
+
+def _steps(name: str, spacing: float | tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return the distances of columns and rows."""
+    if spacing is None:
+        return None
+    try:
+        dx, dy = np.broadcast_to(np.asarray(spacing, np.float64), 2).tolist()
+    except ValueError:
+        raise ModelError(f"{name}: the spacing is {spacing!r}; give one number or (dx, dy)") from None
+    return dx, dy
 
 
 def _grid_of_model(model: OpenModel) -> HeightGrid:
@@ -285,4 +378,12 @@ def _grid_of_model(model: OpenModel) -> HeightGrid:
     row_of = np.empty(model.n_vertices, np.int64)
     row_of[number] = np.arange(model.n_vertices)
     heights = model.points[row_of, 2].reshape(len(y), len(x))
-    return HeightGrid(model.name, heights, x * model.unit, y[::-1] * model.unit, model=model, row_of=row_of)
+    return HeightGrid(
+        model.name,
+        heights,
+        x * model.unit,
+        y[::-1] * model.unit,
+        model=model,
+        row_of=row_of,
+        georeference=model.georeference,
+    )

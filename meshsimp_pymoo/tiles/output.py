@@ -4,21 +4,26 @@
 
     OUT/front.csv       as every front: one row per solution, sorted by triangles
     OUT/nested.npz      rows (V,): rows of the file that the finest solution keeps; level (V,): the slope at which
-                        each goes; slope (S,): solution s keeps the rows of higher level; no pickles
+                        each goes; slope (S,): solution s keeps the rows of higher level, unless its vertices were
+                        moved: moved_start (S + 1,): then it keeps moved[moved_start[s]:moved_start[s + 1]]; no pickles
     OUT/meshes/         007_412.ply is solution 7, of 412 triangles
     OUT/chosen.ply      the solution that was asked for, if one was; with pieces, a folder of that name
-    OUT/run.json        settings, package versions, seconds, hash of the grid
+    OUT/front.png       the front
+    OUT/run.json        settings, package versions, seconds, hash of the grid, where on Earth it is
     OUT/tiles/          while the work is going on: finished tiles, which the same call finds again
 
-The finished folder is put in place as a whole; see `meshsimp_pymoo.results`.
+The finished folder is put in place as a whole; see `meshsimp_pymoo.results`. A process that is killed at any moment
+leaves the tiles or the finished folder, and beside them what :func:`restore` and :func:`clear_up` know.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -35,19 +40,27 @@ from meshsimp_pymoo.results import (
     _path_from,
     _put_in_place,
     _read_csv,
+    _short,
+    _single_precision_shift,
     _spelled,
+    _warn_of_shift,
     _write_csv,
     _write_npz,
     even_selection,
+    local_origin,
+    mesh_suffix,
     new_file,
     package_versions,
+    refuse_format,
     write_mesh,
 )
+from meshsimp_pymoo.runs import locked
 from meshsimp_pymoo.tiles.front import TiledFront
 from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.weld import WeldedMesh, pieces, weld
 
 NESTED_FILE = "nested.npz"
+WORK = "tiles"
 
 
 def write_tiled_front(
@@ -59,6 +72,7 @@ def write_tiled_front(
     chosen: int | None = None,
     piece_size: int | None = None,
     run: Mapping[str, Any] | None = None,
+    extra: Callable[[Path], None] | None = None,
 ) -> Path:
     """Write a tiled front in place of the folder's unfinished tiles, all or nothing.
 
@@ -73,11 +87,13 @@ def write_tiled_front(
     mesh_format : str
         One of `meshsimp_pymoo.results.MESH_FORMATS`.
     chosen : int, optional
-        Solution of ``front`` to write as ``chosen.<mesh_format>`` too.
+        Solution of ``front`` to write as ``chosen`` too.
     piece_size : int, optional
-        Write the chosen mesh in pieces of about so many samples a side, as ``chosen/ROW_COLUMN.<mesh_format>``.
+        Write the chosen mesh in pieces of about so many samples a side, as ``chosen/ROW_COLUMN`` and the suffix.
     run : mapping, optional
         What to record in run.json beside versions and grid.
+    extra : callable, optional
+        Called with the unfinished folder before it is put in place, to add files to it (a figure, say).
 
     Raises
     ------
@@ -87,10 +103,14 @@ def write_tiled_front(
     if mesh_format not in MESH_FORMATS:
         raise ValueError(f"mesh_format is {mesh_format!r}; it must be one of {', '.join(MESH_FORMATS)}")
     grid, count = front.grid, len(front)
+    if grid.model is not None:
+        refuse_format(grid.model, mesh_format)
+    suffix, look = mesh_suffix(mesh_format), _frame(front, mesh_format)
     target = Path(folder).resolve()
-    target.parent.mkdir(parents=True, exist_ok=True)
-    partial = _partial_folder(target)
+    partial = None
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        partial = _partial_folder(target)
         with_mesh = set(even_selection(count, meshes))
         if with_mesh:
             (partial / "meshes").mkdir()
@@ -103,15 +123,23 @@ def write_tiled_front(
             if solution in with_mesh or row == chosen:
                 mesh = weld(grid, front.kept(row))
                 if solution in with_mesh:
-                    path = f"meshes/{solution:0{digits}}_{quality.triangles}.{mesh_format}"
-                    _write(partial / path, grid, mesh.samples, mesh.faces)
+                    path = f"meshes/{solution:0{digits}}_{quality.triangles}.{suffix}"
+                    _write(partial / path, grid, mesh.samples, mesh.faces, look)
                 if row == chosen:
-                    _write_chosen(partial, grid, mesh, mesh_format, piece_size)
+                    _write_chosen(partial, grid, mesh, suffix, piece_size, look)
             numbers = [_spelled(column, getattr(quality, column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path])
+        if with_mesh or chosen is not None:
+            _warn(front, mesh_format)
         _write_csv(partial / "front.csv", FRONT_COLUMNS, rows)
+        moved = [np.empty(0, np.int64) if new is None else grid.source_rows(new) for new in front.moved[::-1]]
         _write_npz(
-            partial / NESTED_FILE, rows=grid.source_rows(front.samples), level=front.level, slope=front.slope[::-1]
+            partial / NESTED_FILE,
+            rows=grid.source_rows(front.samples),
+            level=front.level,
+            slope=front.slope[::-1],
+            moved=np.concatenate(moved),
+            moved_start=np.cumsum([0, *map(len, moved)]),
         )
         record = dict(run or {}) | {
             "model": {
@@ -122,40 +150,102 @@ def write_tiled_front(
                 "triangles": grid.n_triangles,
                 "rows": grid.shape[0],
                 "columns": grid.shape[1],
+                **({"georeference": grid.georeference} if grid.georeference else {}),
             },
+            **({"mesh_origin": look["origin"].tolist()} if look["origin"].any() else {}),
             "solutions": count,
             "chosen": None if chosen is None else count - 1 - chosen,
             "versions": package_versions(),
         }
         text = json.dumps(record, indent=2, allow_nan=False)
         (partial / "run.json").write_text(text + "\n", encoding="utf-8")
+        if extra is not None:
+            extra(partial)
         _put_in_place(partial, target, Path(folder), overwrite=True)
+    except OSError as problem:
+        _remove(partial)
+        raise ResultError(
+            f"{folder}: cannot be written ({_short(problem)}); what is finished stays there: mend that, and the same "
+            "call goes on"
+        ) from None
     except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
+        _remove(partial)
         raise
     return Path(folder)
 
 
+def restore(folder: Path) -> None:
+    """Put a folder back whose process was killed while it was putting the finished one in its place."""
+    target = folder.resolve()
+    for old in _left_beside(target, "old"):
+        if not (old / WORK).is_dir():
+            continue
+        with suppress(ResultError, OSError), locked(old):  # another process may be at it right now
+            if target.exists():
+                shutil.rmtree(old)
+            else:
+                old.rename(target)
+
+
+def clear_up(folder: Path) -> None:
+    """Remove unfinished folders of processes that were killed; the caller holds the folder for itself."""
+    for partial in _left_beside(folder.resolve(), "partial"):
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def _left_beside(target: Path, suffix: str) -> list[Path]:
+    own = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.{suffix}")
+    if not target.parent.is_dir():
+        return []
+    return sorted(path for path in target.parent.iterdir() if own.fullmatch(path.name) and path.is_dir())
+
+
+def _remove(partial: Path | None) -> None:
+    if partial is not None:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def _frame(front: TiledFront, mesh_format: str) -> dict[str, Any]:
+    """Return what `write_mesh` is to know of a grid's frame; all meshes of a front have one origin."""
+    grid = front.grid
+    origin = local_origin(grid.file_points(front.samples)) if mesh_format == "glb" else np.zeros(3)
+    return {"origin": origin, "georeference": grid.georeference, "name": Path(grid.name).stem}
+
+
+def _warn(front: TiledFront, mesh_format: str) -> None:
+    if mesh_format != "stl":
+        return
+    points = front.grid.file_points(front.samples)
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    _warn_of_shift(front.grid.name, diagonal, mesh_format, _single_precision_shift(points))
+
+
 def _write_chosen(
-    folder: Path, grid: HeightGrid, mesh: WeldedMesh, mesh_format: str, piece_size: int | None
+    folder: Path, grid: HeightGrid, mesh: WeldedMesh, suffix: str, piece_size: int | None, look: dict[str, Any]
 ) -> None:
     if piece_size is None:
-        _write(folder / f"chosen.{mesh_format}", grid, mesh.samples, mesh.faces)
+        _write(folder / f"chosen.{suffix}", grid, mesh.samples, mesh.faces, look)
         return
     (folder / "chosen").mkdir()
     for row, column, samples, faces in pieces(grid, mesh, piece_size):
-        _write(folder / "chosen" / f"{row:03}_{column:03}.{mesh_format}", grid, samples, faces)
+        _write(folder / "chosen" / f"{row:03}_{column:03}.{suffix}", grid, samples, faces, look)
 
 
 def write_welded(path: Path, front: TiledFront, row: int) -> None:
     """Write the mesh of a solution in the format of the path's suffix, all or nothing."""
+    mesh_format = path.suffix.lower().lstrip(".")
+    if front.grid.model is not None:
+        refuse_format(front.grid.model, mesh_format)
     mesh = weld(front.grid, front.kept(row))
+    _warn(front, mesh_format)
     with new_file(path) as unfinished:
-        _write(unfinished, front.grid, mesh.samples, mesh.faces)
+        _write(unfinished, front.grid, mesh.samples, mesh.faces, _frame(front, mesh_format))
 
 
-def _write(path: Path, grid: HeightGrid, samples: npt.NDArray[np.int64], faces: npt.NDArray[np.int64]) -> None:
-    write_mesh(path, grid.file_points(samples), faces, grid.attributes_at(samples))
+def _write(
+    path: Path, grid: HeightGrid, samples: npt.NDArray[np.int64], faces: npt.NDArray[np.int64], look: dict[str, Any]
+) -> None:
+    write_mesh(path, grid.file_points(samples), faces, grid.attributes_at(samples), **look)
 
 
 def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledFront:
@@ -184,16 +274,19 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             rows, level, slope = file["rows"], file["level"], file["slope"]
+            moved, start = file["moved"], file["moved_start"]
     except Exception as problem:  # absent, cut off or with flipped bits
         reason = str(problem).splitlines()[0] if str(problem) else type(problem).__name__
         raise ResultError(f"{path}: cannot be read ({reason}); simplify again") from None
-    if rows.shape != level.shape or len(slope) != len(columns["error"]) or rows.dtype.kind != "i":
+    fits = rows.shape == level.shape and len(slope) == len(columns["error"]) == len(start) - 1
+    if not fits or {rows.dtype.kind, moved.dtype.kind, start.dtype.kind} != {"i"} or start[-1] != len(moved):
         raise ResultError(f"{path}: does not belong to front.csv; simplify again")
     names = list(asdict(Quality(0.0, 0, 0, 0.0, 0.0, 0.0, 0)))
     table = zip(*(columns[name].tolist() for name in names), strict=True)
     quality = tuple(Quality(**dict(zip(names, row, strict=True))) for row in table)
     samples: npt.NDArray[np.int64] = grid.samples_of_rows(rows)
-    return TiledFront(grid, samples, level, slope[::-1].copy(), quality[::-1])
+    found = [grid.samples_of_rows(part) if len(part) else None for part in np.split(moved, start[1:-1])]
+    return TiledFront(grid, samples, level, slope[::-1].copy(), quality[::-1], tuple(found[::-1]))
 
 
 def is_tiled(folder: str | os.PathLike[str]) -> bool:
@@ -207,7 +300,9 @@ def stored_model(folder: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     file = record["model"].get("file")
     settings = record.get("settings", {})
     name = record["model"]["name"] if file is None else str((Path(folder) / file).resolve())
-    return name, {"up": settings.get("up", "auto")} | {key: settings.get(key) for key in ("spacing", "nodata")}
+    return name, {"up": settings.get("up", "auto")} | {
+        key: settings.get(key) for key in ("spacing", "nodata", "window")
+    }
 
 
 def _read_record(folder: Path) -> dict[str, Any]:

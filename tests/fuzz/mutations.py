@@ -215,9 +215,11 @@ def good_front() -> tuple[tuple[str, bytes], ...]:
             [s.quality for s in found],
             kept,
             faces=lambda row: found[row].faces,
+            series={"another": [[2.5, 2], [1.0, 7]]},
             run={"settings": {"up": "auto"}, "seed": 1},
         )
-        return tuple((name, (folder / name).read_bytes()) for name in ("front.csv", "front.npz", "run.json"))
+        names = ("front.csv", "front.npz", "run.json", "series.csv")
+        return tuple((name, (folder / name).read_bytes()) for name in names)
 
 
 def file_case(rng: np.random.Generator) -> tuple[str, bytes]:

@@ -8,6 +8,7 @@ import pytest
 from delaunay import faces_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from samples import holey_grid, subset
 
 from meshsimp_pymoo.datasets import load, names
 from meshsimp_pymoo.geometry.error import (
@@ -28,21 +29,6 @@ from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, SourceMesh, g
 from meshsimp_pymoo.geometry.model import build_model, load_model
 
 RULES = [(f, o) for f in FOOTPRINTS for o in OUTSIDES]
-
-
-def subset(model, share, seed=0):
-    kept = np.random.default_rng(seed).random(model.n_vertices) < share
-    kept[model.corners] = True
-    return kept
-
-
-def holey_grid():
-    """A height grid with a bay and a hole: lattice ties, borders on every side."""
-    rng = np.random.default_rng(4)
-    elevation = rng.integers(0, 50, (9, 11)).astype(float)
-    elevation[3:6, 4:7] = np.nan
-    elevation[:4, 8:] = np.nan
-    return grid_source(elevation, 2.0, 3.0, name="holey")
 
 
 MODELS = {

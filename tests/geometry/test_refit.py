@@ -7,6 +7,7 @@ import importlib.util
 import numpy as np
 import pytest
 import trimesh
+from samples import holey_grid, subset
 from scipy import sparse
 from scipy.optimize import linprog
 
@@ -17,18 +18,9 @@ from meshsimp_pymoo.geometry.load import SourceMesh, grid_source
 from meshsimp_pymoo.geometry.model import build_model, load_model
 from meshsimp_pymoo.geometry.refit import TOLERANCE, least_error, refit_heights
 
-
-def holey():
-    rng = np.random.default_rng(4)
-    elevation = rng.integers(0, 50, (9, 11)).astype(float)
-    elevation[3:6, 4:7] = np.nan
-    elevation[:4, 8:] = np.nan
-    return grid_source(elevation, 2.0, 3.0, name="holey")
-
-
 MODELS = {
     "terrain": lambda: load("jacksboro:20"),
-    "holey": holey,
+    "holey": holey_grid,
     "face": lambda: load("face:300"),
     "horseshoe": lambda: load("horseshoe:200"),
 }
@@ -37,12 +29,6 @@ MODELS = {
 @pytest.fixture(scope="module", params=MODELS)
 def model(request):
     return load_model(MODELS[request.param](), up="z")
-
-
-def subset(model, share, seed=0):
-    kept = np.random.default_rng(seed).random(model.n_vertices) < share
-    kept[model.corners] = True
-    return kept
 
 
 def by_linear_programme(model, kept, weights=None):

@@ -69,6 +69,19 @@ def test_fronts_are_drawn_and_methods_can_be_left_out(visit):
     assert chart.locator(".axes").inner_html() != ticks
 
 
+def test_on_paper_all_fronts_are_drawn(browser, page, tmp_path):
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    visit = Visit(browser, path, viewport={"width": 500, "height": 200})
+    waiting = visit.page.locator("[id^=chart-]:not([data-drawn])")
+    assert waiting.count() > 0
+    visit.page.pdf()
+    assert waiting.count() == 0
+    assert visit.page.locator("[id^=chart-] path.series").count() > 0
+    visit.check()
+    visit.close()
+
+
 def test_pictures_are_embedded_no_wider_than_can_be_shown(visit):
     widths = visit.page.evaluate("[...document.images].map((image) => [image.src.slice(0, 23), image.naturalWidth])")
     assert widths == [["data:image/webp;base64,", 1600]] * 2

@@ -268,15 +268,33 @@ def test_the_front_stands_beside_the_original_and_its_meshes(tmp_path, name):
     assert [("knee" in panel.get_title()) for panel in panels] == [False, False, True, False]
 
 
+def test_the_panels_show_sizes_that_differ_though_most_solutions_are_large():
+    sizes = np.unique(np.round(2000 - np.geomspace(1, 1999, 300)).astype(int))  # crowded below 2000
+    small, middle, large = sizes[panel_rows(sizes)]
+    assert small < 100
+    assert middle < large / 2
+
+
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 102])
 def test_the_knee_and_the_chosen_mesh_are_always_among_the_panels(count):
+    sizes = np.geomspace(2, 900, count)
     for knee in {0, count // 2, count - 1}:
         for chosen in {0, count // 3, count - 1}:
-            rows = panel_rows(count, chosen, knee)
+            rows = panel_rows(sizes, chosen, knee)
             assert {knee, chosen} <= set(rows)
             assert rows == sorted(set(rows))
             assert len(rows) == min(3, count)
             assert 0 <= rows[0] <= rows[-1] < count
+
+
+def test_other_fronts_are_drawn_behind_in_the_same_units(ax):
+    plot_front([[40.0, 2], [10.0, 9]], ax, n_points=10, series={"start": [[20.0, 9], [50.0, 2]]})
+    behind, own = ax.get_lines()[:2]
+    assert behind.get_label() == "start"
+    assert behind.get_xydata().tolist() == [[2.0, 5.0], [9.0, 2.0]]
+    assert own.get_xydata().tolist() == [[2.0, 4.0], [9.0, 1.0]]
+    assert ax.get_ylim()[1] > 5
+    assert "start" in [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def test_missing_meshes_leave_empty_panels(roof):

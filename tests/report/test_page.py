@@ -159,6 +159,31 @@ def test_arrow_keys_pick_a_solution(visit, front):
     assert shown(visit.page) == 0
 
 
+def test_a_mesh_that_is_slow_to_unpack_does_not_replace_one_picked_later(visit, front):
+    visit.page.evaluate(
+        """() => {
+          const unpack = unpackFaces;
+          window.waiting = [];
+          unpackFaces = (packed) => {
+            const slow = packed === data.solutions[5].faces;
+            return slow ? new Promise((go) => waiting.push(go)).then(() => unpack(packed)) : unpack(packed);
+          };
+        }"""
+    )
+    visit.page.locator("#slider").fill("5")
+    visit.page.locator("#slider").fill("9")
+    visit.page.wait_for_selector("html[data-shown='9']")
+    assert visit.page.evaluate("waiting.length") == 1
+    later = pixels(visit.page, "simplified")
+    visit.page.evaluate("waiting[0]()")
+    visit.page.wait_for_timeout(300)
+    assert shown(visit.page) == 9
+    assert visit.page.evaluate("state.mesh.row") == 9
+    assert unlike(later, pixels(visit.page, "simplified")) == 0
+    visit.page.locator("#slider").fill("4")  # and the page goes on working
+    assert shown(visit.page) == 4
+
+
 def test_a_search_by_triangles_finds_the_most_accurate(visit, front):
     for limit in (front[7].triangles - 1, front[7].triangles):
         visit.page.fill("#most-triangles", str(limit))
@@ -403,12 +428,12 @@ EVIL = "</script><img src=http://127.0.0.1:9/x onerror=alert(1)><script>window.h
 
 
 def test_names_cannot_run_anything_or_call_anyone(browser, folder, front, tmp_path):
-    stored = replace(read_front(folder), meshes=(EVIL,) * len(front))
+    stored = replace(read_front(folder), meshes=(EVIL,) * len(front), series={EVIL: front.F})
     stored.run["model"]["name"] = f"{EVIL}.ply"
     stored.run["settings"] = {"patch": EVIL}
     path = tmp_path / "report.html"
     path.write_text(
-        simplification_page(stored, front.problem, folder=f"; rm -rf {EVIL}", knee=3, series={EVIL: front.F}),
+        simplification_page(stored, front.problem, folder=f"; rm -rf {EVIL}", knee=3),
         encoding="utf-8",
     )
     visit = Visit(browser, path)

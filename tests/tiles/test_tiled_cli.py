@@ -38,7 +38,9 @@ def out(path, tmp_path_factory):
 
 
 def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
-    assert {entry.name for entry in out.iterdir()} == {"front.csv", "nested.npz", "meshes", "chosen.ply", "run.json"}
+    expected = {"front.csv", "front.png", "nested.npz", "meshes", "chosen.ply", "run.json"}
+    assert {entry.name for entry in out.iterdir()} == expected
+    assert (out / "front.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((out / "meshes").iterdir())) == 4
     chosen = read_source(out / "chosen.ply")
     assert 690 <= len(chosen.faces) <= 700
@@ -114,6 +116,9 @@ def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
         (["--time", "5s"], "--time does not go with tiles"),
         (["--algorithm", "nsga2_v1"], "--algorithm does not go with tiles"),
         (["--pin", "hull"], "--pin does not go with tiles"),
+        (["--measure", "rms"], "--measure does not go with tiles"),
+        (["--window", "0,0,5000,10"], "does not lie within"),
+        (["--format", "landxml", "--up", "x"], "heights of a grid are along z"),
         (["--triangles", "1"], "at least 2 triangles"),
         (["--dask", "tcp://127.0.0.1:9"], "no Dask scheduler answers"),
     ],

@@ -7,6 +7,9 @@ const shortNumber = d3.format(".4~g");
 
 // Values below this share of the largest are drawn as 0: rounding would stretch the axis.
 const ROUNDING = 1e-6;
+// Of so many points the marks would hide each other: they are drawn smaller, those of a series not at all.
+const MANY = 150;
+const MANY_BESIDE = 40;
 
 // 12,300 and 0.0123, but 1.2e+7
 function readable(value) {
@@ -106,7 +109,8 @@ class FrontChart {
     }
     for (const one of this.special) entry({ d: mark(one.mark, 6), class: `special ${one.mark}` }, one.name);
     for (const one of this.series) {
-      entry(one.line === "thick" ? { d: "M-8,0H8", class: "thick" } : this.look(one, mark(one.mark, 4)), one.name, one);
+      const line = { ...this.look(one, "M-8,0H8"), class: `series ${one.line}` };
+      entry(one.line === "thick" || !one.mark ? line : this.look(one, mark(one.mark, 4)), one.name, one);
     }
     if (list.childElementCount > 1) this.host.append(list);
   }
@@ -130,7 +134,7 @@ class FrontChart {
     const low = least / 10 ** (0.04 * reach + 0.02);
     const gap = zeros ? 18 * Math.sign(to - from) : 0;
     const scale = d3.scaleLog([low, top * 10 ** (0.04 * reach + 0.02)], [from + gap, to]);
-    const all = scale.ticks().filter((value) => value >= low);
+    const all = scale.ticks().filter((value) => value >= low && value > ROUNDING * top);
     const lead = (value) => Math.round(value / 10 ** Math.floor(Math.log10(value) + 1e-9));
     const kept = reach > 3.2 ? [1] : reach > 1.2 ? [1, 2, 5] : reach > 0.5 ? [1, 2, 3, 4, 5, 7] : [1, 2, 3, 4, 5, 6, 7, 8, 9];
     let ticks = all.filter((value) => kept.includes(lead(value)));
@@ -188,8 +192,9 @@ class FrontChart {
     if (!this.front) return;
     svgPart(svg, "path", { d: steps(this.front), class: "front-line" });
     this.places = Array.from(this.front.x, (value, k) => [x.at(value), y.at(this.front.y[k])]);
+    const r = this.places.length > MANY ? 2.4 : 3.5;
     this.places.forEach(([px, py], k) => {
-      svgPart(svg, "circle", { cx: px, cy: py, r: 3.5, class: this.front.hollow[k] ? "front-dot hollow" : "front-dot" });
+      svgPart(svg, "circle", { cx: px, cy: py, r, class: this.front.hollow[k] ? "front-dot hollow" : "front-dot" });
     });
     for (const { row, mark } of this.special) {
       const [px, py] = this.places[row];

@@ -32,7 +32,7 @@ const state = { row: null, mesh: null, viewer: null, geometry: null };
 const chart = new FrontChart(part("chart"), {
   name: "The front: error against triangles. Each point is a simplified mesh.",
   front: { x: columns.triangles, y: columns[data.measure], hollow: data.solutions.map((solution) => !solution) },
-  series: data.series.map((one) => ({ ...one, faint: true, line: "thin", mark: "circle" })),
+  series: data.series.map((one) => ({ ...one, faint: true, line: "thin", mark: one.x.length > MANY_BESIDE ? null : "circle" })),
   special: [
     { row: data.knee, mark: "diamond", name: "knee: the best compromise" },
     ...(data.chosen === null ? [] : [{ row: data.chosen, mark: "star", name: "chosen when the front was made" }]),
@@ -146,7 +146,7 @@ part("by-triangles").addEventListener("submit", (event) => {
   const most = part("most-triangles").valueAsNumber;
   let best = null;
   columns.triangles.forEach((triangles, row) => {
-    if (triangles <= most && (best === null || columns.error[row] < columns.error[best])) best = row;
+    if (triangles <= most && (best === null || columns[data.measure][row] < columns[data.measure][best])) best = row;
   });
   answer(best, `at most ${plainNumber(most)} triangles; the smallest has ${plainNumber(Math.min(...columns.triangles))}`);
 });

@@ -1,0 +1,452 @@
+"""The bad days of a tiled simplification: whatever breaks, finished tiles stay and the same command ends the same.
+
+==============================================  ====================================================================
+what happens                                    what comes of it
+==============================================  ====================================================================
+a worker is killed in the middle of a tile      another one does the tile; the same bytes
+the process is killed, at ten random moments    the same command goes on and ends with the same bytes
+... while the finished folder is put in place   the next call puts it right; no tile is done again
+the disk is full or read-only                   one line, exit code 2; what is finished stays, the same call goes on
+the output folder is gone, or is another        one line, exit code 2; what is there instead is not touched
+a stored tile is cut off or has a flipped bit   that tile is done again; the same bytes
+the record beside the tiles is damaged          one line, exit code 2; --overwrite begins anew
+the memory is too small                         one line, exit code 2, with the tile that fits, before any work
+==============================================  ====================================================================
+"""
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.engines import Processes
+from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.geometry.model import build_model
+from meshsimp_pymoo.tiles import memory
+from meshsimp_pymoo.tiles.front import Folder, settings, tiled_front
+from meshsimp_pymoo.tiles.grid import open_grid
+from meshsimp_pymoo.tiles.thin import thin_tile
+
+# What depends on nothing but the model and the settings: all files but run.json, which has the seconds.
+SAME = ("front.csv", "nested.npz", "chosen.ply", "front.png")
+
+
+HEIGHTS = open_grid(build_model(load("jacksboro:2"))).heights[:34, :200].astype(np.float32)  # three tiles
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("grid") / "relief.npy"
+    np.save(path, HEIGHTS)
+    return path
+
+
+def command(path, out):
+    call = ["simplify", str(path), "-o", str(out), "--tile", "64", "--triangles", "300", "--meshes", "3"]
+    return [*call, "--jobs", "1", "--threads", "1", "--quiet"]
+
+
+@pytest.fixture(scope="module")
+def whole(path, tmp_path_factory):
+    """Return the bytes of a run that nothing happened to."""
+    out = tmp_path_factory.mktemp("whole") / "out"
+    assert main(command(path, out)) == 0
+    return contents(out)
+
+
+def contents(out):
+    files = {str(file.relative_to(out)): file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    assert set(SAME) < set(files)
+    files.pop("run.json")
+    return files
+
+
+def refused(capsys, *words):
+    """Check that one line was said, without a traceback."""
+    said = capsys.readouterr().err
+    assert said.startswith("meshsimp: ")
+    assert said.count("\n") == 1
+    for word in words:
+        assert word in said
+
+
+def pieces(out):
+    return {file.name: file.read_bytes() for file in (out / "tiles").glob("*.npz")}
+
+
+def at_call(number, action):
+    """Return a stand-in for thin_tile that lets something happen before a tile."""
+    calls = []
+
+    def thin(tile):
+        calls.append(tile.name)
+        if len(calls) == number:
+            action()
+        return thin_tile(tile)
+
+    return thin
+
+
+# ---------------------------------------------------------------------------------------------------- what is killed
+
+
+def test_a_worker_killed_in_the_middle_of_a_tile_changes_no_byte():
+    grid = open_grid(HEIGHTS)
+    expected = tiled_front(grid, tile=64)
+    killed = []
+    with Processes(2) as engine:
+
+        def kill(share, what):
+            if what.startswith("tile 2 of") and not killed:
+                killed.append(next(iter(engine._pool._processes)))
+                os.kill(killed[-1], signal.SIGKILL)
+
+        found = tiled_front(grid, tile=64, engine=engine, progress=kill)
+    assert killed
+    assert found.quality == expected.quality
+    assert np.array_equal(found.samples, expected.samples)
+    assert np.array_equal(found.level, expected.level)
+
+
+KILLER = """
+import os, random, shutil, signal, sys, time
+from pathlib import Path
+import matplotlib.backends.backend_agg, matplotlib.figure  # all that a call imports, before it is forked
+import meshsimp_pymoo.cli.simplify, meshsimp_pymoo.report.figures
+from meshsimp_pymoo.cli import main
+
+folder, seed, moments, call = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:]
+
+def start(out):
+    pid = os.fork()
+    if pid == 0:
+        os._exit(main([word.replace("OUT", str(out)) for word in call]))
+    return pid
+
+def seconds():
+    begin = time.perf_counter()
+    assert os.waitpid(start(folder / "warm" / "out"), 0)[1] == 0
+    shutil.rmtree(folder / "warm")
+    return time.perf_counter() - begin
+
+rng = random.Random(seed)
+length = min(seconds(), seconds())
+number, killed = 0, 0
+while killed < moments:
+    out = folder / str(number) / "out"
+    pid = start(out)
+    time.sleep(rng.random() * length)
+    os.kill(pid, signal.SIGKILL)
+    killed += os.WIFSIGNALED(os.waitpid(pid, 0)[1])
+    finished = (out / "front.csv").exists()
+    print(number, "killed", len(list((out / "tiles").glob("*.npz"))))
+    if finished or killed == moments:
+        # a finished folder is not made anew, but cleared up beside
+        print(number, "ended", os.waitstatus_to_exitcode(os.waitpid(start(out), 0)[1]) - 2 * finished)
+        number += 1
+"""
+
+
+def test_killed_at_ten_random_moments_the_same_command_ends_with_the_same_bytes(path, whole, tmp_path):
+    call = [sys.executable, "-c", KILLER, str(tmp_path), "1", "10", *command(path, "OUT")]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    said = [line.split() for line in done.stdout.splitlines()]
+    assert len([line for line in said if line[1] == "killed"]) >= 10
+    assert sum(int(line[2]) > 0 for line in said if line[1] == "killed") >= 3
+    ends = [line for line in said if line[1] == "ended"]
+    assert len(ends) >= 1
+    for number, _, code in ends:
+        assert int(code) == 0
+        assert contents(tmp_path / number / "out") == whole
+        assert [entry.name for entry in (tmp_path / number).iterdir()] == ["out"]
+
+
+def test_killed_between_taking_the_old_folder_away_and_putting_the_new_one_there_nothing_is_lost(
+    path, whole, tmp_path, monkeypatch
+):
+    out = tmp_path / "out"
+    rename = Path.rename
+
+    def killed(self, target):
+        if self.suffix == ".partial":
+            raise KeyboardInterrupt  # as far as the folders go: the renaming back is not done either
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", killed)
+    monkeypatch.setattr("meshsimp_pymoo.tiles.output._remove", lambda partial: None)
+    assert main(command(path, out)) == 130
+    monkeypatch.undo()
+    left = sorted(entry.suffix for entry in tmp_path.iterdir())
+    assert left == [".old", ".partial"]
+    calls = []
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", calls.append)
+    assert main(command(path, out)) == 0
+    assert not calls
+    assert contents(out) == whole
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+# ------------------------------------------------------------------------------------------- what cannot be written
+
+
+@pytest.mark.parametrize("number", [1, 4, 9])
+@pytest.mark.parametrize("kind", [errno.ENOSPC, errno.EROFS])
+def test_a_disk_that_is_full_or_read_only_is_named_and_what_was_finished_stays(
+    path, whole, tmp_path, capsys, monkeypatch, number, kind
+):
+    out, savez, calls = tmp_path / "out", np.savez, []
+
+    def full(file, **arrays):
+        calls.append(file)
+        if len(calls) >= number:
+            Path(file).write_bytes(b"half of it")
+            raise OSError(kind, os.strerror(kind))
+        savez(file, **arrays)
+
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.np.savez", full)
+    assert main(command(path, out)) == 2
+    refused(capsys, str(out), os.strerror(kind))
+    monkeypatch.undo()
+    if number == 1:
+        assert not out.exists()
+    else:
+        assert len(pieces(out)) >= 1
+        assert not list((out / "tiles").glob(".*"))
+    assert main(command(path, out)) == 0
+    assert contents(out) == whole
+
+
+@pytest.mark.parametrize("name", ["write_mesh", "_write_csv", "_write_npz", "_put_in_place"])
+def test_a_disk_that_is_full_when_the_result_is_written_leaves_all_tiles(
+    path, whole, tmp_path, capsys, monkeypatch, name
+):
+    out = tmp_path / "out"
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(f"meshsimp_pymoo.tiles.output.{name}", full)
+    assert main(command(path, out)) == 2
+    refused(capsys, str(out), "No space left on device", "the same call goes on")
+    monkeypatch.undo()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+    before = pieces(out)
+    assert "finish.npz" in before
+    calls = []
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", calls.append)
+    assert main(command(path, out)) == 0
+    assert not calls
+    assert contents(out) == whole
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """Return a folder on a file system of its own, and what changes its size."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def mounted(options):
+        call = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)]
+        return shutil.which("mount") is not None and subprocess.run(call, capture_output=True).returncode == 0
+
+    if not mounted("size=64k"):
+        pytest.skip("a small file system needs the right to mount one")
+    yield folder, lambda kilobytes: mounted(f"remount,size={kilobytes}k")
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_on_a_small_disk_each_call_gets_as_far_as_there_is_room(path, whole, small_disk, capsys):
+    folder, resize = small_disk
+    out, finished = folder / "out", []
+    for kilobytes in (32, 64, 128, 256, 512):
+        assert resize(kilobytes)
+        code = main(command(path, out))
+        if code == 0:
+            break
+        refused(capsys, "No space left on device")
+        finished.append(pieces(out))
+    assert code == 0
+    assert len(finished) >= 2
+    assert finished[-1]
+    assert contents(out) == whole
+
+
+# ------------------------------------------------------------------------------------------ what somebody else does
+
+
+@pytest.mark.parametrize("instead", ["nothing", "a file", "a folder", "a link"])
+def test_an_output_folder_that_goes_away_meanwhile_is_named_and_what_is_there_instead_stays(
+    path, whole, tmp_path, capsys, monkeypatch, instead
+):
+    out, aside = tmp_path / "out", tmp_path / "aside"
+
+    def replace():
+        out.rename(aside)
+        if instead == "a file":
+            out.write_text("mine")
+        elif instead == "a folder":
+            out.mkdir()
+            (out / "mine.txt").write_text("mine")
+        elif instead == "a link":
+            (tmp_path / "mine").mkdir()
+            (tmp_path / "mine" / "mine.txt").write_text("mine")
+            out.symlink_to(tmp_path / "mine")
+
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", at_call(5, replace))
+    assert main(command(path, out)) == 2
+    refused(capsys, str(out))
+    monkeypatch.undo()
+    if instead == "a file":
+        assert out.read_text() == "mine"
+        out.unlink()
+    elif instead != "nothing":
+        assert (out / "mine.txt").read_text() == "mine"
+        (shutil.rmtree if instead == "a folder" else Path.unlink)(out)
+    aside.rename(out)
+    assert len(pieces(out)) >= 2
+    assert main(command(path, out)) == 0
+    assert contents(out) == whole
+
+
+def test_a_folder_put_there_when_all_is_thinned_is_not_replaced(path, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "out"
+    monkeypatch.setattr(
+        "meshsimp_pymoo.cli.tiled.tiled_front",
+        lambda *args, **kwargs: (tiled_front(*args, **kwargs), (out / "mine.txt").write_text("mine"))[0],
+    )
+    assert main(command(path, out)) == 2
+    refused(capsys, "exists already")
+    assert (out / "mine.txt").read_text() == "mine"
+
+
+# ------------------------------------------------------------------------------------------------ what is damaged
+
+
+def test_a_stored_tile_is_itself_or_nothing_whatever_bit_of_it_is_flipped(tmp_path):
+    rng = np.random.default_rng(1)
+    store = Folder(tmp_path, {"grid": "any"})
+    arrays = {"removed": rng.integers(0, 1000, 40).astype(np.uint16), "level": rng.random(40).astype(np.float32)}
+    store.put("piece", **arrays)
+    file = tmp_path / "piece.npz"
+    data = file.read_bytes()
+    n_refused = 0
+    for bit in rng.choice(8 * len(data), 800, replace=False):
+        damaged = bytearray(data)
+        damaged[bit // 8] ^= 1 << (bit % 8)
+        file.write_bytes(damaged)
+        found = store.get("piece")
+        n_refused += found is None
+        if found is not None:
+            assert {key: values.tobytes() for key, values in found.items()} == {
+                key: values.tobytes() for key, values in arrays.items()
+            }
+    assert n_refused > 400
+    for end in range(0, len(data), 17):
+        file.write_bytes(data[:end])
+        assert store.get("piece") is None
+
+
+def test_an_interrupted_run_with_damaged_tiles_ends_with_the_same_bytes(path, whole, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "out"
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", at_call(8, interrupt))
+    assert main(command(path, out)) == 130
+    monkeypatch.undo()
+    stored = sorted((out / "tiles").glob("*.npz"))
+    assert len(stored) >= 2
+    for k, file in enumerate(stored):
+        data = bytearray(file.read_bytes())
+        data[len(data) // 3] ^= 4
+        file.write_bytes(b"" if k == 0 else data[: len(data) // 2] if k % 2 else data)
+    assert main(command(path, out)) == 0
+    assert contents(out) == whole
+    capsys.readouterr()
+
+
+def test_a_damaged_record_of_what_the_tiles_belong_to_is_named(path, whole, tmp_path, capsys):
+    out = tmp_path / "out"
+    grid = open_grid(path)
+    Folder(out / "tiles", settings(grid, tile=64))
+    for damage in (b"", b"\xff\xfe", b"{}"):
+        (out / "tiles" / "what.json").write_bytes(damage)
+        assert main(command(path, out)) == 2
+        refused(capsys, "unfinished tiles of another model or of other settings")
+    assert main([*command(path, out), "--overwrite"]) == 0
+    assert contents(out) == whole
+
+
+# ------------------------------------------------------------------------------------------------ too little memory
+
+
+LIMITED = """
+import resource, sys
+from pathlib import Path
+import meshsimp_pymoo.cli.simplify
+from meshsimp_pymoo.cli import main
+used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+limit = used + (int(sys.argv[1]) << 20)
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="how much memory is taken is said in /proc")
+@pytest.mark.parametrize(("megabytes", "jobs"), [(10, 1), (300, 2)])
+def test_too_little_memory_is_said_in_one_line_with_the_way_out(tmp_path, megabytes, jobs):
+    path, out = tmp_path / "big.npy", tmp_path / "out"
+    np.save(path, np.zeros((1200, 1300), np.float32))
+    call = ["simplify", str(path), "-o", str(out), "--tile", "512", "--jobs", str(jobs), "--quiet"]
+    done = subprocess.run([sys.executable, "-c", LIMITED, str(megabytes), *call], capture_output=True, text=True)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith("meshsimp: ")
+    assert done.stderr.count("\n") == 1
+    assert "--tile" in done.stderr
+    assert not out.exists()
+
+
+def test_with_half_the_tile_it_fits_as_the_message_says(monkeypatch):
+    grid = open_grid(np.zeros((4000, 4000), np.float32))
+    monkeypatch.setattr(memory, "free_memory", lambda: (1000 << 20, float("inf")))
+    memory.check_memory(grid, tile=256, most=200_000, jobs=2)
+    with pytest.raises(ModelError, match=r"tiles of 512 samples .* 2 at a time, .* use --tile 256"):
+        memory.check_memory(grid, tile=512, most=200_000, jobs=2)
+    memory.check_memory(grid, tile=512, most=200_000, jobs=1)
+    memory.check_memory(grid, tile=512, most=200_000, jobs=2, remote=True)
+    with pytest.raises(ModelError, match=r"use --jobs 1, fewer triangles or a --window"):
+        memory.check_memory(grid, tile=512, most=4_000_000, jobs=2)
+
+
+def test_a_tile_that_does_not_fit_after_all_is_said_in_one_line(path, tmp_path, capsys, monkeypatch):
+    out = tmp_path / "out"
+
+    def full():
+        raise MemoryError
+
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", at_call(5, full))
+    assert main(command(path, out)) == 2
+    refused(capsys, "does not fit into memory", "smaller tiles")
+    assert len(pieces(out)) >= 2
+
+
+def test_the_free_memory_is_what_the_system_and_the_limits_say(tmp_path, monkeypatch):
+    for_all, _ = memory.free_memory()
+    assert 1 << 20 < for_all
+    (tmp_path / "memory.stat").write_text("anon 5\nfile 300\n")
+    (tmp_path / "memory.current").write_text("1000\n")
+    (tmp_path / "memory.max").write_text("5000\n")
+    monkeypatch.setattr(memory, "CONTROL_GROUPS", ((str(tmp_path), "memory.max", "memory.current", "file"),))
+    assert memory.free_memory()[0] == 5000 - (1000 - 300)
+    (tmp_path / "memory.max").write_text("max\n")
+    assert memory.free_memory()[0] > 1 << 20
