@@ -266,7 +266,8 @@ class MemeticSearch(GeneticAlgorithm):
     def _finalize(self) -> None:
         """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
         pop = self.pop
-        X = between_the_rungs(self.problem, pop.get("X"), pop.get("F"), nested_front(self.problem, self))
+        thinned = nested_front(self.problem, self)
+        X = between_the_rungs(self.problem, pop.get("X"), pop.get("F"), thinned, most=self.survival.rungs[-1])
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
             self.evaluator.eval(self.problem, extra, algorithm=self)
@@ -274,9 +275,13 @@ class MemeticSearch(GeneticAlgorithm):
 
 
 def between_the_rungs(
-    problem: Any, X: NDArray[np.bool_], F: NDArray[np.float64], thinned: NestedFront
+    problem: Any, X: NDArray[np.bool_], F: NDArray[np.float64], thinned: NestedFront, *, most: float
 ) -> NDArray[np.bool_]:
-    """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller."""
+    """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
+
+    Beyond the most accurate of them, where keeping all vertices is not the best (a scan whose outline is not covered),
+    those of the thinned model that are better, of at most ``most`` triangles.
+    """
     order = np.argsort(F[:, 1], kind="stable")
     measure = summed_measure(problem)
     most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
@@ -304,15 +309,19 @@ def between_the_rungs(
                 )
             )
         rows = []
-        for most in wanted:
-            best = min((_best_of(front, most) for front in fronts), key=lambda choice: choice[0])
+        for size in wanted:
+            best = min((_best_of(front, size) for front in fronts), key=lambda choice: choice[0])
             if best[0] < F[order[k - 1], 0]:
                 rows.append(best[1].kept(best[2]))
         return rows
 
-    return np.array([kept for rows in thread_pool().map(one, range(1, len(order))) for kept in rows]).reshape(
-        -1, X.shape[1]
-    ).astype(bool)
+    found = [kept for rows in thread_pool().map(one, range(1, len(order))) for kept in rows]
+    better = np.flatnonzero((thinned.error < F[:, 0].min()) & (thinned.triangles <= most))
+    if len(better):
+        best = better[np.argmin(thinned.error[better])]
+        better = better[better <= best]
+        found += [thinned.kept(int(k)) for k in better[np.linspace(0, len(better) - 1, BETWEEN).astype(int)]]
+    return np.array(found).reshape(-1, X.shape[1]).astype(bool)
 
 
 def _best_of(front: NestedFront, most: float) -> tuple[float, NestedFront, int]:

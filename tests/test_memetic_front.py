@@ -74,3 +74,14 @@ def test_the_ways_of_making_children_can_be_chosen_and_none_is_worse_than_thinni
         fitting = thinned.triangles <= triangles
         # the mesh may be one of thinning's own, whose error was added up in another order
         assert error <= thinned.error[fitting].min() * (1 + 1e-9) or triangles not in ladder.rungs
+
+
+def test_where_all_vertices_are_not_the_best_mesh_the_front_still_ends_with_the_best_of_thinning(shared_data):
+    """Where a scan's outline is not covered, the whole mesh's error is not the least."""
+    problem = MeshProblem(shared_data / "m4_skull.ply")
+    thinned = thinning(problem.model)
+    whole = problem.evaluate(np.ones(problem.n_var, bool))
+    assert thinned.error.min() < whole[0]
+    result = minimize(problem, memetic(20, moves_per_vertex=0), ("n_gen", 2), seed=1)
+    assert result.F[:, 0].min() <= thinned.error.min() * (1 + 1e-9)
+    assert result.F[:, 0].min() < result.algorithm.pop.get("F")[:, 0].min()  # the last rungs have none of it

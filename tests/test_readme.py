@@ -11,8 +11,10 @@ import pytest
 import yaml
 
 from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.cli.arguments import make_parser
 from meshsimp_pymoo.experiment.config import read_experiment_file
+from meshsimp_pymoo.operators import OPERATORS
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -94,6 +96,12 @@ def test_every_file_that_the_page_points_to_is_there():
     )
     assert len(pointed) > 6
     assert [name for name in sorted(pointed) if not (ROOT / name).exists()] == []
+
+
+def test_the_commented_configuration_names_every_preset_and_operator():
+    text = (ROOT / "configs" / "quick.yaml").read_text(encoding="utf-8")
+    names = {*PRESETS, *OPERATORS, *(name for table in OPERATORS.values() for name in table)}
+    assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", text)] == []
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "configs").glob("*.yaml")), ids=lambda path: path.stem)

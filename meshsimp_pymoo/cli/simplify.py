@@ -40,6 +40,7 @@ from meshsimp_pymoo.cli.terminal import (
 )
 from meshsimp_pymoo.cli.tiled import simplify_tiled, wants_tiles
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
+from meshsimp_pymoo.geometry.load import NoFullGrid
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.results import (
     CHECKPOINT,
@@ -74,7 +75,15 @@ def simplify(args: argparse.Namespace) -> int:
     if args.output is None:
         args.output = f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
     if wants_tiles(args):
-        return simplify_tiled(args)
+        try:
+            return simplify_tiled(args)
+        except NoFullGrid as reason:
+            if args.tile is not None:
+                raise
+            # nobody asked for tiles
+            if not args.quiet:
+                why = re.split("; only|, and tiles", str(reason))[0]
+                say(f"{why}; so it is not cut into tiles but searched in one piece")
     folder = _claim(args)
     problem = _mesh_problem(args)
     refuse_format(problem.model, args.format)

@@ -85,6 +85,10 @@ class ModelError(ValueError):
     """The input cannot be used. One line: the file, the cause with its value, the way out."""
 
 
+class NoFullGrid(ModelError):
+    """The model is not a full grid of heights along its axes, which can be cut into tiles."""
+
+
 class ModelWarning(UserWarning):
     """The input is usable, but something in it was dropped or is doubtful."""
 

@@ -23,6 +23,7 @@ from meshsimp_pymoo.geometry.load import (
     UNPACKED_LIMIT,
     ModelError,
     ModelWarning,
+    NoFullGrid,
     SourceMesh,
     Window,
     _reason,
@@ -149,7 +150,7 @@ class RasterHeights:
             place, mirrored = _placement(raster, steps, name)
             a, b, _, d = tuple(raster.transform)[:4]
             if mirrored or (b, d) != (0, 0) or a < 0:
-                raise ModelError(
+                raise NoFullGrid(
                     f"{name}: its transform turns or mirrors it, and tiles want rows from north to south; warp it "
                     "(gdalwarp), or leave the tiles out (--tile none)"
                 )

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.datasets import find_source
-from meshsimp_pymoo.geometry.load import RASTER_SUFFIXES, ModelError, Window, check_window
+from meshsimp_pymoo.geometry.load import RASTER_SUFFIXES, ModelError, NoFullGrid, Window, check_window
 from meshsimp_pymoo.geometry.model import OpenModel, build_model
 from meshsimp_pymoo.geometry.predicates import exact_ranges
 
@@ -208,7 +208,7 @@ class HeightGrid:
             i, j = np.argwhere(missing)[0]
             row = int(rows[i]) if np.ndim(rows) else rows + int(i)
             column = int(columns[j]) if np.ndim(columns) else columns + int(j)
-            raise ModelError(
+            raise NoFullGrid(
                 f"{self.name}: has no height at row {row + self.corner[0]}, column {column + self.corner[1]}; only a "
                 "grid without gaps can be cut into tiles: fill them, take a part without (--window), or leave the "
                 "tiles out (--tile none)"
@@ -312,7 +312,7 @@ def _grid_of_array(
 ) -> HeightGrid:
     if isinstance(heights, np.ma.MaskedArray):
         if np.ma.getmaskarray(heights).any():
-            raise ModelError(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
+            raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
         heights = heights.data
     if heights.dtype.kind not in "iuf":
         raise ModelError(f"{name}: heights have the type {heights.dtype}; give real numbers")
@@ -369,7 +369,7 @@ def _grid_of_model(model: OpenModel) -> HeightGrid:
     number = (len(y) - 1 - row) * len(x) + column
     n_cells = 2 * (len(x) - 1) * (len(y) - 1)
     if model.n_vertices != len(x) * len(y) or len(np.unique(number)) != len(number) or len(model.faces) != n_cells:
-        raise ModelError(
+        raise NoFullGrid(
             f"{model.name}: its {model.n_vertices} vertices are not all crossings of {len(y)} rows and {len(x)} "
             "columns; only a height grid without gaps can be cut into tiles: leave the tiles out"
         )

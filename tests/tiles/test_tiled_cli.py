@@ -138,6 +138,21 @@ def test_a_scan_is_not_cut_into_tiles(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_big_grid_with_gaps_is_searched_in_one_piece_unless_tiles_are_asked_for(tmp_path, capsys, monkeypatch):
+    heights = np.add.outer(np.arange(20.0), np.arange(30.0) ** 2)
+    heights[5:9, 11] = np.nan
+    np.save(tmp_path / "gaps.npy", heights)
+    monkeypatch.setattr(tiled_command, "TILED_FROM", 500)
+    command = ["simplify", str(tmp_path / "gaps.npy"), "-o", str(tmp_path / "out"), "--meshes", "none", "--up", "z"]
+    assert main([*command, "--tile", "64"]) == 2
+    assert "only a grid without gaps can be cut into tiles" in capsys.readouterr().err
+    assert main([*command, "--evaluations", "150", "--algorithm", "nsga2_v1"]) == 2  # these options are not for tiles
+    assert main([*command, "--population", "10"]) == 0
+    told = capsys.readouterr().err
+    assert "no height at row 5, column 11; so it is not cut into tiles but searched in one piece" in told
+    assert (tmp_path / "out" / "front.csv").exists()
+
+
 def test_big_grids_are_cut_into_tiles_without_being_asked(path, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(tiled_command, "TILED_FROM", 5_000)
     assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1"]) == 0
