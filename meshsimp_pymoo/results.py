@@ -68,12 +68,22 @@ __all__ = [
     "mesh_suffix",
     "new_file",
     "package_versions",
+    "partial_folder",
+    "path_from",
     "put_back",
+    "put_in_place",
     "read_front",
+    "read_front_csv",
     "refuse_format",
+    "short_reason",
+    "single_precision_shift",
+    "spelled_value",
     "stays_inside",
+    "warn_of_shift",
+    "write_csv",
     "write_front",
     "write_mesh",
+    "write_npz",
     "write_solution",
 ]
 
@@ -232,7 +242,7 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     while not parent.exists():
         parent = parent.parent
     try:
-        _partial_folder(parent / target.name).rmdir()
+        partial_folder(parent / target.name).rmdir()
     except OSError as problem:
         raise ResultError(
             f"{folder}: cannot be written in {parent} ({problem.strerror}); name another folder"
@@ -359,9 +369,9 @@ def write_front(
     target = folder.resolve()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        partial = _partial_folder(target)
+        partial = partial_folder(target)
     except OSError as problem:
-        raise ResultError(f"{folder}: cannot be made ({_short(problem)}); name another folder") from None
+        raise ResultError(f"{folder}: cannot be made ({short_reason(problem)}); name another folder") from None
     try:
         digits = max(3, len(str(len(order) - 1)))
         rows, single = [], 0.0
@@ -373,7 +383,7 @@ def write_front(
             path, fitted = "", ["", ""]
             if faces is not None and (solution in with_mesh or row == chosen):
                 arrays = mesh_arrays(model, faces(int(row)))
-                single = max(single, _single_precision_shift(arrays[0]))
+                single = max(single, single_precision_shift(arrays[0]))
                 if solution in with_mesh:
                     path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{suffix}"
                     write_mesh(partial / path, *arrays, **look)
@@ -382,23 +392,23 @@ def write_front(
                 if refit is not None:
                     better = refit(int(row))
                     raised = (better.vertices(model), *arrays[1:])
-                    fitted = [_spelled("error", better.error), path.replace("meshes/", "refitted/")]
+                    fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                     if solution in with_mesh:
                         write_mesh(partial / fitted[1], *raised, **look)
                     if row == chosen:
                         write_mesh(partial / f"chosen_refitted.{suffix}", *raised, **look)
-            numbers = [_spelled(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
+            numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
-        _warn_of_shift(model.name, model.diagonal, mesh_format, single)
-        _write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
+        warn_of_shift(model.name, model.diagonal, mesh_format, single)
+        write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
-            _write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
+            write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        _write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
+        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
-                "file": _path_from(target, model.name),
+                "file": path_from(target, model.name),
                 "hash": model.hash,
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
@@ -415,12 +425,12 @@ def write_front(
         )
         if extra is not None:
             extra(partial)
-        _put_in_place(partial, target, folder, overwrite)
+        put_in_place(partial, target, folder, overwrite)
     except BaseException as problem:
         shutil.rmtree(partial, ignore_errors=True)
         if isinstance(problem, OSError):
             raise ResultError(
-                f"{folder}: cannot be written ({_short(problem)}); make room, or name another folder"
+                f"{folder}: cannot be written ({short_reason(problem)}); make room, or name another folder"
             ) from None
         raise
     return folder
@@ -443,7 +453,7 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     folder = Path(folder)
     if not folder.is_dir():
         raise ResultError(f"{folder}: no such folder")
-    quality, meshes, refitted_meshes = _read_csv(folder / "front.csv")
+    quality, meshes, refitted_meshes = read_front_csv(folder / "front.csv")
     refitted_error = quality.pop("refitted_error", None)
     count = len(meshes)
     F, packed, source_index = _read_npz(folder / "front.npz")
@@ -471,7 +481,7 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     try:
         run = json.loads(record.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
-        raise ResultError(f"{record}: cannot be read ({_short(problem)})") from None
+        raise ResultError(f"{record}: cannot be read ({short_reason(problem)})") from None
     if not isinstance(run, dict) or run.get("solutions") != count:
         raise ResultError(f"{record}: is not the record of this front of {count} solutions")
     _check_record(run, count, record)
@@ -597,7 +607,7 @@ def local_origin(vertices: FloatArray) -> FloatArray:
     [500000.0, 5400000.0, 7.0]
     """
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
-    if _single_precision_shift(vertices) <= SINGLE_PRECISION_LOSS * diagonal:
+    if single_precision_shift(vertices) <= SINGLE_PRECISION_LOSS * diagonal:
         return np.zeros(3)
     return np.asarray(np.floor(vertices.min(axis=0)), dtype=np.float64)
 
@@ -643,7 +653,7 @@ def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
     suffix = path.suffix.lower().lstrip(".")
     refuse_format(model, suffix)
     arrays = mesh_arrays(model, faces)
-    _warn_of_shift(model.name, model.diagonal, suffix, _single_precision_shift(arrays[0]))
+    warn_of_shift(model.name, model.diagonal, suffix, single_precision_shift(arrays[0]))
     write_mesh(path, *arrays, **_written_frame(model, suffix))
 
 
@@ -686,7 +696,7 @@ def new_file(path: Path, *, way_out: str = "name another file") -> Iterator[Path
         _flush(partial)
         partial.replace(path)
     except OSError as problem:
-        raise ResultError(f"{path}: cannot be written ({_short(problem)}); {way_out}") from None
+        raise ResultError(f"{path}: cannot be written ({short_reason(problem)}); {way_out}") from None
     finally:
         # whatever stands in the way of that was said already
         with suppress(OSError):
@@ -709,7 +719,8 @@ def _versions() -> dict[str, str]:
     return versions
 
 
-def _warn_of_shift(name: str, diagonal: float, mesh_format: str, shift: float) -> None:
+def warn_of_shift(name: str, diagonal: float, mesh_format: str, shift: float) -> None:
+    """Warn if the format's single precision moves vertices by more than a person would see in the numbers."""
     if mesh_format == "stl" and shift > SINGLE_PRECISION_LOSS * diagonal:
         warnings.warn(
             f"{name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
@@ -719,7 +730,7 @@ def _warn_of_shift(name: str, diagonal: float, mesh_format: str, shift: float) -
         )
 
 
-def _path_from(folder: Path, name: str) -> str | None:
+def path_from(folder: Path, name: str) -> str | None:
     """Return the path of the model's file relative to the results, so that both can move together; None: no file."""
     if not Path(name).is_file():
         return None
@@ -742,11 +753,13 @@ def even_selection(count: int, most: int | None) -> list[int]:
     return [int(row) for row in np.unique(np.rint(np.linspace(0, count - 1, most)).astype(int))]
 
 
-def _spelled(column: str, value: float) -> str:
+def spelled_value(column: str, value: float) -> str:
+    """Return a number as it stands in a front's CSV file: whole numbers bare, others so that they read back equal."""
     return str(int(value)) if column in INT_COLUMNS else repr(float(value))
 
 
-def _write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+def write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Write a heading and rows of cells that are text already."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
@@ -759,7 +772,7 @@ def _csv_rows(path: Path, *headers: tuple[str, ...]) -> tuple[tuple[str, ...], l
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file, strict=True))
     except (OSError, UnicodeDecodeError, csv.Error) as problem:
-        raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
+        raise ResultError(f"{path}: cannot be read ({short_reason(problem)})") from None
     header = tuple(rows[0]) if rows else ()
     if header not in headers:
         raise ResultError(f"{path}: its first line must be {','.join(headers[0])}")
@@ -777,7 +790,7 @@ def _series_rows(series: Mapping[str, npt.ArrayLike]) -> Iterator[list[str]]:
         if F.ndim != 2 or F.shape[1] != 2 or not len(F) or not np.isfinite(F).all():
             raise ValueError(f"the series {name!r} is no front: (n, 2) finite numbers, error and triangles")
         for error, triangles in F[np.lexsort((F[:, 0], F[:, 1]))]:
-            yield [name, _spelled("minimised", error), _spelled("triangles", triangles)]
+            yield [name, spelled_value("minimised", error), spelled_value("triangles", triangles)]
 
 
 def _read_series(path: Path) -> dict[str, FloatArray]:
@@ -796,7 +809,8 @@ def _read_series(path: Path) -> dict[str, FloatArray]:
     return {name: np.array(front, dtype=np.float64) for name, front in series.items()}
 
 
-def _read_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
+def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
+    """Return the columns of a front's CSV file as arrays, the names of its meshes and of the refitted ones."""
     header, rows = _csv_rows(path, FRONT_COLUMNS, FRONT_COLUMNS + REFIT_COLUMNS)
     columns: dict[str, npt.NDArray[Any]] = {}
     for at, column in enumerate(header):
@@ -843,7 +857,7 @@ def stays_inside(folder: Path, name: str) -> bool:
         return False
 
 
-def _write_npz(path: Path, **arrays: npt.NDArray[Any]) -> None:
+def write_npz(path: Path, **arrays: npt.NDArray[Any]) -> None:
     """Write arrays as .npz without the time of writing, so that equal arrays give equal bytes."""
     with zipfile.ZipFile(path, "w") as file:
         for name, array in arrays.items():
@@ -862,7 +876,7 @@ def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
     except KeyError as problem:
         raise ResultError(f"{path}: holds no array {problem}; the file is not ours") from None
     except (OSError, ModelError, MemoryError) as problem:
-        raise ResultError(f"{path}: cannot be read ({_short(problem)})") from None
+        raise ResultError(f"{path}: cannot be read ({short_reason(problem)})") from None
     for name, array, kind, ndim in (
         ("F", F, "f", 2),
         ("kept", packed, "u", 2),
@@ -1027,18 +1041,19 @@ def _printable(text: str) -> str:
     return "".join(character if character.isprintable() else "?" for character in text)
 
 
-def _single_precision_shift(vertices: FloatArray) -> float:
+def single_precision_shift(vertices: FloatArray) -> float:
+    """Return by how much single precision moves the vertices at most, along an axis [their units]."""
     return float(np.abs(vertices - vertices.astype(np.float32)).max(initial=0.0))
 
 
-def _partial_folder(target: Path) -> Path:
+def partial_folder(target: Path) -> Path:
     """Make a hidden folder beside the target, with the permissions that the user's folders usually get."""
     partial = target.with_name(f".{target.name}.{secrets.token_hex(4)}.partial")
     partial.mkdir()
     return partial
 
 
-def _put_in_place(partial: Path, target: Path, folder: Path, overwrite: bool) -> None:
+def put_in_place(partial: Path, target: Path, folder: Path, overwrite: bool) -> None:
     """Flush the finished folder to the disk and rename it to the target."""
     for path in [*partial.rglob("*"), partial]:
         _flush(path)
@@ -1075,6 +1090,7 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a {type(value).__name__} cannot be recorded in run.json; pass numbers, texts, lists and mappings")
 
 
-def _short(problem: Exception) -> str:
+def short_reason(problem: Exception) -> str:
+    """Return the first line of what an exception says."""
     text = getattr(problem, "strerror", None) or str(problem) or type(problem).__name__
     return str(text).splitlines()[0]

@@ -202,7 +202,7 @@ def test_ten_kills_at_random_moments_change_no_byte(tmp_path, forker):
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "whole"]
 
 
-@pytest.mark.parametrize("place", ["report.figures.front_figure", "results._put_in_place", "results._flush"])
+@pytest.mark.parametrize("place", ["report.figures.front_figure", "results.put_in_place", "results._flush"])
 def test_killed_while_the_results_are_written(tmp_path, forker, whole, monkeypatch, place):
     out = stopped(tmp_path / "out", monkeypatch)
     options = ("simplify", *SEARCH, *PLAIN, *BUDGET, "-o", out)
@@ -303,7 +303,7 @@ def test_ctrl_c_leaves_the_front_so_far_and_no_checkpoint(tmp_path, monkeypatch,
 def test_ctrl_c_while_writing_keeps_the_search(tmp_path, whole, monkeypatch, capsys):
     out = stopped(tmp_path / "out", monkeypatch)
     with monkeypatch.context() as patch:
-        patch.setattr("meshsimp_pymoo.results._put_in_place", lambda *_: stop(KeyboardInterrupt)())
+        patch.setattr("meshsimp_pymoo.results.put_in_place", lambda *_: stop(KeyboardInterrupt)())
         assert simplify(out) == 130
     assert "the same command goes on from the checkpoint" in one_line(capsys)
     assert simplify(out) == 0

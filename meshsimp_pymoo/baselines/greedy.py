@@ -29,17 +29,17 @@ from meshsimp_pymoo.geometry.live import (
     N_EMITTED,
     Ground,
     Live,
-    _cost,
-    _cost_in,
-    _star,
-    _total,
     build,
+    deviation_in,
     insert,
     lent_live,
     make_ground,
     remove,
     summed_error,
+    total_cost,
+    triangles_around,
     try_remove,
+    weighed_cost,
 )
 from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD
 
@@ -130,7 +130,7 @@ def thinning(
     removed = np.empty(n, np.int64)
     error = np.empty(n + 1)
     triangles = np.empty(n + 1, np.int64)
-    n_removed = _thin(ground, live, sites, fixed, least, np.inf, removed, error, triangles)
+    n_removed = thin_live(ground, live, sites, fixed, least, np.inf, removed, error, triangles)
     base = np.setdiff1d(sites, removed[:n_removed])
     return NestedFront(
         base,
@@ -259,7 +259,7 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
 
 
 @njit(cache=True, nogil=True)
-def _thin(
+def thin_live(
     g: Ground,
     live: Live,
     sites: np.ndarray,
@@ -287,7 +287,7 @@ def _thin(
             n += 1
     for k in range(n // 2 - 1, -1, -1):
         _sift_down(heap, at, key, k, n)
-    error[0] = _total(live)
+    error[0] = total_cost(live)
     triangles[0] = live.tally[N_EMITTED]
     n_removed = 0
     around = np.empty(len(live.ring), np.int64)
@@ -299,14 +299,14 @@ def _thin(
         at[v] = -1
         if n > 0:
             _sift_down(heap, at, key, 0, n)
-        m = _star(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
+        m = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
         for k in range(m):
             around[k] = np.int64(live.ring[k])
         if not remove(g, live, v):
             continue
         removed[n_removed] = v
         n_removed += 1
-        error[n_removed] = _total(live)
+        error[n_removed] = total_cost(live)
         triangles[n_removed] = live.tally[N_EMITTED]
         if triangles[n_removed] == 0:
             # The last mesh was the smallest one there is.
@@ -349,9 +349,9 @@ def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
             continue
         d = live.cost[i]
         if emitted:
-            d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
             if g.weighed:
-                d = _cost(g, d, i)
+                d = weighed_cost(g, d, i)
         elif live.bare_segment[i] < 0:
             d = 1.0  # there is no mesh yet; any vertex will do
         if d > most or (d == most and worst >= 0 and i < worst):
@@ -377,7 +377,7 @@ def _grow(
     n_changed = live.tally[END] // RECORD
     for r in range(n_changed):
         changed[r] = r
-    error[0] = _total(live)
+    error[0] = total_cost(live)
     triangles[0] = live.tally[N_EMITTED]
     n_inserted = 0
     while True:
@@ -406,8 +406,8 @@ def _grow(
         insert(g, live, v)
         inserted[n_inserted] = v
         n_inserted += 1
-        error[n_inserted] = _total(live)
+        error[n_inserted] = total_cost(live)
         triangles[n_inserted] = live.tally[N_EMITTED]
-        n_changed = _star(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
+        n_changed = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
         for k in range(n_changed):
             changed[k] = np.int64(live.cavity[k]) // RECORD

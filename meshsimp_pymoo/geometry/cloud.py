@@ -22,12 +22,12 @@ from meshsimp_pymoo.geometry.load import (
     UNPACKED_LIMIT,
     ModelError,
     SourceMesh,
-    _color,
-    _numbers,
-    _reason,
-    _warn,
     build_source,
     check_points,
+    parse_numbers,
+    reason_of,
+    rgba_of,
+    warn_of,
 )
 from meshsimp_pymoo.geometry.model import find_corners, unit_square, vector_order
 from meshsimp_pymoo.geometry.predicates import exact_ranges
@@ -113,7 +113,7 @@ def cloud_source(
     first[1:] = (sorted_xy[1:] != sorted_xy[:-1]).any(axis=1)
     n_twins = len(first) - int(first.sum())
     if n_twins:
-        _warn(
+        warn_of(
             f"{name}: {n_twins} of {len(first)} points share their (x, y) with another one and were dropped; the "
             "lowest of each place stays"
         )
@@ -202,14 +202,14 @@ def _read_text(path: Path, name: str, suffix: str) -> tuple[FloatArray, dict[str
     head, columns, declared = _text_head(text, name, suffix)
     body = _plain_numbers(text[head:], name)
     width, count = _table_shape(body, name, columns)
-    table = _numbers(body.decode("ascii", errors="replace"), name)
+    table = parse_numbers(body.decode("ascii", errors="replace"), name)
     if len(table) != width * count:
         raise ModelError(f"{name}: holds {len(table)} numbers in {count} lines of {width}; the file is damaged")
     if declared is not None and declared != count:
         raise ModelError(f"{name}: declares {declared} points, but {count} follow; copy or export it again")
     table = table.reshape(count, width)
     attributes: dict[str, Any] = {}
-    if columns is None and width >= 6 and (color := _color(list(table[:, 3:6].T))) is not None:
+    if columns is None and width >= 6 and (color := rgba_of(list(table[:, 3:6].T))) is not None:
         attributes["color"] = color
     order = list(columns) if columns is not None else [0, 1, 2]
     return np.ascontiguousarray(table[:, order]), attributes, {}
@@ -319,10 +319,10 @@ def _read_las(path: Path, name: str, suffix: str) -> tuple[FloatArray, dict[str,
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
         raise ModelError(
-            f"{name}: cannot be read as {suffix} ({type(error).__name__}: {_reason(error)}); export it again"
+            f"{name}: cannot be read as {suffix} ({type(error).__name__}: {reason_of(error)}); export it again"
         ) from None
     if withheld:
-        _warn(f"{name}: {withheld} points are marked as withheld and were left out")
+        warn_of(f"{name}: {withheld} points are marked as withheld and were left out")
     if not parts:
         raise ModelError(f"{name}: has 0 vertices; at least 4 are needed")
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}

@@ -163,7 +163,7 @@ def _gather(
 
 
 @njit(cache=True, nogil=True)
-def _is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bool:
+def is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bool:
     """Whether a triangle is lower than ``min_height`` over its longest edge; the same for all its rotations."""
     a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
     while a > b or a > c:
@@ -180,7 +180,7 @@ def _is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> b
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _sum_of_three(a: float, b: float, c: float) -> float:
+def sum_of_three(a: float, b: float, c: float) -> float:
     """Their sum, rounded the same way in whatever order they come."""
     low = a if a < b else b
     high = b if a < b else a
@@ -223,7 +223,7 @@ def _emit(
             outer = stack[depth]
             for k in range(3):
                 t = mesh[outer + 4 + k] & TRIANGLE
-                if emitted[t // RECORD] == 1 and _is_sliver(xy, mesh, t, min_height):
+                if emitted[t // RECORD] == 1 and is_sliver(xy, mesh, t, min_height):
                     emitted[t // RECORD] = 0
                     stack[depth] = t
                     depth += 1
@@ -233,8 +233,8 @@ def _emit(
             continue
         if side > 0:
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
-            x3 = _sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
-            y3 = _sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+            x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
+            y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
             if not inside(model_xy, side, state, start, items, faces, x3, y3):
                 emitted[t // RECORD] = 0
                 continue
@@ -512,7 +512,7 @@ def evaluate_subsets(
         MAXIMUM, UNCOVERED, then the error of each region. A subset that emits no triangle has error, squares, maximum
         and regions inf.
     """
-    use_footprint, nearest = _rules(footprint, outside)
+    use_footprint, nearest = checked_rules(footprint, outside)
     rows = np.ascontiguousarray(np.atleast_2d(kept))
     if rows.dtype != np.bool_:
         raise TypeError(f"subsets are bool arrays, one entry a vertex, not {rows.dtype}")
@@ -586,7 +586,7 @@ def simplify(model: OpenModel, kept: np.ndarray, *, footprint: str = "model", ou
     >>> simplify(roof, corners).quality.error        # the ridge of 3 vertices falls from height 1 to the ground
     3.0
     """
-    use_footprint, nearest = _rules(footprint, outside)
+    use_footprint, nearest = checked_rules(footprint, outside)
     row = np.array(kept, order="C")
     if row.dtype != np.bool_:
         raise TypeError(f"a subset is a bool array, one entry a vertex, not {row.dtype}")
@@ -635,18 +635,20 @@ def measured(table: np.ndarray, measure: str, total_weight: float) -> np.ndarray
     >>> measured(np.array([[6.0, 2, 4, 20, 4, 0]]), "rms_error", 5.0)
     array([2.])
     """
-    _require_measure(measure)
+    require_measure(measure)
     if measure == "error":
         return table[..., ERROR]
     return np.sqrt(table[..., SQUARES] / total_weight) if measure == "rms_error" else table[..., MAXIMUM]
 
 
-def _require_measure(measure: str) -> None:
+def require_measure(measure: str) -> None:
+    """Raise a ValueError that names the measures if this is none of them."""
     if measure not in MEASURES:
         raise ValueError(f"measure={measure!r} is unknown; choose one of {', '.join(map(repr, MEASURES))}")
 
 
-def _rules(footprint: str, outside: str) -> tuple[bool, bool]:
+def checked_rules(footprint: str, outside: str) -> tuple[bool, bool]:
+    """Return whether the footprint is the model's and whether uncovered vertices cost something; refuse other words."""
     if footprint not in FOOTPRINTS:
         raise ValueError(f"footprint={footprint!r} is unknown; choose one of {', '.join(map(repr, FOOTPRINTS))}")
     if outside not in OUTSIDES:
@@ -753,7 +755,7 @@ def _look_at_mesh(
     model: OpenModel, vertices: np.ndarray, faces: np.ndarray, outside: str, frame: str, n_recorded: int
 ) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Check a mesh and return d_p, covered, and as many rows of sites, shares and gaps as are to be recorded."""
-    _, nearest = _rules("model", outside)
+    _, nearest = checked_rules("model", outside)
     if frame not in ("file", "local"):
         raise ValueError(f"frame={frame!r} is unknown; choose 'file' or 'local'")
     vertices = np.asarray(vertices, float)

@@ -29,10 +29,10 @@ from numba import njit
 from meshsimp_pymoo.geometry.borrow import borrowed
 from meshsimp_pymoo.geometry.error import (
     COVER_TOLERANCE,
-    _is_sliver,
-    _require_measure,
-    _rules,
-    _sum_of_three,
+    checked_rules,
+    is_sliver,
+    require_measure,
+    sum_of_three,
 )
 from meshsimp_pymoo.geometry.footprint import inside
 from meshsimp_pymoo.geometry.predicates import circle_sign, orient_sign
@@ -85,7 +85,7 @@ class Ground(NamedTuple):
     items: np.ndarray
     faces: np.ndarray
     nearest: bool
-    weighed: bool  # whether the cost of a vertex is not d_p itself, but what _cost makes of it
+    weighed: bool  # whether the cost of a vertex is not d_p itself, but what weighed_cost makes of it
     weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
     squared: bool  # whether the cost is the square of d_p
 
@@ -226,7 +226,7 @@ def _cavity(
 
 
 @njit(cache=True, nogil=True)
-def _star(mesh: np.ndarray, t: int, p: int, star: np.ndarray, rim: np.ndarray, ring: np.ndarray) -> int:
+def triangles_around(mesh: np.ndarray, t: int, p: int, star: np.ndarray, rim: np.ndarray, ring: np.ndarray) -> int:
     """List the triangles around p counter-clockwise, the halfedges outside its ring and the ring's vertices."""
     first = t
     m = 0
@@ -306,7 +306,7 @@ def _fill(
 
 
 @njit(cache=True, nogil=True)
-def _cost(g: Ground, d: float, i: int) -> float:
+def weighed_cost(g: Ground, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, if that is not d itself (``g.weighed``)."""
     if g.squared:
         d *= d
@@ -314,7 +314,7 @@ def _cost(g: Ground, d: float, i: int) -> float:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _cost_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) -> float:
+def deviation_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) -> float:
     """d_p of vertex i on the plane of triangle (a, b, c)."""
     ax = xy[2 * a]
     ay = xy[2 * a + 1]
@@ -343,8 +343,8 @@ def _is_inside(g: Ground, a: int, b: int, c: int) -> bool:
     if g.side == 0:
         return True
     xy = g.xy
-    x3 = _sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
-    y3 = _sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+    x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
+    y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
     return inside(xy, g.side, g.state, g.start, g.items, g.faces, x3, y3)
 
 
@@ -526,7 +526,7 @@ def _settle_bare(g: Ground, live: Live) -> None:
             bare_gap[i] = gap
             cost = _bare_cost(xy, g.z, mesh, segment[best], i, g.unit, g.nearest) if best >= 0 else 0.0
             if g.weighed:
-                cost = _cost(g, cost, i)
+                cost = weighed_cost(g, cost, i)
             live.amount[BARE_ERROR] += cost - live.cost[i]
             live.cost[i] = cost
 
@@ -649,7 +649,7 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
             kind[t >> 3] = 0
             continue
         bits = PLAIN if _is_inside(g, a, b, c) else 0
-        if _is_thin(g, a, b, c) and _is_sliver(xy, mesh, t, g.min_height):
+        if _is_thin(g, a, b, c) and is_sliver(xy, mesh, t, g.min_height):
             bits |= THIN
         kind[t >> 3] = bits
     for q in range(count[N_REGION]):
@@ -717,9 +717,9 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         following[i] = head[r]
         head[r] = i
         if kind[r] & EMITTED:
-            d = _cost_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            d = deviation_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
             if weighed:
-                d = _cost(g, d, i)
+                d = weighed_cost(g, d, i)
             subtotal[r] += d
             amount[COVERED_ERROR] += d
         else:
@@ -802,7 +802,7 @@ def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
     """Remove site p; ``half`` as in :func:`_settle`."""
     mesh = live.mesh
     count = live.tally
-    m = _star(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
+    m = triangles_around(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
     n_ears = _fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
     if n_ears == 0 or count[N_SITES] <= 3:
         return False
@@ -850,7 +850,7 @@ def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def _total(live: Live) -> float:
+def total_cost(live: Live) -> float:
     """Sum of the costs; inf where there is no mesh."""
     if live.tally[N_EMITTED] == 0:
         return np.inf
@@ -884,11 +884,11 @@ def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
-    before = _total(live)
+    before = total_cost(live)
     n = live.tally[N_EMITTED]
     if not exchange(g, live, v, w):
         return np.inf, 0
-    change = _total(live) - before
+    change = total_cost(live) - before
     n = live.tally[N_EMITTED] - n
     exchange(g, live, w, v)
     return change, n
@@ -1030,7 +1030,7 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
     n_emitted = 0
     change = 0.0
     if v >= 0:
-        n_star = _star(mesh, live.place[v], v, cavity, live.rim, ring)
+        n_star = triangles_around(mesh, live.place[v], v, cavity, live.rim, ring)
         if n_star > MOST:
             return unknown
         for k in range(n_star):
@@ -1110,7 +1110,7 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
                     if most < -1e-15:
                         return unknown
                 d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
-                change += _cost(g, d, i) if weighed else d
+                change += weighed_cost(g, d, i) if weighed else d
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
         if change > limit:
             return np.inf, 0
@@ -1163,9 +1163,9 @@ def _build(
         live.following[i] = live.head[r]
         live.head[r] = i
         if live.kind[r] & EMITTED:
-            d = _cost_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
             if g.weighed:
-                d = _cost(g, d, i)
+                d = weighed_cost(g, d, i)
             live.subtotal[r] += d
             live.amount[COVERED_ERROR] += d
         else:
@@ -1249,7 +1249,7 @@ class LiveTriangulation:
     @property
     def error(self) -> float:
         """The error in the chosen measure [model units]."""
-        return float(summed_error(_total(self.live), self.ground, self.model))
+        return float(summed_error(total_cost(self.live), self.ground, self.model))
 
     @property
     def triangles(self) -> int:
@@ -1323,7 +1323,7 @@ class LiveTriangulation:
     def _measured(self, change: float, triangles: int) -> tuple[float, int]:
         """Turn a change of the sum of costs into one of the error."""
         if self.ground.squared:
-            change = summed_error(_total(self.live) + change, self.ground, self.model) - self.error
+            change = summed_error(total_cost(self.live) + change, self.ground, self.model) - self.error
         return float(change), int(triangles)
 
     def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
@@ -1371,8 +1371,8 @@ def make_ground(
     ValueError
         If the measure is unknown or the maximum.
     """
-    use_footprint, nearest = _rules(footprint, outside)
-    _require_measure(measure)
+    use_footprint, nearest = checked_rules(footprint, outside)
+    require_measure(measure)
     if measure == "max_error":
         raise ValueError(
             "measure='max_error' is no sum over the vertices, which thinning, insertion and relocation need; "

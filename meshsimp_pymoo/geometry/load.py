@@ -388,7 +388,7 @@ def _warn_of_nodata(z: FloatArray, name: str) -> None:
             continue
         low, high = float(others.min()), float(others.max())
         if max(low - value, value - high) > high - low:
-            _warn(
+            warn_of(
                 f"{name}: {len(z) - len(others)} of {len(z)} heights are {value:.9g}, far from all others ({low:g} to "
                 f"{high:g}); if that means 'no sample', say nodata={value:.9g} (--nodata={value:.9g})"
             )
@@ -442,7 +442,7 @@ def build_source(
             f"{name}: all {len(triangles)} faces name a vertex twice; the file is damaged, export it again"
         )
     if flat.any():
-        _warn(f"{name}: {flat.sum()} of {len(triangles)} faces name a vertex twice and were dropped")
+        warn_of(f"{name}: {flat.sum()} of {len(triangles)} faces name a vertex twice and were dropped")
         triangles = triangles[~flat]
     kept_attributes = {}
     for key, values in (attributes or {}).items():
@@ -500,7 +500,7 @@ def _check_file(path: Path, name: str) -> None:
     except ModelError:
         raise
     except (OSError, ValueError) as error:
-        raise ModelError(f"{name}: cannot be read ({_reason(error)}); check the path and its permissions") from error
+        raise ModelError(f"{name}: cannot be read ({reason_of(error)}); check the path and its permissions") from error
 
 
 def _guarded(reader: Any, path: Path, name: str, *args: Any) -> SourceMesh:
@@ -512,17 +512,19 @@ def _guarded(reader: Any, path: Path, name: str, *args: Any) -> SourceMesh:
     except ModelError:
         raise
     except OSError as error:
-        raise ModelError(f"{name}: cannot be read ({_reason(error)}); check the path and its permissions") from error
+        raise ModelError(f"{name}: cannot be read ({reason_of(error)}); check the path and its permissions") from error
     except MemoryError as error:
         raise ModelError(f"{name}: does not fit into memory; cut it into tiles first") from error
 
 
-def _reason(error: BaseException) -> str:
+def reason_of(error: BaseException) -> str:
+    """Return what an exception says, in one line of at most 200 characters."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split())[:200]
 
 
-def _warn(message: str) -> None:
+def warn_of(message: str) -> None:
+    """Warn the caller's caller that something in the input was dropped or is doubtful."""
     warnings.warn(message, ModelWarning, stacklevel=2)
 
 
@@ -533,7 +535,7 @@ def _known_mesh_suffixes() -> list[str]:
     return sorted((found - set(CLOUD_SUFFIXES) - set(ARCHIVE_SUFFIXES)) | set(OWN_SUFFIXES))
 
 
-def _numbers(text: str, name: str) -> FloatArray:
+def parse_numbers(text: str, name: str) -> FloatArray:
     """Parse white-space separated numbers; NaN and infinity are numbers, anything else names its place."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # older NumPy only warns about text it cannot read
@@ -566,7 +568,7 @@ def _fans(corners: IntArray, counts: IntArray) -> IntArray:
     return np.column_stack([corners[first], corners[first + step + 1], corners[first + step + 2]])
 
 
-def _color(channels: list[npt.NDArray[Any]]) -> npt.NDArray[np.uint8] | None:
+def rgba_of(channels: list[npt.NDArray[Any]]) -> npt.NDArray[np.uint8] | None:
     """Make (V, 4) uint8 of 3 or 4 columns: bytes, or fractions of 1; None for anything else."""
     if all(channel.dtype == np.uint8 for channel in channels):
         columns = [channel.astype(np.uint8) for channel in channels]
@@ -813,7 +815,7 @@ def _even(values: npt.NDArray[Any], counts: IntArray) -> npt.NDArray[Any] | _Rag
 
 
 def _ply_ascii(data: bytes, start: int, elements: list[_PlyElement], name: str) -> dict[str, dict[str, Any]]:
-    numbers = _numbers(data[start:].decode("ascii", errors="replace"), name)
+    numbers = parse_numbers(data[start:].decode("ascii", errors="replace"), name)
     at = 0
     result = {}
     for element in elements:
@@ -897,13 +899,13 @@ def _ply_attributes(vertex: dict[str, Any], name: str) -> dict[str, npt.NDArray[
     for names in COLOR_NAMES:
         found = [rest[key] for key in names if key in rest]
         channels = [value for value in found if isinstance(value, np.ndarray) and value.ndim == 1]
-        if len(channels) >= 3 and "color" not in rest and (color := _color(channels)) is not None:
+        if len(channels) >= 3 and "color" not in rest and (color := rgba_of(channels)) is not None:
             attributes["color"] = color
             rest = {key: value for key, value in rest.items() if key not in names}
             break
     for key, value in rest.items():
         if isinstance(value, _Ragged):
-            _warn(f"{name}: the per-vertex lists {key!r} differ in length and stay behind")
+            warn_of(f"{name}: the per-vertex lists {key!r} differ in length and stay behind")
         else:
             attributes[key] = value
     return attributes
@@ -928,7 +930,7 @@ def _even_table(lines: list[str], name: str, what: str, least: int) -> tuple[Flo
         raise ModelError(
             f"{name}: the {what} line {short[:60]!r} has fewer than {least} numbers; export the file again"
         )
-    values = _numbers(" ".join(lines), name)
+    values = parse_numbers(" ".join(lines), name)
     width = int(widths.min())
     first = np.cumsum(widths) - widths
     return values[first[:, None] + np.arange(width)], width
@@ -944,15 +946,15 @@ def _read_obj(path: Path, name: str) -> SourceMesh:
     table, width = _even_table([lines[i][2:] for i in np.flatnonzero(is_vertex)], name, "vertex", 3)
     attributes: dict[str, npt.ArrayLike] = {}
     if width >= 6:  # x y z r g b [a]
-        if (color := _color(list(table[:, 3:7].T))) is not None:
+        if (color := rgba_of(list(table[:, 3:7].T))) is not None:
             attributes["color"] = color
         else:
-            _warn(f"{name}: the numbers behind its vertices are no colours in 0..1 or 0..255 and stay behind")
+            warn_of(f"{name}: the numbers behind its vertices are no colours in 0..1 or 0..255 and stay behind")
     if not face_at:
         return build_source(table[:, :3], np.empty((0, 3), np.int64), attributes, name)
     corner_lines = [re.sub(r"/\S*", "", lines[i][2:]) for i in face_at]
     counts = np.array([len(line.split()) for line in corner_lines], dtype=np.int64)
-    corners = _whole(_numbers(" ".join(corner_lines), name), name, "the face index")
+    corners = _whole(parse_numbers(" ".join(corner_lines), name), name, "the face index")
     if (corners == 0).any():
         raise ModelError(f"{name}: a face names vertex 0, but OBJ counts from 1; export the file again")
     if (corners < 0).any():  # -1 is the last vertex before the face's own line
@@ -973,7 +975,7 @@ def _read_off(path: Path, name: str) -> SourceMesh:
     lines = ([rest] if rest else []) + lines[1:]
     if not lines:
         raise ModelError(f"{name}: ends before its counts; the file is truncated, export it again")
-    header = _whole(_numbers(lines[0], name), name, "the count")
+    header = _whole(parse_numbers(lines[0], name), name, "the count")
     if len(header) < 2 or header.min() < 0:
         raise ModelError(f"{name}: cannot read the counts {lines[0][:60]!r}; export the file again")
     n_vertices, n_faces = int(header[0]), int(header[1])
@@ -988,15 +990,15 @@ def _read_off(path: Path, name: str) -> SourceMesh:
     first_color = 6 if keyword[3] else 3
     last_color = min(first_color + 4, width - (2 if keyword[1] else 0))
     if keyword[2] and last_color - first_color >= 3:
-        if (color := _color(list(table[:, first_color:last_color].T))) is not None:
+        if (color := rgba_of(list(table[:, first_color:last_color].T))) is not None:
             attributes["color"] = color
         else:
-            _warn(f"{name}: its vertex colours are neither in 0..1 nor in 0..255 and stay behind")
+            warn_of(f"{name}: its vertex colours are neither in 0..1 nor in 0..255 and stay behind")
     if n_faces == 0:
         return build_source(table[:, :3], np.empty((0, 3), np.int64), attributes, name)
     face_lines = lines[1 + n_vertices : 1 + n_vertices + n_faces]
     widths = np.array([len(line.split()) for line in face_lines], dtype=np.int64)
-    values = _numbers(" ".join(face_lines), name)
+    values = parse_numbers(" ".join(face_lines), name)
     starts = np.cumsum(widths) - widths
     counts = _whole(values[starts], name, "the number of corners")
     if (counts < 0).any() or (counts + 1 > widths).any():
@@ -1031,7 +1033,8 @@ def _read_with_trimesh(path: Path, name: str) -> SourceMesh:
             raise
         except Exception as error:  # a damaged file may break the reader anywhere
             raise ModelError(
-                f"{name}: cannot be read as {suffix} ({type(error).__name__}: {_reason(error)}); export the file again"
+                f"{name}: cannot be read as {suffix} ({type(error).__name__}: {reason_of(error)}); "
+                "export the file again"
             ) from error
         pieces = _scene_pieces(loaded)
     if not pieces:
@@ -1062,7 +1065,7 @@ def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, npt.NDAr
     else:  # a glTF with a material keeps its vertex colours beside it
         colors = np.asarray(getattr(visual, "vertex_attributes", {}).get("color", ()))
     if colors.ndim == 2 and len(colors) == len(points) and colors.shape[1] in (3, 4):
-        if (color := _color(list(colors.T))) is not None:
+        if (color := rgba_of(list(colors.T))) is not None:
             attributes["color"] = color
     return points, faces, attributes
 
@@ -1103,7 +1106,7 @@ def _concatenated(
         if len(shapes) == 1:
             attributes[key] = np.concatenate([part for part in parts if part is not None])
         else:
-            _warn(f"{name}: only some of its {len(pieces)} meshes have the attribute {key!r}, which stays behind")
+            warn_of(f"{name}: only some of its {len(pieces)} meshes have the attribute {key!r}, which stays behind")
     faces = np.concatenate([piece[1] + offset for piece, offset in zip(pieces, offsets, strict=True)])
     return np.concatenate([piece[0] for piece in pieces]), faces, attributes
 
@@ -1170,7 +1173,7 @@ def _check_gltf(path: Path, name: str, suffix: str) -> None:
         counts = [int(item.get("count", 0)) for item in accessors if "bufferView" not in item]
         outside = [uri for uri in _gltf_uris(tree) if not _is_beside(uri)]
     except (ValueError, AttributeError, TypeError, OverflowError, RecursionError) as error:
-        raise ModelError(f"{name}: its JSON part cannot be read ({_reason(error)}); export the file again") from error
+        raise ModelError(f"{name}: its JSON part cannot be read ({reason_of(error)}); export the file again") from error
     if outside:
         raise ModelError(f"{name}: names {outside[0][:80]!r}, which is outside its folder; export it as .glb")
     if max(counts, default=0) > size:
@@ -1263,7 +1266,7 @@ def _read_npy(stream: IO[bytes], size: int, name: str) -> npt.NDArray[Any]:
     except (ModelError, OSError, MemoryError):
         raise
     except Exception as error:  # its header is Python text and its data may be packed: anything may break
-        raise ModelError(f"{name}: is not a NumPy array file ({_reason(error)}); check the suffix") from error
+        raise ModelError(f"{name}: is not a NumPy array file ({reason_of(error)}); check the suffix") from error
 
 
 def read_npz(stream: IO[bytes], name: str) -> dict[str, npt.NDArray[Any]]:
@@ -1296,7 +1299,7 @@ def read_npz(stream: IO[bytes], name: str) -> dict[str, npt.NDArray[Any]]:
     except (ModelError, MemoryError):
         raise
     except Exception as error:  # its directory and its packed data may be damaged in any way
-        raise ModelError(f"{name}: is not a complete .npz file ({_reason(error)}); copy or save it again") from error
+        raise ModelError(f"{name}: is not a complete .npz file ({reason_of(error)}); copy or save it again") from error
     return arrays
 
 
@@ -1332,7 +1335,7 @@ def _read_asc(
             f"{name}: truncated: declares {columns:g} x {rows:g} heights, but {len(text) - at} bytes follow; "
             "copy it again"
         )
-    heights = _numbers(text[at:], name)
+    heights = parse_numbers(text[at:], name)
     if len(heights) != columns * rows:
         raise ModelError(
             f"{name}: declares {columns:g} x {rows:g} = {columns * rows:g} heights, but {len(heights)} "

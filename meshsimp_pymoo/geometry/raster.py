@@ -26,10 +26,10 @@ from meshsimp_pymoo.geometry.load import (
     NoFullGrid,
     SourceMesh,
     Window,
-    _reason,
-    _warn,
     check_window,
     grid_mesh,
+    reason_of,
+    warn_of,
 )
 
 __all__ = ["RasterHeights", "count_raster_samples", "read_raster"]
@@ -231,7 +231,7 @@ def _guarded(name: str) -> Iterator[None]:
     except (ModelError, ModelWarning, MemoryError):
         raise
     except Exception as error:  # GDAL's own errors, and what its answers break in a damaged file
-        raise ModelError(f"{name}: cannot be read as a GeoTIFF ({_reason(error)}); export it again") from error
+        raise ModelError(f"{name}: cannot be read as a GeoTIFF ({reason_of(error)}); export it again") from error
 
 
 @contextlib.contextmanager
@@ -371,7 +371,7 @@ def _georeference(raster: Any, name: str) -> dict[str, Any]:
         facts |= {"crs": crs.to_wkt(), "epsg": crs.to_epsg()}
         facts["unit"] = crs.linear_units if crs.is_projected else "degree"
         if crs.is_geographic:
-            _warn(
+            warn_of(
                 f"{name}: its coordinates are degrees, its heights are not; triangles are shaped in degrees: for "
                 "shapes in metres project it first (gdalwarp -t_srs)"
             )

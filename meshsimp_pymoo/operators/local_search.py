@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from meshsimp_pymoo.baselines.greedy import _thin
+from meshsimp_pymoo.baselines.greedy import thin_live
 from meshsimp_pymoo.geometry.borrow import borrowed
 from meshsimp_pymoo.geometry.error import thread_pool
 from meshsimp_pymoo.geometry.live import (
@@ -21,11 +21,11 @@ from meshsimp_pymoo.geometry.live import (
     N_SITES,
     Ground,
     Live,
-    _total,
     build,
     exchange,
     lent_live,
     make_ground,
+    total_cost,
     try_exchange,
 )
 from meshsimp_pymoo.operators.requirements import summed_measure
@@ -143,7 +143,7 @@ def _anneal(
     near, fill, on_border, drop = shares
     site = live.site
     count = live.tally
-    now = _total(live)
+    now = total_cost(live)
     best = now
     n_best = n_movable
     best_movable[:n_best] = movable[:n_best]
@@ -198,7 +198,7 @@ def _anneal(
         else:
             n_movable -= 1
             movable[q] = movable[n_movable]
-        now = _total(live)
+        now = total_cost(live)
         if now < best:
             best = now
             kept_best = False
@@ -254,7 +254,8 @@ def _thin_to(ground: Ground, live: Live, pinned: NDArray[np.bool_], triangles: i
     if live.tally[N_EMITTED] > triangles:
         sites = np.flatnonzero(live.site[: len(pinned)])
         n = len(sites) + 1
-        _thin(ground, live, sites, pinned, triangles, np.inf, np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64))
+        removed, error, counts = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
+        thin_live(ground, live, sites, pinned, triangles, np.inf, removed, error, counts)
 
 
 def relocate(
@@ -327,7 +328,7 @@ def relocate(
         _fit(ground, live, pinned, N_EMITTED, triangles, state)
     result = live.site[:n] == 1
     rows = np.flatnonzero(result & ~pinned)
-    total = max(float(_total(live)), 0.0)
+    total = max(float(total_cost(live)), 0.0)
     if moves > 0 and np.isfinite(total):
         movable = np.empty(n, np.int64)
         movable[: len(rows)] = rows

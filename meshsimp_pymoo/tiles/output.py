@@ -36,23 +36,23 @@ from meshsimp_pymoo.results import (
     MESH_FORMATS,
     MESHES_BY_DEFAULT,
     ResultError,
-    _partial_folder,
-    _path_from,
-    _put_in_place,
-    _read_csv,
-    _short,
-    _single_precision_shift,
-    _spelled,
-    _warn_of_shift,
-    _write_csv,
-    _write_npz,
     even_selection,
     local_origin,
     mesh_suffix,
     new_file,
     package_versions,
+    partial_folder,
+    path_from,
+    put_in_place,
+    read_front_csv,
     refuse_format,
+    short_reason,
+    single_precision_shift,
+    spelled_value,
+    warn_of_shift,
+    write_csv,
     write_mesh,
+    write_npz,
 )
 from meshsimp_pymoo.runs import locked
 from meshsimp_pymoo.tiles.front import TiledFront
@@ -110,7 +110,7 @@ def write_tiled_front(
     partial = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        partial = _partial_folder(target)
+        partial = partial_folder(target)
         with_mesh = set(even_selection(count, meshes))
         if with_mesh:
             (partial / "meshes").mkdir()
@@ -127,13 +127,13 @@ def write_tiled_front(
                     _write(partial / path, grid, mesh.samples, mesh.faces, look)
                 if row == chosen:
                     _write_chosen(partial, grid, mesh, suffix, piece_size, look)
-            numbers = [_spelled(column, getattr(quality, column)) for column in FRONT_COLUMNS[1:-1]]
+            numbers = [spelled_value(column, getattr(quality, column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path])
         if with_mesh or chosen is not None:
             _warn(front, mesh_format)
-        _write_csv(partial / "front.csv", FRONT_COLUMNS, rows)
+        write_csv(partial / "front.csv", FRONT_COLUMNS, rows)
         moved = [np.empty(0, np.int64) if new is None else grid.source_rows(new) for new in front.moved[::-1]]
-        _write_npz(
+        write_npz(
             partial / NESTED_FILE,
             rows=grid.source_rows(front.samples),
             level=front.level,
@@ -144,7 +144,7 @@ def write_tiled_front(
         record = dict(run or {}) | {
             "model": {
                 "name": grid.name,
-                "file": _path_from(target, grid.name),
+                "file": path_from(target, grid.name),
                 "hash": grid.hash,
                 "vertices": grid.n_samples,
                 "triangles": grid.n_triangles,
@@ -161,12 +161,12 @@ def write_tiled_front(
         (partial / "run.json").write_text(text + "\n", encoding="utf-8")
         if extra is not None:
             extra(partial)
-        _put_in_place(partial, target, Path(folder), overwrite=True)
+        put_in_place(partial, target, Path(folder), overwrite=True)
     except OSError as problem:
         _remove(partial)
         raise ResultError(
-            f"{folder}: cannot be written ({_short(problem)}); what is finished stays there: mend that, and the same "
-            "call goes on"
+            f"{folder}: cannot be written ({short_reason(problem)}); what is finished stays there: mend that, and "
+            "the same call goes on"
         ) from None
     except BaseException:
         _remove(partial)
@@ -217,7 +217,7 @@ def _warn(front: TiledFront, mesh_format: str) -> None:
         return
     points = front.grid.file_points(front.samples)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    _warn_of_shift(front.grid.name, diagonal, mesh_format, _single_precision_shift(points))
+    warn_of_shift(front.grid.name, diagonal, mesh_format, single_precision_shift(points))
 
 
 def _write_chosen(
@@ -266,7 +266,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     from meshsimp_pymoo.geometry.error import Quality
 
     folder = Path(folder)
-    columns = _read_csv(folder / "front.csv")[0]
+    columns = read_front_csv(folder / "front.csv")[0]
     record = _read_record(folder)
     if record["model"]["hash"] != grid.hash:
         raise ResultError(f"{folder}: is not a front of {grid.name}, whose heights or spacing are others")

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from meshsimp_pymoo.baselines.greedy import _thin
+from meshsimp_pymoo.baselines.greedy import thin_live
 from meshsimp_pymoo.geometry.live import END, build, lent_live, make_ground
 from meshsimp_pymoo.geometry.model import OpenModel, vector_order
 from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD
@@ -118,7 +118,7 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     removed = np.empty(n, np.int64)
     error = np.empty(n + 1)
     triangles = np.empty(n + 1, np.int64)
-    n_removed = _thin(ground, live, sites, fixed, 0, FORESIGHT * 2.0 * tile.limit, removed, error, triangles)
+    n_removed = thin_live(ground, live, sites, fixed, 0, FORESIGHT * 2.0 * tile.limit, removed, error, triangles)
     level = hull_levels(triangles[0] - triangles[: n_removed + 1], error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
     return number[removed[:n_wanted]], level[:n_wanted]

@@ -225,7 +225,7 @@ def test_a_disk_that_is_full_or_read_only_is_named_and_what_was_finished_stays(
     assert contents(out) == whole
 
 
-@pytest.mark.parametrize("name", ["write_mesh", "_write_csv", "_write_npz", "_put_in_place"])
+@pytest.mark.parametrize("name", ["write_mesh", "write_csv", "write_npz", "put_in_place"])
 def test_a_disk_that_is_full_when_the_result_is_written_leaves_all_tiles(
     path, whole, tmp_path, capsys, monkeypatch, name
 ):
