@@ -220,6 +220,7 @@ def _environment() -> Any:
 def _guarded(name: str) -> Iterator[None]:
     """Say in one line what GDAL and rasterio say, and ignore their warnings."""
     try:
+        import rasterio  # noqa: F401 - its parts may have been imported where it is missing now
         from rasterio.errors import NotGeoreferencedWarning
     except ImportError:
         raise ModelError(f"{name}: GeoTIFF needs rasterio; install it by pip install 'meshsimp-pymoo[geo]'") from None
