@@ -51,9 +51,11 @@ LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
 # The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
 IDLE = 12
-# In the final front neighbours differ by this share of the error, with at most so many meshes between two rungs and so
-# many entries of their subsets in all.
-STEP = 0.008
+# In the final front neighbours differ by this share of the error, or by the smaller one where a rung is better than the
+# thinned model by less than twice the first, so that no gap is worse than thinning; with at most so many meshes between
+# two rungs and so many entries of their subsets in all.
+STEP = 0.015
+SMALL_STEP = 0.008
 BETWEEN = 24
 ENTRIES = 2e8
 
@@ -289,13 +291,15 @@ def between_the_rungs(
     def one(k: int) -> list[NDArray[np.bool_]]:
         low, high = F[order[k - 1], 1], F[order[k], 1]
         ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
-        n_rows = min(max(int(np.log(max(ratio, 1.0)) / STEP), 1), BETWEEN, most_rows)
+        by_thinning = _best_of(thinned, high)[0]
+        step = STEP if F[order[k], 0] < (1.0 - 2.0 * STEP) * by_thinning else SMALL_STEP
+        n_rows = min(max(int(np.log(max(ratio, 1.0)) / step), 1), BETWEEN, most_rows)
         wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
         wanted = wanted[(wanted > low) & (wanted < high)]
         if not len(wanted):
             return []
         fronts = [thinned]
-        if F[order[k], 0] < _best_of(thinned, high)[0]:
+        if F[order[k], 0] < by_thinning:
             # The rung is better than the thinned model: so may be what it is thinned to.
             fronts.append(
                 thinning(
