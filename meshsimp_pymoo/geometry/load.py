@@ -1249,7 +1249,9 @@ def _read_npy(stream: IO[bytes], size: int, name: str) -> npt.NDArray[Any]:
     try:
         version = np.lib.format.read_magic(stream)
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read_header(stream)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about the header's spelling: Python 2's, or backslashes
+            shape, _, dtype = read_header(stream)
         if dtype.hasobject:
             raise ModelError(f"{name}: holds Python objects, which are never unpickled; save numbers")
         needed = math.prod(shape) * dtype.itemsize
@@ -1260,7 +1262,9 @@ def _read_npy(stream: IO[bytes], size: int, name: str) -> npt.NDArray[Any]:
                 f"copy or save it again"
             )
         stream.seek(0)
-        array = np.lib.format.read_array(stream, allow_pickle=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            array = np.lib.format.read_array(stream, allow_pickle=False)
         stream.read(1)  # reaching the end makes an archive compare its checksum
         return array
     except (ModelError, OSError, MemoryError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -291,7 +292,9 @@ def count_samples(model: str | os.PathLike[str], *, window: Window | None = None
 
 def _map_array(path: Path) -> npt.NDArray[Any]:
     try:
-        heights = np.load(path, mmap_mode="r", allow_pickle=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about the header's spelling
+            heights = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as problem:  # its header is Python text: anything may break
         reason = str(problem).strip().splitlines()
         raise ModelError(

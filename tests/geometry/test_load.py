@@ -27,6 +27,7 @@ from meshsimp_pymoo.geometry.load import (
     grid_source,
     read_source,
 )
+from meshsimp_pymoo.tiles.grid import open_grid
 
 # A pyramid without its base: five vertices, four faces, and coordinates that no float32 holds.
 POINTS = np.array([[0.1, 0.2, 0.3], [1.1, 0, 0], [1, 1.7, 0], [0, 1, 0], [0.5, 0.5, 1 / 3]])
@@ -642,6 +643,16 @@ def test_grids_that_are_none_are_refused():
     ]:
         with pytest.raises(ModelError, match=match):
             grid_source(elevation, dx)
+
+
+@pytest.mark.parametrize("load", [read_source, open_grid])
+def test_the_spelling_of_a_numpy_header_is_no_concern_of_the_user(tmp_path, load):
+    """A header of Python 2, which NumPy reads and warns of."""
+    np.save(tmp_path / "new.npy", np.arange(12.0).reshape(3, 4))
+    content = (tmp_path / "new.npy").read_bytes()
+    assert b"(3, 4), }  " in content
+    (tmp_path / "old.npy").write_bytes(content.replace(b"(3, 4), }  ", b"(3L, 4L), }"))
+    load(tmp_path / "old.npy")
 
 
 def test_npy_and_npz_carry_heights_and_spacing(tmp_path):
