@@ -181,6 +181,8 @@ def moves():
 
 def passes():
     """One pass of thinning and of greedy insertion, all sizes, one core."""
+    for run in (thinning, greedy_insertion):
+        run(MeshProblem("jacksboro:12").model)
     table = Table("model", "N", "thinning s", "greedy insertion s", title="Greedy passes")
     for model in (MeshProblem("jacksboro:1").model, million()):
         model.kernel_arguments  # noqa: B018 - made once a model
