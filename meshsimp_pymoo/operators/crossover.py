@@ -574,7 +574,7 @@ class RegionCrossover(_PairCrossover):
 
 
 def region_starts(n_regions: int, n_vertices: int) -> NDArray[np.int64]:
-    """Return the first vertex of each region: vertex i is in region i * n_regions // n_vertices.
+    """Return the first vertex of each region, (n_regions,): vertex i is in region i * n_regions // n_vertices.
 
     Examples
     --------
@@ -585,7 +585,14 @@ def region_starts(n_regions: int, n_vertices: int) -> NDArray[np.int64]:
 
 
 def price_of_a_triangle(error: NDArray[np.float64], triangles: NDArray[np.integer]) -> float:
-    """Return the error that a triangle is worth, from the errors (2,) and the triangles (2,) of two parents.
+    """Return the error [model units] that a triangle is worth: the geometric mean of two parents' error per triangle.
+
+    Parameters
+    ----------
+    error : (2,) float array
+        Summed error of each parent [model units].
+    triangles : (2,) int array
+        Triangles of each; 0 counts as 1.
 
     Examples
     --------
@@ -601,9 +608,15 @@ def cheaper_parent(excess: NDArray[np.float64], differs: NDArray[np.bool_]) -> N
     Parameters
     ----------
     excess : (n,) float array
-        What the first parent costs more.
+        What the first parent costs more [model units].
     differs : (n,) bool array
         Where the parents differ; with fewer than two such regions there are only copies.
+
+    Returns
+    -------
+    (n,) bool array
+        True where the second parent costs less. Where that would be one parent's copy, the region in which the choice
+        matters least is the other one's.
     """
     second = excess > 0.0
     rows = np.flatnonzero(differs)

@@ -99,7 +99,7 @@ class Relocation(Mutation):
     Raises
     ------
     ValueError
-        If one of the numbers is negative.
+        If one of the numbers is negative or ``prob`` not in [0, 1], and when the problem minimises the maximum.
     TypeError
         When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
     """
@@ -112,7 +112,7 @@ class Relocation(Mutation):
         temperature: float = 0.2,
         prob: float = 1.0,
     ) -> None:
-        super().__init__(prob=prob)
+        super().__init__(prob=require_probability("prob", prob))
         given = {"moves_per_vertex": moves_per_vertex, "max_moves": max_moves, "temperature": temperature}
         for name, value in given.items():
             if not value >= 0:
@@ -124,9 +124,7 @@ class Relocation(Mutation):
     def _do(
         self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
     ) -> NDArray[np.bool_]:
-        pinned = pinned_vertices(problem, self)
-        mesh_neighbours(problem, self)
-        require_bool(X, self)
+        pinned = _require_mesh(problem, X, self)
         moves = self.moves_per_vertex * (X & ~pinned).sum(axis=1)
         total = moves.sum()
         if total > self.max_moves:
@@ -151,7 +149,7 @@ class SizeStep(Mutation):
     Raises
     ------
     ValueError
-        If ``step`` is negative.
+        If ``step`` is negative or ``prob`` not in [0, 1], and when the problem minimises the maximum.
     TypeError
         When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
     """
@@ -165,9 +163,7 @@ class SizeStep(Mutation):
     def _do(
         self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
     ) -> NDArray[np.bool_]:
-        pinned = pinned_vertices(problem, self)
-        mesh_neighbours(problem, self)
-        require_bool(X, self)
+        pinned = _require_mesh(problem, X, self)
         if self.step == 0:
             return X.copy()
         free = (X & ~pinned).sum(axis=1)
@@ -176,6 +172,14 @@ class SizeStep(Mutation):
         wanted = np.where(wanted == free, free + np.where(draw < 0.0, -1, 1), wanted)
         sizes = pinned.sum() + np.clip(wanted, 0, int((~pinned).sum()))
         return relocate_all(problem, X, np.zeros(len(X), int), random_state, sizes=sizes)
+
+
+def _require_mesh(problem: Any, X: NDArray[np.bool_], operator: object) -> NDArray[np.bool_]:
+    """Return the pinned vertices (N,) of a mesh problem; refuse other problems, and chromosomes that are not bool."""
+    pinned = pinned_vertices(problem, operator)
+    mesh_neighbours(problem, operator)
+    require_bool(X, operator)
+    return pinned
 
 
 def shift_kept(

@@ -13,7 +13,7 @@ from pymoo.core.population import Population
 from stand_in_problem import GridProblem
 
 from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.operators import NeighbourShift, SizeStep
+from meshsimp_pymoo.operators import NeighbourShift, Relocation, SizeStep
 from meshsimp_pymoo.operators import mutation as module
 from meshsimp_pymoo.operators.mutation import bernoulli_positions
 
@@ -203,3 +203,12 @@ def test_a_size_step_at_either_end_stays_there_or_comes_back() -> None:
 def test_an_impossible_step_is_refused_with_its_value() -> None:
     with pytest.raises(ValueError, match=r"step = -0\.1 is no number"):
         SizeStep(-0.1)
+
+
+@pytest.mark.parametrize("mutation", [Relocation, SizeStep])
+def test_what_lowers_sums_refuses_the_maximum_and_impossible_probabilities(mutation: type) -> None:
+    with pytest.raises(ValueError, match=r"prob = 1\.2 is not a probability"):
+        mutation(prob=1.2)
+    problem = MeshProblem("peaks:6", objectives=("max_error", "triangles"))
+    with pytest.raises(ValueError, match=r"the first objective is the maximum, 'max_error'; use objectives="):
+        mutation()._do(problem, np.ones((2, problem.n_var), bool), random_state=np.random.default_rng(1))
