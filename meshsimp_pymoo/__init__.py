@@ -30,18 +30,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.algorithms import moead, nsga2_v1, nsga2_v2, nsga3, weighted_ga_v1, weighted_ga_v2
-    from meshsimp_pymoo.baselines.greedy import greedy_insertion, thinning
-    from meshsimp_pymoo.display import FrontOutput
-    from meshsimp_pymoo.engines import DaskEngine, Processes
+    from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
     from meshsimp_pymoo.front import Front, FrontSolution
-    from meshsimp_pymoo.geometry.error import Quality
-    from meshsimp_pymoo.geometry.live import LiveTriangulation
-    from meshsimp_pymoo.geometry.load import ModelError, ModelWarning
-    from meshsimp_pymoo.geometry.model import OpenModel
-    from meshsimp_pymoo.geometry.refit import Refitted, refit_heights
-    from meshsimp_pymoo.memetic_search import memetic
-    from meshsimp_pymoo.operators import (
+    from meshsimp_pymoo.problem import MeshProblem
+    from meshsimp_pymoo.report.figures import plot_error, plot_front, plot_mesh
+    from meshsimp_pymoo.search.display import FrontOutput
+    from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
+    from meshsimp_pymoo.search.memetic import memetic
+    from meshsimp_pymoo.search.operators import (
         OAX,
         HalfPlaneCrossover,
         NeighbourShift,
@@ -54,22 +50,26 @@ if TYPE_CHECKING:
         SizeStep,
         SubsetUniformCrossover,
     )
-    from meshsimp_pymoo.problem import MeshProblem
-    from meshsimp_pymoo.report.figures import plot_error, plot_front, plot_mesh
-    from meshsimp_pymoo.results import ResultError, read_front, write_front
+    from meshsimp_pymoo.search.presets import moead, nsga2_v1, nsga2_v2, nsga3, weighted_ga_v1, weighted_ga_v2
+    from meshsimp_pymoo.storage import read_front, write_front
+    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.live import LiveTriangulation
+    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.refit import Refitted, refit_heights
     from meshsimp_pymoo.tiles.front import tiled_front
     from meshsimp_pymoo.tiles.grid import open_grid
+    from meshsimp_pymoo.workers import DaskEngine, Processes
 
 _HOMES = {
-    "memetic_search": ("memetic",),
-    "algorithms": ("moead", "nsga2_v1", "nsga2_v2", "nsga3", "weighted_ga_v1", "weighted_ga_v2"),
-    "geometry.error": ("Quality",),
-    "geometry.load": ("ModelError", "ModelWarning"),
-    "geometry.model": ("OpenModel",),
-    "geometry.live": ("LiveTriangulation",),
-    "geometry.refit": ("Refitted", "refit_heights"),
-    "baselines.greedy": ("greedy_insertion", "thinning"),
-    "operators": (
+    "search.memetic": ("memetic",),
+    "search.presets": ("moead", "nsga2_v1", "nsga2_v2", "nsga3", "weighted_ga_v1", "weighted_ga_v2"),
+    "surface.evaluate": ("Quality",),
+    "errors": ("ModelError", "ModelWarning", "ResultError"),
+    "surface.model": ("OpenModel",),
+    "surface.live": ("LiveTriangulation",),
+    "surface.refit": ("Refitted", "refit_heights"),
+    "search.greedy": ("greedy_insertion", "thinning"),
+    "search.operators": (
         "OAX",
         "HalfPlaneCrossover",
         "NeighbourShift",
@@ -83,13 +83,13 @@ _HOMES = {
         "SubsetUniformCrossover",
     ),
     "problem": ("MeshProblem",),
-    "display": ("FrontOutput",),
+    "search.display": ("FrontOutput",),
     "front": ("Front", "FrontSolution"),
     "report.figures": ("plot_error", "plot_front", "plot_mesh"),
-    "results": ("ResultError", "read_front", "write_front"),
+    "storage": ("read_front", "write_front"),
     "tiles.front": ("tiled_front",),
     "tiles.grid": ("open_grid",),
-    "engines": ("DaskEngine", "Processes"),
+    "workers": ("DaskEngine", "Processes"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

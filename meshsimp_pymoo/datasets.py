@@ -30,7 +30,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, Window, grid_source, is_there, read_source
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.files import is_there
+from meshsimp_pymoo.formats.load import SourceMesh, Window, grid_source, read_source
 
 __all__ = ["describe", "find_source", "load", "names"]
 
@@ -148,7 +150,7 @@ def find_source(
         A mesh, grid or cloud file, or the name of a built-in model. A file wins over a built-in model of the same
         name.
     spacing, nodata, window, max_edge : optional
-        Passed on to :func:`~meshsimp_pymoo.geometry.load.read_source`; for files only.
+        Passed on to :func:`~meshsimp_pymoo.formats.load.read_source`; for files only.
 
     Raises
     ------

@@ -25,31 +25,28 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.analysis import knee
-from meshsimp_pymoo.geometry.error import ERROR, TRIANGLES, Quality, Simplified
-from meshsimp_pymoo.geometry.load import ModelError
-from meshsimp_pymoo.geometry.refit import Refitted, refit_heights
-from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.operators.sampling import NestedSubsets, nested_front
+from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.files import claim_file, new_file
+from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.results import (
+from meshsimp_pymoo.search.operators.sampling import NestedSubsets, nested_front
+from meshsimp_pymoo.storage import (
     MESH_SUFFIXES,
     MESHES_BY_DEFAULT,
-    ResultError,
-    claim_file,
     even_selection,
-    new_file,
     read_front,
     write_front,
     write_solution,
 )
+from meshsimp_pymoo.surface.evaluate import ERROR, TRIANGLES, Quality, Simplified
+from meshsimp_pymoo.surface.refit import Refitted, refit_heights
 
 if TYPE_CHECKING:
     import pandas
     import trimesh
     from matplotlib.axes import Axes
 
-    from meshsimp_pymoo.geometry.model import OpenModel
+    from meshsimp_pymoo.surface.model import OpenModel
 
 __all__ = ["Front", "FrontSolution", "starting_front"]
 
@@ -165,7 +162,7 @@ class FrontSolution:
         return self.front.problem.mesh(self.kept)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.results.write_mesh`.
+        """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.storage.write_mesh`.
 
         A mesh that the front's folder holds in this format is copied.
 
@@ -511,7 +508,7 @@ class Front(Sequence[FrontSolution]):
         return self[int(fitting[0])]
 
     def knee(self) -> FrontSolution:
-        """Return the best compromise; see :func:`meshsimp_pymoo.analysis.knee`."""
+        """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
         return self[knee(self.F)]
 
     # ------------------------------------------------------------------------------------------- showing and writing it
@@ -552,7 +549,7 @@ class Front(Sequence[FrontSolution]):
             The solution to write as ``chosen.<mesh_format>`` too.
         refit : bool
             Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
-            :func:`~meshsimp_pymoo.geometry.refit.refit_heights`.
+            :func:`~meshsimp_pymoo.surface.refit.refit_heights`.
         page : bool
             Write ``report.html``, the page on which to look at the solutions and choose one.
         run : mapping, optional

@@ -39,6 +39,7 @@ __all__ = [
     "coverage",
     "epsilon",
     "hypervolume_ratio",
+    "knee",
     "non_dominated",
 ]
 
@@ -289,6 +290,37 @@ def cardinality(F: ArrayLike) -> int:
     2
     """
     return len(non_dominated(F, "the front"))
+
+
+def knee(front: ArrayLike) -> int:
+    """Return the knee of a front: the solution farthest below the line between its ends, scaled to [0, 1].
+
+    There is always exactly one [1]_; of equal ones, the first.
+
+    Parameters
+    ----------
+    front : (n, 2) array-like
+        (error, triangles), non-dominated, in any order.
+
+    Returns
+    -------
+    int
+        Row of ``front``.
+
+    References
+    ----------
+    .. [1] I. Das, "On characterizing the 'knee' of the Pareto curve based on normal-boundary intersection",
+       Structural Optimization 18, 1999.
+
+    Examples
+    --------
+    >>> knee([[10, 2], [1, 4], [0, 20]])
+    1
+    """
+    F = checked_objectives(front, "the front")
+    extent = np.ptp(F, axis=0)
+    scaled = (F - F.min(axis=0)) / np.where(extent > 0, extent, 1.0)
+    return int(np.argmin(scaled.sum(axis=1).round(12)))
 
 
 class _FrontIndicator(Indicator):

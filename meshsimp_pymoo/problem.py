@@ -17,7 +17,9 @@ import trimesh
 from pymoo.core.problem import ElementwiseProblem, Problem
 
 from meshsimp_pymoo.datasets import find_source
-from meshsimp_pymoo.geometry.error import (
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.load import SourceMesh, Window
+from meshsimp_pymoo.surface.evaluate import (
     FOOTPRINTS,
     MEASURES,
     OUTSIDES,
@@ -29,9 +31,8 @@ from meshsimp_pymoo.geometry.error import (
     evaluate_subsets,
     simplify,
 )
-from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, Window
-from meshsimp_pymoo.geometry.model import OpenModel, load_model
-from meshsimp_pymoo.geometry.orient import Up
+from meshsimp_pymoo.surface.model import OpenModel, load_model
+from meshsimp_pymoo.surface.orient import Up
 
 BoolArray = npt.NDArray[np.bool_]
 FloatArray = npt.NDArray[np.float64]
@@ -102,10 +103,10 @@ class MeshProblem(ElementwiseProblem):
         for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's frame.
     objectives : tuple of str
         What is minimised: one or more of "error" (the sum of w_p d_p), "rms_error" and "max_error" (see
-        :class:`~meshsimp_pymoo.geometry.error.Quality`), then "triangles". All come from the same evaluation.
+        :class:`~meshsimp_pymoo.surface.evaluate.Quality`), then "triangles". All come from the same evaluation.
     weights : str or array, optional
         How much each vertex counts in the error: one number for each row of the file, or the name of one of its
-        per-vertex attributes; see :meth:`~meshsimp_pymoo.geometry.model.OpenModel.with_weights`. 1 by default.
+        per-vertex attributes; see :meth:`~meshsimp_pymoo.surface.model.OpenModel.with_weights`. 1 by default.
     max_triangles : int, optional
         Largest number of triangles, as a pymoo constraint.
     max_error : float, optional
@@ -116,7 +117,7 @@ class MeshProblem(ElementwiseProblem):
         Number of chromosomes whose numbers are remembered, so that they are not triangulated again; 0: none.
     regions : int
         In how many regions, runs of the vector of equal length, the error is kept with each solution as well, for
-        :class:`~meshsimp_pymoo.operators.RegionCrossover`; none by default.
+        :class:`~meshsimp_pymoo.search.operators.RegionCrossover`; none by default.
     elementwise_runner : callable, optional
         Any pymoo runner in place of the threads.
     **kwargs
@@ -238,7 +239,7 @@ class MeshProblem(ElementwiseProblem):
     def evaluate_subsets(self, X: npt.NDArray[Any], *, n_threads: int = 1) -> FloatArray:
         """Evaluate chromosomes (P, N) together, each different one once; return the table (P, 6 + regions).
 
-        See :func:`meshsimp_pymoo.geometry.error.evaluate_subsets` for its columns. Pinned vertices are added first.
+        See :func:`meshsimp_pymoo.surface.evaluate.evaluate_subsets` for its columns. Pinned vertices are added first.
         """
         _require_bool(X)
         X = np.asarray(X) | self.pinned
@@ -373,7 +374,7 @@ def open_model(
     window: Window | None = None,
     max_edge: float | None = None,
 ) -> OpenModel:
-    """Read a mesh from a file, a built-in name or memory; see :func:`meshsimp_pymoo.geometry.model.load_model`."""
+    """Read a mesh from a file, a built-in name or memory; see :func:`meshsimp_pymoo.surface.model.load_model`."""
     if isinstance(model, (str, Path)):
         model = find_source(model, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
     return load_model(model, up=up, patch=patch)

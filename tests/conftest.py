@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from browser import launched, playwright_engine
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -29,6 +30,20 @@ def oracle() -> Path:
     if not script.is_file():
         pytest.skip("no independent referee: vertical_error.py is not beside this checkout")
     return script
+
+
+@pytest.fixture(scope="module")
+def engine():
+    """Return Playwright; its event loop ends with the module, so that other tests may have their own."""
+    with playwright_engine() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def browser(engine):
+    """Return a browser; tests that need it skip where there is none."""
+    with launched(engine) as found:
+        yield found
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

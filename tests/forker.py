@@ -72,7 +72,7 @@ def serve() -> None:
             arguments = [*warm, "--algorithm", algorithm, "--evaluations", budget, "-o", f"{folder}/{algorithm}"]
             assert main(arguments) == 0
         import meshsimp_pymoo.cli.experiments  # noqa: F401
-        from meshsimp_pymoo.geometry.error import _executors
+        from meshsimp_pymoo.workers import _executors
 
         # threads must not be there when a process forks
         for pool in _executors.values():

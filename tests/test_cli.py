@@ -23,12 +23,12 @@ from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 import meshsimp_pymoo
 from meshsimp_pymoo import Front, MeshProblem, memetic
-from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli.arguments import ALGORITHMS, FORMATS, SHELLS, make_parser
 from meshsimp_pymoo.cli.simplify import _mesh_problem as mesh_problem
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.results import MESH_FORMATS, MESHES_BY_DEFAULT, read_front, write_mesh
+from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.storage import MESH_FORMATS, MESHES_BY_DEFAULT, read_front, write_mesh
 
 QUICK = ("--generations", "3", "--population", "12")
 PAPERS = ("--algorithm", "nsga2_v1")

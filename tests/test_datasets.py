@@ -8,9 +8,9 @@ import pytest
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.datasets import describe, find_source, load, names
-from meshsimp_pymoo.geometry.error import simplify
-from meshsimp_pymoo.geometry.load import ModelError
-from meshsimp_pymoo.geometry.model import load_model
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.model import load_model
 
 SMALL = {"jacksboro": "jacksboro:40", "topobathy": "topobathy:9", "face": "face:300", "crater": "crater:13"}
 

@@ -31,12 +31,12 @@ import numpy as np
 import pytest
 from pymoo.algorithms.moo.nsga2 import NSGA2
 
-from meshsimp_pymoo import checkpoint
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.experiment import runner
-from meshsimp_pymoo.experiment.config import read_experiment_file
-from meshsimp_pymoo.results import CHECKPOINT, put_back, read_front
-from meshsimp_pymoo.runs import locked
+from meshsimp_pymoo.comparison import runner
+from meshsimp_pymoo.comparison.config import read_experiment_file
+from meshsimp_pymoo.files import locked, put_back
+from meshsimp_pymoo.search import checkpoint
+from meshsimp_pymoo.storage import CHECKPOINT, read_front
 
 sys.path.insert(0, str(Path(__file__).parent))
 from forker import Forker
@@ -157,7 +157,7 @@ def test_a_killed_search_goes_on_and_says_so(tmp_path, whole, monkeypatch, capsy
 
 @pytest.mark.parametrize("algorithm", ["memetic", "moead", "nsga2_v2"])
 def test_a_killed_search_of_every_preset_ends_with_the_same_bytes(tmp_path, monkeypatch, algorithm):
-    from meshsimp_pymoo.algorithms import PRESETS
+    from meshsimp_pymoo.search.presets import PRESETS
 
     kind = type(PRESETS[algorithm](pop_size=8))
     options = ("simplify", "face:60", "--algorithm", algorithm, "--population", "8", "--generations", "5", *PLAIN)
@@ -303,7 +303,7 @@ def test_ctrl_c_leaves_the_front_so_far_and_no_checkpoint(tmp_path, monkeypatch,
 def test_ctrl_c_while_writing_keeps_the_search(tmp_path, whole, monkeypatch, capsys):
     out = stopped(tmp_path / "out", monkeypatch)
     with monkeypatch.context() as patch:
-        patch.setattr("meshsimp_pymoo.results.put_in_place", lambda *_: stop(KeyboardInterrupt)())
+        patch.setattr("meshsimp_pymoo.files.put_in_place", lambda *_: stop(KeyboardInterrupt)())
         assert simplify(out) == 130
     assert "the same command goes on from the checkpoint" in one_line(capsys)
     assert simplify(out) == 0
@@ -480,7 +480,7 @@ def test_a_thread_that_cannot_be_started_is_a_memory_limit_too(tmp_path, monkeyp
         raise RuntimeError("can't start new thread")
 
     monkeypatch.setattr("threading.Thread.start", no_thread)
-    monkeypatch.setattr("meshsimp_pymoo.geometry.error._executors", {})
+    monkeypatch.setattr("meshsimp_pymoo.workers._executors", {})
     assert run("simplify", "face:150", "--population", "20", *PLAIN, "-o", tmp_path / "out") == 2
     assert "does not fit into memory" in one_line(capsys)
 
@@ -559,7 +559,7 @@ def test_a_killed_run_goes_on_within_the_run(config, tmp_path, all_runs, monkeyp
 
 
 def test_killed_runs_of_moead_go_on_too(config, tmp_path, all_runs, monkeypatch):
-    from meshsimp_pymoo.algorithms import TchebycheffMOEAD
+    from meshsimp_pymoo.search.presets import TchebycheffMOEAD
 
     begin, count = TchebycheffMOEAD._begin_generation, []
     config = read(config)

@@ -95,7 +95,7 @@ def test_a_cloud_becomes_a_tin_with_its_bay_open(cloud, tmp_path, capsys):
 
 
 def test_the_options_of_reading_reach_a_problem_and_an_experiment(cloud, tmp_path):
-    from meshsimp_pymoo.experiment.config import ConfigError, read_experiment_file
+    from meshsimp_pymoo.comparison.config import ConfigError, read_experiment_file
 
     text = (
         "problems: [{name: C, model: cloud.xyz, max_edge: 4}, {name: G, model: g.npy, window: [1, 0, 3, 4]}]\n"

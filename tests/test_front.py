@@ -33,14 +33,13 @@ from meshsimp_pymoo import (
     thinning,
     weighted_ga_v1,
 )
-from meshsimp_pymoo.analysis import knee
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.display import errors_at, usual_sizes
 from meshsimp_pymoo.front import starting_front
-from meshsimp_pymoo.geometry.error import simplify
-from meshsimp_pymoo.indicators import hypervolume_ratio
+from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
-from meshsimp_pymoo.results import FRONT_COLUMNS, read_front, write_mesh
+from meshsimp_pymoo.search.display import errors_at, usual_sizes
+from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front, write_mesh
+from meshsimp_pymoo.surface.evaluate import simplify
 
 
 @pytest.fixture(scope="module")

@@ -24,11 +24,12 @@ from meshsimp_pymoo import (
     RandomSubset,
     Relocation,
 )
-from meshsimp_pymoo.algorithms import memetic, moead, nsga2_v1, nsga2_v2, nsga3
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.geometry import error
-from meshsimp_pymoo.geometry.load import ModelError, SourceMesh, grid_source
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.load import SourceMesh, grid_source
 from meshsimp_pymoo.problem import ThreadRunner
+from meshsimp_pymoo.search.presets import memetic, moead, nsga2_v1, nsga2_v2, nsga3
+from meshsimp_pymoo.surface import evaluate as error
 
 
 @pytest.fixture(scope="module")

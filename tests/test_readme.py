@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.algorithms import PRESETS
 from meshsimp_pymoo.cli.arguments import make_parser
-from meshsimp_pymoo.experiment.config import read_experiment_file
-from meshsimp_pymoo.operators import OPERATORS
+from meshsimp_pymoo.comparison.config import read_experiment_file
+from meshsimp_pymoo.search.operators import OPERATORS
+from meshsimp_pymoo.search.presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -21,8 +21,9 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from meshsimp_pymoo.cli.arguments import UsageError, make_parser
+from meshsimp_pymoo.cli.arguments import make_parser
 from meshsimp_pymoo.cli.terminal import BAD_INPUT, INTERRUPTED, OK, interruptible, say, warnings_as_lines
+from meshsimp_pymoo.errors import InputError
 
 __all__ = ["main"]
 
@@ -64,20 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if str(problem) == NO_THREAD:
             say(NO_MEMORY)
             return BAD_INPUT
-        if not isinstance(problem, _input_errors()):
+        if not isinstance(problem, InputError):
             raise
         say(" ".join(str(problem).split()))
         return BAD_INPUT
-
-
-def _input_errors() -> tuple[type[Exception], ...]:
-    """Errors that mean bad input; their modules are loaded only once there is an error to compare."""
-    from meshsimp_pymoo.geometry.load import ModelError
-    from meshsimp_pymoo.results import ResultError
-
-    errors: tuple[type[Exception], ...] = (UsageError, ModelError, ResultError)
-    if "meshsimp_pymoo.experiment.config" in sys.modules:
-        from meshsimp_pymoo.experiment.config import ConfigError
-
-        errors += (ConfigError,)
-    return errors

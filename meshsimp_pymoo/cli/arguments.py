@@ -14,7 +14,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
-__all__ = ["ALGORITHMS", "DEFAULT_GENERATIONS", "FORMATS", "SHELLS", "UsageError", "make_parser"]
+from meshsimp_pymoo.errors import UsageError
+
+__all__ = ["ALGORITHMS", "DEFAULT_GENERATIONS", "FORMATS", "SHELLS", "make_parser"]
 
 # Four times the paper's budget: its 50 generations take a second at its sizes and leave much to gain.
 DEFAULT_GENERATIONS = 200
@@ -96,10 +98,6 @@ examples:
   meshsimp completion zsh > "${fpath[1]}/_meshsimp"
       zsh, always
 """
-
-
-class UsageError(ValueError):
-    """The command line cannot be understood."""
 
 
 class _Parser(argparse.ArgumentParser):

@@ -10,15 +10,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.cli.arguments import UsageError
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, bar, say
+from meshsimp_pymoo.errors import UsageError
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.engines import DaskEngine
-from meshsimp_pymoo.experiment.config import read_experiment_file
-from meshsimp_pymoo.experiment.runner import run_experiment
-from meshsimp_pymoo.report.experiment import write_report
-from meshsimp_pymoo.results import read_front
+    from meshsimp_pymoo.workers import DaskEngine
+from meshsimp_pymoo.comparison.config import read_experiment_file
+from meshsimp_pymoo.comparison.report import write_report
+from meshsimp_pymoo.comparison.runner import run_experiment
+from meshsimp_pymoo.storage import read_front
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _cluster(address: str) -> DaskEngine:
-    from meshsimp_pymoo.engines import DaskEngine, EngineError
+    from meshsimp_pymoo.workers import DaskEngine, EngineError
 
     try:
         return DaskEngine(address)
@@ -68,8 +68,8 @@ def report(args: argparse.Namespace) -> int:
 
 
 def _write_front_page(args: argparse.Namespace, out: Path) -> int:
-    from meshsimp_pymoo.analysis import knee
     from meshsimp_pymoo.front import Front
+    from meshsimp_pymoo.indicators import knee
     from meshsimp_pymoo.report.page import write_page
 
     front = Front.load(out, model=args.model)

@@ -21,8 +21,8 @@ def info(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from meshsimp_pymoo.geometry.load import ModelError
-    from meshsimp_pymoo.geometry.orient import front_patch, surface_facts, up_direction, upright_rotation
+    from meshsimp_pymoo.errors import ModelError
+    from meshsimp_pymoo.surface.orient import front_patch, surface_facts, up_direction, upright_rotation
 
     source = datasets.find_source(
         args.model, spacing=args.spacing, nodata=args.nodata, window=args.window, max_edge=args.max_edge

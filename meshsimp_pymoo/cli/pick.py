@@ -6,11 +6,12 @@ import argparse
 import json
 from dataclasses import asdict
 
-from meshsimp_pymoo.cli.arguments import UsageError
 from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
 from meshsimp_pymoo.cli.tiled import pick_tiled
+from meshsimp_pymoo.errors import UsageError
+from meshsimp_pymoo.files import claim_file
 from meshsimp_pymoo.front import Front, FrontSolution
-from meshsimp_pymoo.results import MESH_SUFFIXES, claim_file
+from meshsimp_pymoo.storage import MESH_SUFFIXES
 from meshsimp_pymoo.tiles.output import is_tiled
 
 

@@ -8,13 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.arguments import UsageError
 from meshsimp_pymoo.cli.terminal import OK, described
 from meshsimp_pymoo.datasets import find_source
+from meshsimp_pymoo.errors import UsageError
+from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.front import Front
-from meshsimp_pymoo.geometry.error import mesh_deviation, mesh_quality
 from meshsimp_pymoo.problem import open_model
-from meshsimp_pymoo.results import claim_file, new_file
+from meshsimp_pymoo.surface.evaluate import mesh_deviation, mesh_quality
 
 PICTURES = ("png", "svg", "pdf")
 # A mesh of the front itself, measured from its file, differs by less.

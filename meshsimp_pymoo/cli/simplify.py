@@ -18,16 +18,7 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
 
-from meshsimp_pymoo.algorithms import PRESETS
-from meshsimp_pymoo.checkpoint import (
-    CheckpointError,
-    Checkpoints,
-    NotResumable,
-    difference,
-    read_checkpoint,
-    restore,
-)
-from meshsimp_pymoo.cli.arguments import DEFAULT_GENERATIONS, UsageError
+from meshsimp_pymoo.cli.arguments import DEFAULT_GENERATIONS
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
     INTERRUPTED,
@@ -39,21 +30,28 @@ from meshsimp_pymoo.cli.terminal import (
     stop_if_interrupted,
 )
 from meshsimp_pymoo.cli.tiled import simplify_tiled, wants_tiles
+from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
+from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
-from meshsimp_pymoo.geometry.load import NoFullGrid
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.results import (
+from meshsimp_pymoo.search.checkpoint import (
+    CheckpointError,
+    Checkpoints,
+    NotResumable,
+    difference,
+    read_checkpoint,
+    restore,
+)
+from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.storage import (
     CHECKPOINT,
-    ResultError,
     claim_output,
     is_unfinished,
     local_origin,
     mesh_suffix,
     package_versions,
-    put_back,
     refuse_format,
 )
-from meshsimp_pymoo.runs import locked
 
 # What of the command line does not decide the results.
 UNRECORDED = ("command", "output", "overwrite", "quiet", "json", "model", "seed", "page", "checkpoint")
@@ -172,7 +170,7 @@ def _mesh_problem(args: argparse.Namespace) -> MeshProblem:
 
 def _generations(args: argparse.Namespace) -> int:
     """Return the generations to run where neither time nor evaluations are given."""
-    from meshsimp_pymoo.memetic_search import sweep_generations
+    from meshsimp_pymoo.search.memetic import sweep_generations
 
     default = sweep_generations(args.population) if args.algorithm == "memetic" else DEFAULT_GENERATIONS
     return int(args.generations or default)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from meshsimp_pymoo.geometry.error import Quality
-    from meshsimp_pymoo.geometry.model import OpenModel
+    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.model import OpenModel
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def progress(quiet: bool, model: OpenModel) -> Iterator[Callable[[float, int, Fl
     if quiet or not sys.stderr.isatty():
         yield lambda share, evaluations, F: None
         return
-    from meshsimp_pymoo.display import errors_at, usual_sizes
+    from meshsimp_pymoo.search.display import errors_at, usual_sizes
 
     sizes = usual_sizes(len(model.faces))
     with bar(quiet, Path(model.name).name) as draw:

@@ -11,12 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.arguments import UsageError
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
-from meshsimp_pymoo.engines import Engine, EngineError, open_engine
-from meshsimp_pymoo.geometry.load import ModelError
-from meshsimp_pymoo.results import ResultError, claim_output, mesh_suffix, refuse_format
-from meshsimp_pymoo.runs import locked
+from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
+from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.storage import claim_output, mesh_suffix, refuse_format
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
 from meshsimp_pymoo.tiles.grid import HeightGrid, count_samples, open_grid
 from meshsimp_pymoo.tiles.memory import check_memory
@@ -29,6 +27,7 @@ from meshsimp_pymoo.tiles.output import (
     write_tiled_front,
     write_welded,
 )
+from meshsimp_pymoo.workers import Engine, EngineError, open_engine
 
 # From this many samples on, a grid is thinned tile by tile without being asked.
 TILED_FROM = 2_000_000
@@ -137,7 +136,7 @@ def _thin(
     def draw(unfinished: Path) -> None:
         from matplotlib.figure import Figure
 
-        from meshsimp_pymoo.analysis import knee
+        from meshsimp_pymoo.indicators import knee
         from meshsimp_pymoo.report.figures import plot_front
 
         figure = Figure(figsize=(7.0, 5.0), dpi=110, layout="constrained")
@@ -236,7 +235,7 @@ def _choose(args: argparse.Namespace, front: TiledFront, threads: int) -> tuple[
         front, row = front.with_triangles(args.triangles, threads=threads)
         return front, row, ""
     if args.pick == "knee":
-        from meshsimp_pymoo.analysis import knee
+        from meshsimp_pymoo.indicators import knee
 
         return front, int(knee(front.F)), ""
     for name in ("max_error", "mean_error"):

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.geometry.error import simplify
+from meshsimp_pymoo.surface.evaluate import simplify
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from meshsimp_pymoo.geometry.model import OpenModel
+    from meshsimp_pymoo.surface.model import OpenModel
 
 __all__ = [
     "error_figure",
@@ -410,7 +410,7 @@ def error_figure(
     model : OpenModel
         The original mesh.
     deviation, covered : (N,) arrays
-        Of :func:`meshsimp_pymoo.geometry.error.mesh_deviation`.
+        Of :func:`meshsimp_pymoo.surface.evaluate.mesh_deviation`.
     title : str, optional
         What stands above the map.
 

@@ -17,15 +17,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.comparison.study import slug
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import new_file
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma
 from meshsimp_pymoo.report.figures import UNCOVERED, relief_exaggeration
-from meshsimp_pymoo.report.study import slug
-from meshsimp_pymoo.results import FRONT_COLUMNS, ResultError, StoredFront, new_file
+from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.geometry.error import Simplified
-    from meshsimp_pymoo.geometry.model import OpenModel
     from meshsimp_pymoo.problem import MeshProblem
+    from meshsimp_pymoo.surface.evaluate import Simplified
+    from meshsimp_pymoo.surface.model import OpenModel
 
 __all__ = ["PAGE_BYTES", "simplification_page", "write_page"]
 

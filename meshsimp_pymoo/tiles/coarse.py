@@ -1,7 +1,7 @@
 """The smallest meshes of a grid: so few vertices that they can be moved about on the whole of it.
 
 Thinning is greedy: below some hundred triangles it is a matter of luck where its vertices stand, whatever tiles there
-were. So these meshes are searched one by one (:func:`~meshsimp_pymoo.operators.local_search.relocate`), from the
+were. So these meshes are searched one by one (:func:`~meshsimp_pymoo.search.local_search.relocate`), from the
 thinned vertices, on every second, fourth, ... row and column of samples. What that takes does not grow with the grid.
 """
 
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.geometry.load import SourceMesh, grid_source
-from meshsimp_pymoo.geometry.model import build_model
+from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.grid import HeightGrid
 
 FloatArray = npt.NDArray[np.float64]
@@ -85,7 +85,7 @@ class CoarseGrid:
 
 def move(task: Coarse) -> IntArray:
     """Move the vertices of a mesh while that lowers its error; return its rows of ``task.points``, ascending."""
-    from meshsimp_pymoo.operators.local_search import relocate
+    from meshsimp_pymoo.search.local_search import relocate
 
     faces = grid_source(task.points[:, 2].reshape(task.shape)).faces
     model = build_model(SourceMesh(task.points, faces, {}, "coarse grid", up="z"))

@@ -34,13 +34,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.engines import Engine, Serial
-from meshsimp_pymoo.geometry.error import Quality
-from meshsimp_pymoo.results import ResultError, new_file
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import new_file
+from meshsimp_pymoo.surface.evaluate import Quality
 from meshsimp_pymoo.tiles.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
 from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.thin import Tile, thin_tile
 from meshsimp_pymoo.tiles.weld import measure, weld
+from meshsimp_pymoo.workers import Engine, Serial
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.datasets import find_source
-from meshsimp_pymoo.geometry.load import RASTER_SUFFIXES, ModelError, NoFullGrid, Window, check_window
-from meshsimp_pymoo.geometry.model import OpenModel, build_model
-from meshsimp_pymoo.geometry.predicates import exact_ranges
+from meshsimp_pymoo.errors import ModelError, NoFullGrid
+from meshsimp_pymoo.formats.load import RASTER_SUFFIXES, Window, check_window
+from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.surface.model import OpenModel, build_model
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -47,7 +48,7 @@ class HeightGrid:
     """Heights at the crossings of rows and columns.
 
     A sample's number is ``row * columns + column``. Its place in the plane is the one that
-    :func:`~meshsimp_pymoo.geometry.model.load_model` would give it, so that triangulations are the same too.
+    :func:`~meshsimp_pymoo.surface.model.load_model` would give it, so that triangulations are the same too.
 
     Attributes
     ----------
@@ -70,7 +71,7 @@ class HeightGrid:
     file_columns : int, optional
         Columns of the file; None: those of the grid.
     georeference : dict
-        Where on Earth it is, as far as the file says; see :class:`~meshsimp_pymoo.geometry.load.SourceMesh`.
+        Where on Earth it is, as far as the file says; see :class:`~meshsimp_pymoo.formats.load.SourceMesh`.
     """
 
     name: str
@@ -119,7 +120,7 @@ class HeightGrid:
 
     @cached_property
     def exact_ranges(self) -> tuple[float, float]:
-        """Up to where double precision is exact on these coordinates; see `meshsimp_pymoo.geometry.predicates`."""
+        """Up to where double precision is exact on these coordinates; see `meshsimp_pymoo.plane.predicates`."""
         return exact_ranges(np.concatenate([self.x, self.y])[:, None])
 
     @cached_property
@@ -238,7 +239,7 @@ def open_grid(
     window : (column, row, columns, rows), optional
         The part to take; places and rows stay those of the whole file.
     up : optional
-        Direction of the height, for meshes; see :func:`~meshsimp_pymoo.geometry.model.load_model`.
+        Direction of the height, for meshes; see :func:`~meshsimp_pymoo.surface.model.load_model`.
 
     Raises
     ------
@@ -281,7 +282,7 @@ def count_samples(model: str | os.PathLike[str], *, window: Window | None = None
     if suffix == ".npy":
         return int(_map_array(path).size)
     if suffix in RASTER_SUFFIXES:
-        from meshsimp_pymoo.geometry.raster import count_raster_samples
+        from meshsimp_pymoo.formats.geotiff import count_raster_samples
 
         return count_raster_samples(path, str(path))
     with path.open("rb") as file:
@@ -340,7 +341,7 @@ def _grid_of_array(
 def _grid_of_raster(
     path: Path, spacing: float | tuple[float, float] | None, nodata: float | None, window: Window | None
 ) -> HeightGrid:
-    from meshsimp_pymoo.geometry.raster import RasterHeights
+    from meshsimp_pymoo.formats.geotiff import RasterHeights
 
     heights = RasterHeights(path, str(path), _steps(str(path), spacing), nodata, window)
     return HeightGrid(

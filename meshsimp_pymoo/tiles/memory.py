@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from meshsimp_pymoo.geometry.load import ModelError
+from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.tiles.grid import HeightGrid
 
 # Measured, rounded up: the libraries of a process, a sample of a tile, a sample of the whole while the first phase is

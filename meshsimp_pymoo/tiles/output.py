@@ -12,7 +12,7 @@
     OUT/run.json        settings, package versions, seconds, hash of the grid, where on Earth it is
     OUT/tiles/          while the work is going on: finished tiles, which the same call finds again
 
-The finished folder is put in place as a whole; see `meshsimp_pymoo.results`. A process that is killed at any moment
+The finished folder is put in place as a whole; see `meshsimp_pymoo.storage`. A process that is killed at any moment
 leaves the tiles or the finished folder, and beside them what :func:`restore` and :func:`clear_up` know.
 """
 
@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -31,36 +30,30 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.results import (
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
+from meshsimp_pymoo.storage import (
     FRONT_COLUMNS,
     MESH_FORMATS,
     MESHES_BY_DEFAULT,
-    ResultError,
     even_selection,
     local_origin,
     mesh_suffix,
-    new_file,
     package_versions,
-    partial_folder,
-    path_from,
-    put_in_place,
     read_front_csv,
     refuse_format,
-    short_reason,
     single_precision_shift,
     spelled_value,
     warn_of_shift,
-    write_csv,
     write_mesh,
-    write_npz,
 )
-from meshsimp_pymoo.runs import locked
 from meshsimp_pymoo.tiles.front import TiledFront
 from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.weld import WeldedMesh, pieces, weld
 
 NESTED_FILE = "nested.npz"
 WORK = "tiles"
+WAY_OUT = "what is finished stays there: mend that, and the same call goes on"
 
 
 def write_tiled_front(
@@ -85,7 +78,7 @@ def write_tiled_front(
     meshes : int or None
         The most meshes to write, an even selection; None: all.
     mesh_format : str
-        One of `meshsimp_pymoo.results.MESH_FORMATS`.
+        One of `meshsimp_pymoo.storage.MESH_FORMATS`.
     chosen : int, optional
         Solution of ``front`` to write as ``chosen`` too.
     piece_size : int, optional
@@ -107,10 +100,7 @@ def write_tiled_front(
         refuse_format(grid.model, mesh_format)
     suffix, look = mesh_suffix(mesh_format), _frame(front, mesh_format)
     target = Path(folder).resolve()
-    partial = None
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        partial = partial_folder(target)
+    with new_folder(folder, replace=True, way_out=WAY_OUT) as partial:
         with_mesh = set(even_selection(count, meshes))
         if with_mesh:
             (partial / "meshes").mkdir()
@@ -161,23 +151,13 @@ def write_tiled_front(
         (partial / "run.json").write_text(text + "\n", encoding="utf-8")
         if extra is not None:
             extra(partial)
-        put_in_place(partial, target, Path(folder), overwrite=True)
-    except OSError as problem:
-        _remove(partial)
-        raise ResultError(
-            f"{folder}: cannot be written ({short_reason(problem)}); what is finished stays there: mend that, and "
-            "the same call goes on"
-        ) from None
-    except BaseException:
-        _remove(partial)
-        raise
     return Path(folder)
 
 
 def restore(folder: Path) -> None:
     """Put a folder back whose process was killed while it was putting the finished one in its place."""
     target = folder.resolve()
-    for old in _left_beside(target, "old"):
+    for old in left_beside(target, "old"):
         if not (old / WORK).is_dir():
             continue
         with suppress(ResultError, OSError), locked(old):  # another process may be at it right now
@@ -189,19 +169,7 @@ def restore(folder: Path) -> None:
 
 def clear_up(folder: Path) -> None:
     """Remove unfinished folders of processes that were killed; the caller holds the folder for itself."""
-    for partial in _left_beside(folder.resolve(), "partial"):
-        shutil.rmtree(partial, ignore_errors=True)
-
-
-def _left_beside(target: Path, suffix: str) -> list[Path]:
-    own = re.compile(rf"\.{re.escape(target.name)}\.[0-9a-f]{{8}}\.{suffix}")
-    if not target.parent.is_dir():
-        return []
-    return sorted(path for path in target.parent.iterdir() if own.fullmatch(path.name) and path.is_dir())
-
-
-def _remove(partial: Path | None) -> None:
-    if partial is not None:
+    for partial in left_beside(folder.resolve(), "partial"):
         shutil.rmtree(partial, ignore_errors=True)
 
 
@@ -263,7 +231,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     ResultError
         If a file is missing or damaged, or the grid is another one.
     """
-    from meshsimp_pymoo.geometry.error import Quality
+    from meshsimp_pymoo.surface.evaluate import Quality
 
     folder = Path(folder)
     columns = read_front_csv(folder / "front.csv")[0]

@@ -22,10 +22,10 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from meshsimp_pymoo.baselines.greedy import thin_live
-from meshsimp_pymoo.geometry.live import END, build, lent_live, make_ground
-from meshsimp_pymoo.geometry.model import OpenModel, vector_order
-from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD
+from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
+from meshsimp_pymoo.search.greedy import thin_live
+from meshsimp_pymoo.surface.live import END, build, lent_live, make_ground
+from meshsimp_pymoo.surface.model import OpenModel, vector_order
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

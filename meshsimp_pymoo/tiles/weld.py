@@ -1,8 +1,8 @@
 """The mesh of a kept subset of a height grid, and its error over all samples.
 
 The mesh is the Delaunay triangulation of the kept samples, the same triangles that
-:func:`~meshsimp_pymoo.geometry.error.simplify` gives for the same subset of the same grid in memory. Its error is added
-up over all samples, band by band, so that memory holds the mesh and a few rows of heights.
+:func:`~meshsimp_pymoo.surface.evaluate.simplify` gives for the same subset of the same grid in memory. Its error is
+added up over all samples, band by band, so that memory holds the mesh and a few rows of heights.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from meshsimp_pymoo.geometry.error import Quality
-from meshsimp_pymoo.geometry.model import vector_order
-from meshsimp_pymoo.geometry.triangulation import LAST_INDEX, RECORD, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate
+from meshsimp_pymoo.surface.evaluate import Quality
+from meshsimp_pymoo.surface.model import vector_order
 from meshsimp_pymoo.tiles.grid import HeightGrid
 
 FloatArray = npt.NDArray[np.float64]
@@ -35,7 +35,7 @@ class WeldedMesh:
     xy, z : (V, 2), (V,) float arrays
         Their coordinates in the unit square and heights [file units].
     records : uint32 array
-        The triangles with their neighbours; see :mod:`meshsimp_pymoo.geometry.triangulation`.
+        The triangles with their neighbours; see :mod:`meshsimp_pymoo.plane.triangulation`.
     """
 
     samples: IntArray

@@ -59,12 +59,12 @@ from meshsimp_pymoo import (
     nsga2_v1,
     thinning,
 )
-from meshsimp_pymoo.baselines.meshlab import MeshLabUnavailable, meshlab_available, quadric_collapse
-from meshsimp_pymoo.geometry.error import Quality, mesh_quality
-from meshsimp_pymoo.geometry.load import ModelError
-from meshsimp_pymoo.memetic_search import DownTheLadder, SizeLadder
-from meshsimp_pymoo.operators.local_search import MoveShares
+from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, quadric_collapse
+from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.problem import open_model
+from meshsimp_pymoo.search.local_search import MoveShares
+from meshsimp_pymoo.search.memetic import DownTheLadder, SizeLadder
+from meshsimp_pymoo.surface.evaluate import Quality, mesh_quality
 
 BUILT_IN = ("jacksboro:11", "face:1000", "jacksboro:4", "topobathy", "jacksboro")
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

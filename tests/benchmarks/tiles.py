@@ -25,9 +25,9 @@ from numba import njit
 from rich.console import Console
 from rich.table import Table
 
-from meshsimp_pymoo.baselines.greedy import thinning
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.geometry.model import build_model
+from meshsimp_pymoo.search.greedy import thinning
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED
 from meshsimp_pymoo.tiles.front import tiled_front
 from meshsimp_pymoo.tiles.grid import open_grid

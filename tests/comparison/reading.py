@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.analysis import merged_front
-from meshsimp_pymoo.baselines.greedy import thinning
+from meshsimp_pymoo.comparison.analysis import merged_front
+from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, Case, Study
 from meshsimp_pymoo.indicators import epsilon
-from meshsimp_pymoo.report.study import CLASSIC_NAMES, Case, Study
+from meshsimp_pymoo.search.greedy import thinning
 
 FloatArray = npt.NDArray[np.float64]
 

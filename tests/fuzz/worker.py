@@ -24,11 +24,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 import mutations
 
-from meshsimp_pymoo.experiment.config import ConfigError, read_experiment_file
-from meshsimp_pymoo.geometry.load import ModelError, ModelWarning, read_source
-from meshsimp_pymoo.geometry.model import build_model
+from meshsimp_pymoo.comparison.config import ConfigError, read_experiment_file
+from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
+from meshsimp_pymoo.formats.load import read_source
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.results import ResultError, read_front
+from meshsimp_pymoo.storage import read_front
+from meshsimp_pymoo.surface.model import build_model
 
 SECONDS = 5.0
 MEMORY = 1 << 30

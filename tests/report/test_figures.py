@@ -9,8 +9,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.geometry.error import simplify
-from meshsimp_pymoo.geometry.model import load_model
 from meshsimp_pymoo.report.figures import (
     AMBIENT,
     LIGHT,
@@ -22,6 +20,8 @@ from meshsimp_pymoo.report.figures import (
     plot_front,
     plot_mesh,
 )
+from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.model import load_model
 
 
 @pytest.fixture

@@ -27,13 +27,13 @@ import pytest
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.engines import Processes
-from meshsimp_pymoo.geometry.load import ModelError
-from meshsimp_pymoo.geometry.model import build_model
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import memory
 from meshsimp_pymoo.tiles.front import Folder, settings, tiled_front
 from meshsimp_pymoo.tiles.grid import open_grid
 from meshsimp_pymoo.tiles.thin import thin_tile
+from meshsimp_pymoo.workers import Processes
 
 # What depends on nothing but the model and the settings: all files but run.json, which has the seconds.
 SAME = ("front.csv", "nested.npz", "chosen.ply", "front.png")

@@ -9,11 +9,12 @@ import pytest
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiled as tiled_command
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.geometry import raster as raster_module
-from meshsimp_pymoo.geometry.load import ModelError, read_source
-from meshsimp_pymoo.geometry.model import build_model, load_model
-from meshsimp_pymoo.geometry.raster import RasterHeights
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats import geotiff as raster_module
+from meshsimp_pymoo.formats.geotiff import RasterHeights
+from meshsimp_pymoo.formats.load import read_source
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.surface.model import build_model, load_model
 from meshsimp_pymoo.tiles import grid as grid_module
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.output import read_tiled_front

@@ -11,10 +11,11 @@ import pytest
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiled as tiled_command
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.geometry.load import read_source
-from meshsimp_pymoo.geometry.model import build_model, load_model
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.formats.load import read_source
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.results import ResultError, write_mesh
+from meshsimp_pymoo.storage import write_mesh
+from meshsimp_pymoo.surface.model import build_model, load_model
 from meshsimp_pymoo.tiles.grid import open_grid
 from meshsimp_pymoo.tiles.output import read_tiled_front
 from meshsimp_pymoo.tiles.thin import thin_tile
@@ -124,7 +125,7 @@ def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
     ],
 )
 def test_what_tiles_cannot_do_is_refused_in_one_line(path, tmp_path, capsys, options, message, monkeypatch):
-    monkeypatch.setattr("meshsimp_pymoo.engines.CONNECT_SECONDS", 0.3)
+    monkeypatch.setattr("meshsimp_pymoo.workers.CONNECT_SECONDS", 0.3)
     assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--tile", "64", *options]) == 2
     error = capsys.readouterr().err
     assert message in error

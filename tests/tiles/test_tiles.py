@@ -8,19 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshsimp_pymoo.baselines.greedy import thinning
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.engines import Processes, Serial
-from meshsimp_pymoo.geometry.error import evaluate_subsets, simplify
-from meshsimp_pymoo.geometry.load import ModelError
-from meshsimp_pymoo.geometry.model import build_model, load_model
-from meshsimp_pymoo.results import ResultError
+from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.search.greedy import thinning
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
+from meshsimp_pymoo.surface.model import build_model, load_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED, CoarseGrid, move
 from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_front
 from meshsimp_pymoo.tiles.front import settings as call_settings
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
 from meshsimp_pymoo.tiles.weld import find_cracks, measure, pieces, weld
+from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))
 GRID = open_grid(MODEL)
@@ -355,7 +354,7 @@ def test_the_front_depends_neither_on_the_order_nor_on_the_engine(front):
 
 def test_a_dask_cluster_finds_the_same_front(front):
     distributed = pytest.importorskip("distributed")
-    from meshsimp_pymoo.engines import DaskEngine
+    from meshsimp_pymoo.workers import DaskEngine
 
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,

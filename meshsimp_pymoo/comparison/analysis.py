@@ -1,0 +1,895 @@
+"""What many runs say about methods: merged fronts, tables, tests, chosen solutions, attainment.
+
+Everything here is a pure function of fronts: ``runs[method][seed]`` is an (n, 2) array of (error, triangles),
+both minimised, and belongs to one model. A method without chance has a single run, whatever its seed is
+called. No files, no figures.
+
+The order of a study:
+
+1. `merged_fronts`, `pseudo_optimal`: what each method found in all its runs, and what all found together;
+2. `unary_scores`: hypervolume ratio, epsilon, coverage and cardinality of every run against that optimum;
+   `epsilon_table`, `coverage_table`: every method's runs against every other's, the paper's Tables 2 and 1;
+3. `compare`: the paper's Wilcoxon procedure, with effect sizes; `holm`, `corrected` for many comparisons;
+4. `selected_solutions`: the paper's three solutions per method, and the knees;
+5. `attainment_surfaces`: where a share of a method's runs gets.
+
+The paper's text was not at hand when this was written. What had to be read into its words is marked as a
+reading.
+
+References
+----------
+.. [1] R. Campomanes-Álvarez, O. Cordón, S. Damas, Ó. Martín, "Evolutionary multi-objective optimization for
+   mesh simplification of 3D open models", Integrated Computer-Aided Engineering 20(4), 2013.
+.. [2] L. Sánchez and J. R. Villar, "Obtaining transparent models of chaotic systems with multi-objective
+   simulated annealing algorithms", Information Sciences 178(4), 2008.
+.. [3] A. Vargha and H. D. Delaney, "A critique and improvement of the CL common language effect size
+   statistics of McGraw and Wong", Journal of Educational and Behavioral Statistics 25(2), 2000.
+.. [4] S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics
+   6(2), 1979.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import moocore
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from meshsimp_pymoo.indicators import (
+    cardinality,
+    coverage,
+    epsilon,
+    hypervolume_ratio,
+    non_dominated,
+)
+
+__all__ = [
+    "ALPHA",
+    "COVERAGE_THRESHOLD",
+    "INDICATORS",
+    "Comparison",
+    "OptimalFront",
+    "PairTable",
+    "RankSum",
+    "Scores",
+    "Solution",
+    "Summary",
+    "attainment_surfaces",
+    "compare",
+    "corrected",
+    "coverage_table",
+    "dominance_rates",
+    "epsilon_table",
+    "holm",
+    "knees",
+    "magnitude",
+    "merged_front",
+    "merged_fronts",
+    "pseudo_optimal",
+    "rank_sum",
+    "scale_factor",
+    "selected_solutions",
+    "summarise",
+    "trade_off",
+    "unary_scores",
+    "vargha_delaney",
+]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Runs = Mapping[str, Mapping[int, ArrayLike]]
+
+# The paper's level of significance, and the coverage from which one run counts as dominating another.
+ALPHA = 0.05
+COVERAGE_THRESHOLD = 0.75
+
+# How many random weights choose the best trade-off.
+N_WEIGHTS = 1000
+
+INDICATORS = ("hvr", "cardinality", "epsilon", "coverage")
+"""What `compare` can compare methods by: two indicators of a run, two of a pair of runs."""
+
+
+@dataclass(frozen=True)
+class OptimalFront:
+    """The best solutions that all methods found together, and who found them.
+
+    Attributes
+    ----------
+    front : (P, 2) float array
+        The pseudo-optimal front, sorted by triangles.
+    found_by : tuple of P tuples of (method, seed)
+        The runs whose front holds the solution, in the order of the runs.
+    """
+
+    front: FloatArray
+    found_by: tuple[tuple[tuple[str, int], ...], ...]
+
+    def share(self, method: str) -> float:
+        """Return the share of the front's solutions that a method found, alone or not."""
+        return float(np.mean([any(name == method for name, _ in runs) for runs in self.found_by]))
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Mean and standard deviation of some values.
+
+    Attributes
+    ----------
+    mean, std : float
+        The standard deviation is the sample's (n - 1); NaN where there is none, as `note` says.
+    n : int
+        Number of values.
+    note : str
+        Why a number is NaN or infinite; empty if none is.
+    """
+
+    mean: float
+    std: float
+    n: int
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """A binary indicator between the runs of every two methods.
+
+    Attributes
+    ----------
+    indicator : str
+        Its name.
+    methods : tuple of str
+        Rows and columns.
+    values : dict of (method, method) to (n, m) float array
+        ``values[a, b][i, j]`` is the indicator of run i of a over run j of b.
+    """
+
+    indicator: str
+    methods: tuple[str, ...]
+    values: Mapping[tuple[str, str], FloatArray]
+
+    def cell(self, a: str, b: str) -> Summary:
+        """Return the mean and the standard deviation over all pairs of a run of ``a`` and a run of ``b``."""
+        return summarise(self.values[a, b].ravel())
+
+
+@dataclass(frozen=True)
+class Scores:
+    """The indicators of a method against the pseudo-optimal front.
+
+    Attributes
+    ----------
+    seeds : (n,) int array
+        The runs, in the order of all other arrays here.
+    hvr, epsilon, coverage : (n,) float array
+        Of each run's front against the pseudo-optimal one: hypervolume ratio, multiplicative epsilon, share
+        of the pseudo-optimal front that the run weakly dominates, that is, found.
+    cardinality : (n,) int array
+        Number of non-dominated solutions of each run.
+    merged_hvr, merged_epsilon, merged_coverage, merged_cardinality
+        The same of the method's merged front.
+    """
+
+    seeds: IntArray
+    hvr: FloatArray
+    epsilon: FloatArray
+    coverage: FloatArray
+    cardinality: IntArray
+    merged_hvr: float
+    merged_epsilon: float
+    merged_coverage: float
+    merged_cardinality: int
+
+
+@dataclass(frozen=True)
+class RankSum:
+    """A Wilcoxon rank-sum test between two samples.
+
+    Attributes
+    ----------
+    p : float
+        Two-sided p-value.
+    a12 : float
+        Vargha-Delaney effect size: the probability that a value of the first sample is larger than one of the
+        second, ties counted half; 0.5 is no effect.
+    exact : bool
+        Whether p is exact (no ties) or the normal approximation with corrections for ties and continuity.
+    note : str
+        What to know before believing p; mostly empty.
+    """
+
+    p: float
+    a12: float
+    exact: bool
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two methods compared by one indicator on one model.
+
+    Attributes
+    ----------
+    indicator, a, b, model : str
+        What is compared, and where.
+    sample_a, sample_b : (n,), (m,) float array
+        The samples of the test, larger is better: an indicator of each run, or for a binary indicator the
+        rate of the other method's runs that each run dominates.
+    p : float
+        Raw two-sided p-value, as in the paper.
+    p_holm : float
+        The same after Holm's correction for all comparisons made together.
+    a12 : float
+        Vargha-Delaney effect size, more than 0.5 in favour of ``a``.
+    alpha : float
+        Level of significance.
+    note : str
+        What to know before believing p.
+    """
+
+    indicator: str
+    a: str
+    b: str
+    sample_a: FloatArray
+    sample_b: FloatArray
+    p: float
+    p_holm: float
+    a12: float
+    alpha: float = ALPHA
+    model: str = ""
+    note: str = ""
+
+    @property
+    def winner(self) -> str:
+        """The method that is better at the raw p-value, as the paper decides; empty if none is."""
+        return self._winner(self.p)
+
+    @property
+    def winner_holm(self) -> str:
+        """The method that is better after Holm's correction; empty if none is."""
+        return self._winner(self.p_holm)
+
+    def _winner(self, p: float) -> str:
+        mean_a, mean_b = float(np.mean(self.sample_a)), float(np.mean(self.sample_b))
+        if not p < self.alpha or mean_a == mean_b:
+            return ""
+        return self.a if mean_a > mean_b else self.b
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A solution picked from a method's merged front.
+
+    Attributes
+    ----------
+    kind : str
+        "least_error", "fewest_triangles", "trade_off" or "knee".
+    error : float
+        [model units]
+    triangles : int
+        Number of triangles.
+    seeds : tuple of int
+        The runs that found it.
+    """
+
+    kind: str
+    error: float
+    triangles: int
+    seeds: tuple[int, ...]
+
+
+def merged_front(runs: Mapping[int, ArrayLike]) -> FloatArray:
+    """Return what all runs of one method found together: merged, duplicates removed, dominance applied.
+
+    Examples
+    --------
+    >>> merged_front({1: [[3.0, 2], [1.0, 6]], 2: [[2.0, 4], [1.0, 8]]})
+    array([[3., 2.],
+           [2., 4.],
+           [1., 6.]])
+    """
+    return non_dominated(np.vstack(list(_fronts({"method": runs})["method"].values())))
+
+
+def merged_fronts(runs: Runs) -> dict[str, FloatArray]:
+    """Return the merged front of every method."""
+    return {method: _merged(fronts) for method, fronts in _fronts(runs).items()}
+
+
+def pseudo_optimal(runs: Runs) -> OptimalFront:
+    """Return the front of every method and run together, with the runs that found each of its solutions.
+
+    Examples
+    --------
+    >>> optimal = pseudo_optimal({"a": {1: [[3.0, 2], [2.0, 6]]}, "b": {1: [[3.0, 2]], 2: [[1.0, 6]]}})
+    >>> optimal.front
+    array([[3., 2.],
+           [1., 6.]])
+    >>> optimal.found_by
+    ((('a', 1), ('b', 1)), (('b', 2),))
+    >>> optimal.share("a")
+    0.5
+    """
+    fronts = _fronts(runs)
+    front = non_dominated(np.vstack([F for seeds in fronts.values() for F in seeds.values()]))
+    found: dict[bytes, list[tuple[str, int]]] = {row.tobytes(): [] for row in front}
+    for method, seeds in fronts.items():
+        for seed, F in seeds.items():
+            for row in F:
+                if row.tobytes() in found:
+                    found[row.tobytes()].append((method, seed))
+    return OptimalFront(front, tuple(tuple(found[row.tobytes()]) for row in front))
+
+
+def summarise(values: ArrayLike) -> Summary:
+    """Return mean and standard deviation, and say why if one of them is not a number.
+
+    Examples
+    --------
+    >>> summarise([1.0, 2.0, 3.0])
+    Summary(mean=2.0, std=1.0, n=3, note='')
+    >>> summarise([1.5]).note
+    'one value has no standard deviation'
+    """
+    array = _sample(values, "the values")
+    n = len(array)
+    infinite = int(np.isinf(array).sum())
+    if infinite:
+        mean = math.inf if array.max() == math.inf else -math.inf
+        return Summary(mean, math.nan, n, f"{infinite} of {n} values are infinite")
+    mean = float(array.mean())
+    if n == 1:
+        return Summary(mean, math.nan, n, "one value has no standard deviation")
+    return Summary(mean, float(array.std(ddof=1)), n)
+
+
+def unary_scores(
+    runs: Runs, optimal: OptimalFront | ArrayLike | None = None, *, shift: ArrayLike = 0.0
+) -> dict[str, Scores]:
+    """Return the indicators of every run of every method against the pseudo-optimal front.
+
+    Parameters
+    ----------
+    runs : mapping
+        ``runs[method][seed]`` is an (n, 2) front.
+    optimal : OptimalFront or (P, 2) array-like, optional
+        The (pseudo-)optimal front; `pseudo_optimal` of the runs unless given.
+    shift : float or (2,) array-like
+        Added to the objectives for epsilon, see `indicators.epsilon`.
+    """
+    fronts = _fronts(runs)
+    if optimal is None:
+        optimal = pseudo_optimal(runs)
+    best = optimal.front if isinstance(optimal, OptimalFront) else non_dominated(optimal, "the optimal front")
+    scores = {}
+    for method, seeds in fronts.items():
+        merged = _merged(seeds)
+        scores[method] = Scores(
+            seeds=np.array(list(seeds), dtype=np.int64),
+            hvr=np.array([hypervolume_ratio(F, best) for F in seeds.values()]),
+            epsilon=np.array([epsilon(F, best, shift=shift) for F in seeds.values()]),
+            coverage=np.array([coverage(F, best) for F in seeds.values()]),
+            cardinality=np.array([cardinality(F) for F in seeds.values()], dtype=np.int64),
+            merged_hvr=hypervolume_ratio(merged, best),
+            merged_epsilon=epsilon(merged, best, shift=shift),
+            merged_coverage=coverage(merged, best),
+            merged_cardinality=cardinality(merged),
+        )
+    return scores
+
+
+def coverage_table(runs: Runs) -> PairTable:
+    """Return the coverage C between the runs of every two methods, as in the paper's Table 1.
+
+    A reading: a cell averages over all pairs of a run of the one and a run of the other method.
+
+    Examples
+    --------
+    >>> table = coverage_table({"a": {1: [[3, 2], [1, 6]]}, "b": {1: [[3, 2], [2, 6]]}})
+    >>> table.cell("a", "b").mean, table.cell("b", "a").mean
+    (1.0, 0.5)
+    """
+    return _pair_table("coverage", runs, coverage)
+
+
+def epsilon_table(runs: Runs, *, shift: ArrayLike = 0.0) -> PairTable:
+    """Return the multiplicative epsilon I between the runs of every two methods, as in the paper's Table 2.
+
+    A reading: a cell averages over all pairs of a run of the one and a run of the other method.
+    """
+    return _pair_table("epsilon", runs, lambda A, B: epsilon(A, B, shift=shift))
+
+
+def vargha_delaney(x: ArrayLike, y: ArrayLike) -> float:
+    """Return A12, the probability that a value of x is larger than one of y, ties counted half [3]_.
+
+    References
+    ----------
+    .. [3] A. Vargha and H. D. Delaney, "A critique and improvement of the CL common language effect size
+       statistics of McGraw and Wong", Journal of Educational and Behavioral Statistics 25(2), 2000.
+
+    Examples
+    --------
+    >>> vargha_delaney([2, 3], [1, 3])
+    0.625
+    """
+    a, b = _sample(x, "the first sample")[:, None], _sample(y, "the second sample")[None, :]
+    return float((a > b).mean() + (a == b).mean() / 2)
+
+
+def magnitude(a12: float) -> str:
+    """Return Vargha and Delaney's word for an effect size: negligible, small, medium or large.
+
+    Examples
+    --------
+    >>> magnitude(0.5), magnitude(0.3), magnitude(1.0)
+    ('negligible', 'medium', 'large')
+    """
+    distance = abs(a12 - 0.5)
+    words = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"))
+    return next((word for limit, word in words if distance < limit - 1e-12), "large")
+
+
+def rank_sum(x: ArrayLike, y: ArrayLike, *, alpha: float = ALPHA) -> RankSum:
+    """Test by Wilcoxon's rank sums whether two samples come from the same distribution.
+
+    p is exact where no two values are equal, and the normal approximation with corrections for ties and
+    continuity where some are. Samples that cannot differ get p = 1 and a note, not a warning.
+
+    Parameters
+    ----------
+    x, y : (n,), (m,) array-like
+        The samples; infinite values have a rank like any other, NaN is refused.
+    alpha : float
+        Level of significance that the note speaks of.
+
+    Examples
+    --------
+    >>> rank_sum([1, 2, 3, 4], [5, 6, 7, 8])
+    RankSum(p=0.02857142857142857, a12=0.0, exact=True, note='')
+    >>> rank_sum([1, 1], [1]).note
+    'all values are equal'
+    """
+    a, b = _sample(x, "the first sample"), _sample(y, "the second sample")
+    pooled = np.concatenate([a, b])
+    a12 = vargha_delaney(a, b)
+    if (pooled == pooled[0]).all():
+        return RankSum(1.0, a12, True, "all values are equal")
+    exact = len(np.unique(pooled)) == len(pooled)
+    p = float(stats.mannwhitneyu(a, b, method="exact" if exact else "asymptotic").pvalue)
+    least = 2 / math.comb(len(pooled), len(a))
+    note = ""
+    if least >= alpha:
+        note = f"with {len(a)} and {len(b)} values no p-value below {min(1.0, least):.2g} is possible"
+    return RankSum(min(1.0, p), a12, exact, note)
+
+
+def holm(p: ArrayLike) -> FloatArray:
+    """Return p-values corrected for being many, by Holm's step-down procedure [4]_.
+
+    Parameters
+    ----------
+    p : (n,) array-like
+        Raw p-values of all comparisons made together.
+
+    Returns
+    -------
+    (n,) float array
+        In the same order; each is to be compared with the level of significance itself.
+
+    References
+    ----------
+    .. [4] S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of
+       Statistics 6(2), 1979.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03])
+    array([0.03, 0.06, 0.06])
+    """
+    raw = np.asarray(p, dtype=float)
+    if raw.ndim != 1 or not np.all((raw >= 0) & (raw <= 1)):
+        raise ValueError(f"p-values are a list of numbers from 0 to 1, not {raw}")
+    order = np.argsort(raw, kind="stable")
+    steps = np.maximum.accumulate(raw[order] * np.arange(len(raw), 0, -1))
+    adjusted = np.empty_like(raw)
+    adjusted[order] = np.minimum(steps, 1.0)
+    return adjusted
+
+
+def dominance_rates(
+    forth: ArrayLike, back: ArrayLike, indicator: str, *, threshold: float = COVERAGE_THRESHOLD
+) -> FloatArray:
+    """Return P_A(B): for each run of A the share of B's runs that it dominates by an indicator [2]_.
+
+    Run i of A dominates run j of B
+
+    * by "epsilon" if I(A_i, B_j) <= 1 < I(B_j, A_i), that is, if A_i is better than B_j;
+    * by "coverage" if C(A_i, B_j) >= threshold > C(B_j, A_i).
+
+    A reading: the paper has the threshold of 0.75; that the reverse coverage must stay below it is added
+    here, so that of two nearly equal runs neither dominates the other.
+
+    Parameters
+    ----------
+    forth : (n, m) array-like
+        The indicator of each run of A over each run of B.
+    back : (m, n) array-like
+        The indicator of each run of B over each run of A.
+    indicator : {"epsilon", "coverage"}
+        Which indicator it is.
+    threshold : float
+        For the coverage.
+
+    Returns
+    -------
+    (n,) float array
+        Between 0 and 1. The values share their opponents, so they are not independent, and p-values drawn
+        from them are somewhat too small.
+
+    References
+    ----------
+    .. [2] L. Sánchez and J. R. Villar, "Obtaining transparent models of chaotic systems with multi-objective
+       simulated annealing algorithms", Information Sciences 178(4), 2008.
+
+    Examples
+    --------
+    The first run covers all of one opponent and half of the other, the second run nothing:
+
+    >>> dominance_rates([[1.0, 0.5], [0.0, 0.0]], [[0.2, 1.0], [0.3, 0.9]], "coverage")
+    array([0.5, 0. ])
+    """
+    there, reverse = np.asarray(forth, dtype=float), np.asarray(back, dtype=float).T
+    if there.shape != reverse.shape or there.ndim != 2:
+        raise ValueError(
+            f"the tables of A over B {there.shape} and of B over A {reverse.T.shape} do not match"
+        )
+    if indicator == "epsilon":
+        dominates = (there <= 1) & (reverse > 1)
+    elif indicator == "coverage":
+        dominates = (there >= threshold) & (reverse < threshold)
+    else:
+        raise ValueError(f"{indicator!r} is not a binary indicator: choose 'epsilon' or 'coverage'")
+    return np.asarray(dominates.mean(axis=1), dtype=float)
+
+
+def compare(
+    runs: Runs,
+    indicator: str,
+    *,
+    optimal: OptimalFront | ArrayLike | None = None,
+    alpha: float = ALPHA,
+    model: str = "",
+) -> list[Comparison]:
+    """Compare every two methods by an indicator, by the paper's Wilcoxon procedure.
+
+    For an indicator of a run ("hvr", "cardinality") the samples are its values; for an indicator of a pair of
+    runs ("epsilon", "coverage") they are P_A(B) and P_B(A), see `dominance_rates`. The rank-sum test compares
+    the two samples; the method with the larger mean is better if p < alpha. Holm's correction is over all
+    pairs of this call; `corrected` does it over more.
+
+    Parameters
+    ----------
+    runs : mapping
+        ``runs[method][seed]`` is an (n, 2) front; at least two methods.
+    indicator : {"hvr", "cardinality", "epsilon", "coverage"}
+        What to compare by; all so that the larger sample is better.
+    optimal : OptimalFront or (P, 2) array-like, optional
+        For "hvr".
+    alpha : float
+        Level of significance.
+    model : str
+        A name to carry along.
+
+    Returns
+    -------
+    list of Comparison
+        One for each pair of methods, in the order of ``runs``.
+    """
+    fronts = _fronts(runs)
+    if len(fronts) < 2:
+        raise ValueError(f"there is only the method {next(iter(fronts))!r}: give two or more to compare")
+    if indicator in ("hvr", "cardinality"):
+        scores = unary_scores(runs, optimal)
+        values = {method: getattr(scores[method], indicator).astype(float) for method in fronts}
+        samples = {(a, b): (values[a], values[b]) for a, b in itertools.combinations(fronts, 2)}
+    elif indicator in ("epsilon", "coverage"):
+        table = epsilon_table(runs) if indicator == "epsilon" else coverage_table(runs)
+        samples = {
+            (a, b): (
+                dominance_rates(table.values[a, b], table.values[b, a], indicator),
+                dominance_rates(table.values[b, a], table.values[a, b], indicator),
+            )
+            for a, b in itertools.combinations(fronts, 2)
+        }
+    else:
+        raise ValueError(f"unknown indicator {indicator!r}: choose among {', '.join(INDICATORS)}")
+    comparisons = []
+    for (a, b), (sample_a, sample_b) in samples.items():
+        test = rank_sum(sample_a, sample_b, alpha=alpha)
+        comparisons.append(
+            Comparison(indicator, a, b, sample_a, sample_b, test.p, test.p, test.a12, alpha, model, test.note)
+        )
+    return corrected(comparisons)
+
+
+def corrected(comparisons: Iterable[Comparison]) -> list[Comparison]:
+    """Return comparisons with Holm's correction over all of them, e.g. of one indicator on all models."""
+    family = list(comparisons)
+    adjusted = holm([comparison.p for comparison in family])
+    return [replace(comparison, p_holm=float(p)) for comparison, p in zip(family, adjusted, strict=True)]
+
+
+def scale_factor(front: ArrayLike) -> float:
+    """Return alpha, which brings the triangles to the scale of the error: the ratio of their ranges.
+
+    A reading: the design only says that the trade-off uses a scale factor alpha. With this one the weighted
+    sum ranks solutions as if both objectives were normalised to [0, 1] over the front. Where the front has no
+    extent (a single solution), alpha is 1.
+
+    Examples
+    --------
+    >>> scale_factor([[100.0, 2], [0.0, 52]])
+    2.0
+    """
+    error, triangles = np.ptp(non_dominated(front, "the front"), axis=0)
+    return float(error / triangles) if error > 0 and triangles > 0 else 1.0
+
+
+def trade_off(
+    front: ArrayLike,
+    *,
+    random_state: np.random.Generator,
+    alpha: float | None = None,
+    n_weights: int = N_WEIGHTS,
+    rule: str = "mean",
+) -> int:
+    """Return the best trade-off of a front between error and triangles, over many random weights.
+
+    The value of a solution s for a weight w, uniform in [0, 1], is
+
+        F_w(s) = w * error(s) + (1 - w) * alpha * triangles(s)
+
+    A reading: the design gives the random weights and the scale factor, not how 1000 values become one
+    choice. Under ``rule="mean"`` the solution with the least average of F_w is chosen, under ``"votes"`` the
+    one that is best for most weights. Of equal solutions the one with the fewest triangles is chosen.
+
+    Parameters
+    ----------
+    front : (n, 2) array-like
+        (error, triangles), non-dominated and sorted by triangles, as `merged_front` gives it.
+    random_state : numpy.random.Generator
+        Draws the weights.
+    alpha : float, optional
+        Scale factor [error units per triangle]; `scale_factor` of the front unless given. Give all methods
+        the same, that of the pseudo-optimal front, to compare their choices.
+    n_weights : int
+        Number of weights.
+    rule : {"mean", "votes"}
+        How the weights choose.
+
+    Returns
+    -------
+    int
+        Row of ``front``.
+
+    Examples
+    --------
+    >>> trade_off([[10, 2], [1, 4], [0, 20]], random_state=np.random.default_rng(1))
+    1
+    """
+    F = _front(front)
+    if n_weights < 1:
+        raise ValueError(f"n_weights is {n_weights}: give at least 1")
+    factor = scale_factor(F) if alpha is None else float(alpha)
+    if not (math.isfinite(factor) and factor > 0):
+        raise ValueError(f"the scale factor alpha is {factor}: it must be positive")
+    weights = random_state.uniform(size=(n_weights, 1))
+    value = weights * F[:, 0] + (1 - weights) * factor * F[:, 1]
+    if rule == "mean":
+        return int(value.mean(axis=0).argmin())
+    if rule == "votes":
+        return int(np.bincount(value.argmin(axis=1), minlength=len(F)).argmax())
+    raise ValueError(f"unknown rule {rule!r}: choose 'mean' or 'votes'")
+
+
+def knees(front: ArrayLike) -> IntArray:
+    """Return the knees of a front, where a little of one objective costs much of the other.
+
+    By pymoo's decision making: `pymoo.mcdm.high_tradeoff.HighTradeoffPoints` on the front normalised to
+    [0, 1], that is, the solutions whose least trade-off towards their neighbours is an outlier among all.
+
+    Parameters
+    ----------
+    front : (n, 2) array-like
+        (error, triangles), non-dominated and sorted by triangles, as `merged_front` gives it.
+
+    Returns
+    -------
+    (k,) int array
+        Rows of ``front``; none for fewer than three solutions, and where no solution stands out.
+    """
+    F = _front(front)
+    if len(F) < 3:
+        return np.empty(0, dtype=np.int64)
+    # pymoo imports from a deprecated place of SciPy, divides by zero on purpose, and changes the global
+    # warning filters for good: all of that stays in here
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        from pymoo.mcdm.high_tradeoff import HighTradeoffPoints
+
+        rows = HighTradeoffPoints(zero_to_one=True, ideal=F.min(axis=0), nadir=F.max(axis=0))(F)
+    return np.empty(0, dtype=np.int64) if rows is None else np.sort(np.asarray(rows, dtype=np.int64))
+
+
+def selected_solutions(
+    runs: Runs,
+    *,
+    random_state: np.random.Generator,
+    optimal: OptimalFront | ArrayLike | None = None,
+    n_weights: int = N_WEIGHTS,
+    rule: str = "mean",
+) -> dict[str, tuple[Solution, ...]]:
+    """Return the paper's three solutions of every method, and its knees.
+
+    They come from the method's merged front: the least error, the fewest triangles, the best trade-off (see
+    `trade_off`, with the same weights for all methods and the scale factor of the pseudo-optimal front), and
+    any number of knees.
+
+    Parameters
+    ----------
+    runs : mapping
+        ``runs[method][seed]`` is an (n, 2) front.
+    random_state : numpy.random.Generator
+        Draws the weights.
+    optimal : OptimalFront or (P, 2) array-like, optional
+        Gives the scale factor; `pseudo_optimal` of the runs unless given.
+    n_weights, rule
+        As in `trade_off`.
+
+    Returns
+    -------
+    dict of str to tuple of Solution
+        "least_error", "fewest_triangles", "trade_off", then the knees from few triangles to many.
+
+    Examples
+    --------
+    >>> runs = {"a": {1: [[9, 2], [1, 4]], 2: [[0, 30]]}}
+    >>> for solution in selected_solutions(runs, random_state=np.random.default_rng(1))["a"][:3]:
+    ...     print(solution)
+    Solution(kind='least_error', error=0.0, triangles=30, seeds=(2,))
+    Solution(kind='fewest_triangles', error=9.0, triangles=2, seeds=(1,))
+    Solution(kind='trade_off', error=1.0, triangles=4, seeds=(1,))
+    """
+    fronts = _fronts(runs)
+    if optimal is None:
+        optimal = pseudo_optimal(runs)
+    alpha = scale_factor(optimal.front if isinstance(optimal, OptimalFront) else optimal)
+    seed_of_weights = int(random_state.integers(2**63))
+    chosen = {}
+    for method, seeds in fronts.items():
+        found = pseudo_optimal({method: seeds})
+        front = found.front
+        same_weights = np.random.default_rng(seed_of_weights)
+        middle = trade_off(front, random_state=same_weights, alpha=alpha, n_weights=n_weights, rule=rule)
+        rows = [("least_error", len(front) - 1), ("fewest_triangles", 0), ("trade_off", middle)]
+        rows += [("knee", int(row)) for row in knees(front)]
+        chosen[method] = tuple(
+            Solution(
+                kind, float(front[row, 0]), int(front[row, 1]), tuple(seed for _, seed in found.found_by[row])
+            )
+            for kind, row in rows
+        )
+    return chosen
+
+
+def attainment_surfaces(
+    runs: Mapping[int, ArrayLike], percentages: Sequence[float] | None = None
+) -> dict[float, FloatArray]:
+    """Return how far at least a given share of a method's runs gets: surfaces of the empirical attainment.
+
+    Every point on or beyond the surface for p % is weakly dominated by a solution of at least p % of runs.
+
+    Parameters
+    ----------
+    runs : mapping of seed to (n, 2) array-like
+        The fronts of one method.
+    percentages : sequence of float, optional
+        Each more than 0 and at most 100; by default one run (the best surface), half, all (the worst).
+
+    Returns
+    -------
+    dict of float to (k, 2) float array
+        For each percentage the corners of its surface, sorted by triangles.
+
+    References
+    ----------
+    .. [1] V. Grunert da Fonseca, C. M. Fonseca and A. O. Hall, "Inferential performance assessment of
+       stochastic optimisers and the attainment function", EMO 2001.
+
+    Examples
+    --------
+    What both runs reach, though neither has such a solution:
+
+    >>> attainment_surfaces({1: [[3, 2], [1, 6]], 2: [[2, 4]]}, [100])[100]
+    array([[3., 4.],
+           [2., 6.]])
+    """
+    fronts = _fronts({"method": runs})["method"]
+    levels = [100 / len(fronts), 50.0, 100.0] if percentages is None else list(percentages)
+    for level in levels:
+        if not 0 < level <= 100:
+            raise ValueError(f"the percentage {level} is not more than 0 and at most 100")
+    points = np.vstack(list(fronts.values()))
+    sets = np.repeat(np.arange(len(fronts)), [len(F) for F in fronts.values()])
+    surfaces = {}
+    for level in levels:
+        # a percentage that ends between two numbers of runs means the next one
+        n_runs = math.ceil(level * len(fronts) / 100 - 1e-9)
+        surface = moocore.eaf(points, sets, percentiles=[100 * n_runs / len(fronts)])[:, :2]
+        surfaces[level] = non_dominated(surface)
+    return surfaces
+
+
+def _fronts(runs: Runs) -> dict[str, dict[int, FloatArray]]:
+    """Return the front of every run, seeds in order, or say which run is unusable."""
+    if not runs:
+        raise ValueError("there are no runs to analyse; was anything finished?")
+    fronts: dict[str, dict[int, FloatArray]] = {}
+    for method, seeds in runs.items():
+        if not seeds:
+            raise ValueError(f"the method {method!r} has no runs; leave it out or finish it")
+        fronts[method] = {}
+        for seed in sorted(seeds):
+            name = f"the front of the method {method!r} with seed {seed}"
+            fronts[method][seed] = non_dominated(seeds[seed], name)
+            if fronts[method][seed].shape[1] != 2:
+                raise ValueError(
+                    f"{name} has {fronts[method][seed].shape[1]} columns: give (error, triangles)"
+                )
+    return fronts
+
+
+def _merged(fronts: Mapping[int, FloatArray]) -> FloatArray:
+    """Return the front of some fronts."""
+    return non_dominated(np.vstack(list(fronts.values())))
+
+
+def _front(front: ArrayLike) -> FloatArray:
+    """Return a front whose rows mean the same to the caller, or say that it is none."""
+    F = np.asarray(front, dtype=float)
+    reduced = non_dominated(F, "the front")
+    if F.shape != reduced.shape or not np.array_equal(F, reduced):
+        raise ValueError(
+            f"these {len(F)} solutions are not a front sorted by triangles, so rows would be ambiguous; "
+            "pass them through merged_front or indicators.non_dominated first"
+        )
+    return F
+
+
+def _pair_table(name: str, runs: Runs, indicator: Callable[[FloatArray, FloatArray], float]) -> PairTable:
+    """Return an indicator between the runs of every two different methods."""
+    fronts = _fronts(runs)
+    values = {
+        (a, b): np.array([[indicator(A, B) for B in fronts[b].values()] for A in fronts[a].values()])
+        for a, b in itertools.permutations(fronts, 2)
+    }
+    return PairTable(name, tuple(fronts), values)
+
+
+def _sample(values: ArrayLike, name: str) -> FloatArray:
+    """Return a sample as an array, or say what is wrong with it."""
+    sample = np.asarray(values, dtype=float)
+    if sample.ndim != 1 or not len(sample):
+        raise ValueError(
+            f"{name} must be a list of at least one number, not an array of shape {sample.shape}"
+        )
+    if np.isnan(sample).any():
+        raise ValueError(f"{name} has {int(np.isnan(sample).sum())} NaN among {len(sample)} values")
+    return sample

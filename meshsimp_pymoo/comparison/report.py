@@ -1,0 +1,120 @@
+"""The whole report of an experiment, made anew from its stored results alone.
+
+::
+
+    OUT/findings.md                              the paper's claims, with verdicts and numbers
+    OUT/tables/BUDGET/SCORING/NAME.csv|md|tex    see `meshsimp_pymoo.comparison.tables`
+    OUT/tables/runs.csv, findings.csv            all runs, all verdicts
+    OUT/figures/BUDGET/SCORING/*.png             fronts_MODEL, hvr, cardinality, selected, meshes_MODEL
+    OUT/times.csv, times.md                      measured seconds, kept apart: never the same twice
+    OUT/report.html                              all of it on one page that needs no other file
+
+Tables and findings are the same bytes for the same runs. Each folder is made complete beside the old one, and
+then takes its place.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from meshsimp_pymoo.comparison import findings as verdicts
+from meshsimp_pymoo.comparison import tables
+from meshsimp_pymoo.comparison.page import experiment_page
+from meshsimp_pymoo.comparison.store import ExperimentWarning
+from meshsimp_pymoo.comparison.study import Study, slug
+from meshsimp_pymoo.files import new_folder, put_back, put_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["write_report", "write_tables"]
+
+
+def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, float, str], None] | None = None) -> Study:
+    """Write all tables, figures and findings of an experiment, and its page.
+
+    Parameters
+    ----------
+    out : path
+        The experiment's folder.
+    progress : callable, optional
+        Told (done, all, what is being done).
+
+    Returns
+    -------
+    Study
+        What the report is about.
+
+    Raises
+    ------
+    ResultError
+        If there is no experiment, or none of its runs is finished.
+    """
+    study, found = _write_tables(out)
+    _write_figures(study, progress)
+    put_text(study.out / "report.html", experiment_page(study, found))
+    return study
+
+
+def write_tables(out: str | os.PathLike[str]) -> Study:
+    """Write the tables and findings of an experiment, without figures and without its page."""
+    return _write_tables(out)[0]
+
+
+def _write_tables(out: str | os.PathLike[str]) -> tuple[Study, list[verdicts.Finding]]:
+    study = Study(out)
+    for what, items in (("missing", study.missing), ("damaged", study.damaged), ("without a mesh", study.empty)):
+        if items:
+            more = f" and {len(items) - 1} more" if len(items) > 1 else ""
+            warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=3)
+    found: list[verdicts.Finding] = []
+    put_back(study.out / "tables", tidy=True)
+    with new_folder(study.out / "tables", replace=True, flush=False) as folder:
+        for budget in study.budgets:
+            for scoring in study.scorings:
+                if not study.compared(budget, scoring):
+                    continue
+                place = folder / slug(budget) / slug(scoring)
+                for make in tables.COMPARISONS:
+                    tables.write_table(place, make(study, budget, scoring))
+                found += verdicts.findings(study, budget, scoring)
+            meshlab = tables.meshlab(study, budget)
+            if meshlab is not None:
+                tables.write_table(folder / slug(budget), meshlab)
+        tables.write_table(folder, verdicts.table(found))
+        (folder / "runs.csv").write_text(tables.runs(study).csv(), encoding="utf-8")
+    put_text(study.out / "findings.md", verdicts.page(study, found))
+    put_text(study.out / "times.csv", tables.times(study).csv())
+    put_text(study.out / "times.md", verdicts.times_page(study))
+    return study, found
+
+
+def _write_figures(study: Study, progress: Callable[[float, float, str], None] | None) -> None:
+    from meshsimp_pymoo.comparison import figures as figures
+
+    drawings: list[tuple[str, Callable[[], Figure]]] = []
+    for place, budget in enumerate(study.budgets):
+        for scoring in study.scorings:
+            cases = study.compared(budget, scoring)
+            if not cases:
+                continue
+            where = f"{slug(budget)}/{slug(scoring)}"
+            for case in cases:
+                name = slug(case.problem.name)
+                drawings.append((f"{where}/fronts_{name}.png", partial(figures.fronts_figure, study, case)))
+                if place == 0:  # meshes look much the same at every budget
+                    drawings.append((f"{where}/meshes_{name}.png", partial(figures.meshes_figure, study, case)))
+            for indicator in ("hvr", "cardinality"):
+                drawings.append((f"{where}/{indicator}.png", partial(figures.box_figure, study, cases, indicator)))
+            drawings.append((f"{where}/selected.png", partial(figures.selected_figure, study, cases)))
+    put_back(study.out / "figures", tidy=True)
+    with new_folder(study.out / "figures", replace=True, flush=False) as folder:
+        for done, (path, draw) in enumerate(drawings):
+            if progress is not None:
+                progress(done, len(drawings), path)
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            draw().savefig(folder / path)

@@ -1,0 +1,761 @@
+"""From a configuration to finished runs: what is missing is done, what is there is left alone.
+
+A *task* is one algorithm on one problem with one seed (and, for an algorithm whose runs are merged, one value
+of the merged parameter). It makes one *run* for each budget. The runs of a preset are moments of one search:
+the first 25 generations of a search of 50 are a search of 25. An algorithm given by import path may look at
+its budget (some adapt to the share of it that is left), so there each budget is a search of its own; and so
+is every budget in seconds.
+
+Each run is written as soon as it is finished, by the process that made it (see `meshsimp_pymoo.comparison.store`), so
+that nothing depends on this process living on. While a search goes on, its state is saved every minute or so (see
+`meshsimp_pymoo.search.checkpoint`): one that was killed goes on from there, to the same bytes. Results depend on
+neither the number of processes nor the order of the runs, except under a budget in seconds.
+
+Arrays of an evolutionary run: see `meshsimp_pymoo.comparison.store.StoredRun`. Arrays of a classic method on a model:
+``asked`` (R,), the numbers of triangles asked for; ``F``, ``vertices``, ``mean_error``, ... of the meshes
+obtained (all 0 and the error infinite where there is none); ``paper`` (R,) bool, whether it belongs to the
+paper's series of reductions; and the meshes, one after the other: ``mesh_vertices`` and ``mesh_faces``, with
+``vertex_start`` and ``face_start`` (R + 1,).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import time
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.comparison.config import (
+    AlgorithmConfig,
+    Budget,
+    Experiment,
+    ProblemConfig,
+    problem_arguments,
+    read_experiment_file,
+)
+from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, meshlab_front, reductions
+from meshsimp_pymoo.comparison.store import (
+    ExperimentWarning,
+    RunStore,
+    claim_experiment,
+    fingerprint,
+    write_experiment,
+    write_model,
+    write_run,
+)
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.search.checkpoint import (
+    INTERVAL,
+    CheckpointError,
+    Checkpoints,
+    NotResumable,
+    Stored,
+    difference,
+    read_checkpoint,
+    restore,
+)
+from meshsimp_pymoo.storage import package_versions
+from meshsimp_pymoo.surface.evaluate import TRIANGLES, Quality, evaluate_subsets, measured, mesh_quality
+from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
+
+__all__ = ["Done", "Task", "perform", "plan", "run_experiment"]
+
+# Called with (work done, all work, what is being done); work is in evaluations of one vertex.
+Progress = Callable[[float, float, str], None]
+
+# An evaluation of a mesh with N vertices costs about as much as this many vertices beside its N.
+OVERHEAD_VERTICES = 600
+# What a second of budget counts as, in the same unit; roughly what a core does.
+WORK_PER_SECOND = 1e7
+# Work of a classic method on a model, in evaluations.
+BASELINE_EVALUATIONS = 2000
+
+# The folder, inside the experiment's, of the state of searches that are not finished.
+CHECKPOINTS = ".checkpoints"
+
+QUALITY_COLUMNS = ("vertices", "mean_error", "rms_error", "max_error", "uncovered")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A search, and the runs that are to be taken from it.
+
+    Attributes
+    ----------
+    problem : str
+        Name of the problem.
+    algorithm : AlgorithmConfig
+        How it is searched.
+    merged_value : object
+        Value of the merged parameter; None if there is none.
+    seed : int
+        Seed of the search.
+    budgets : tuple of Budget
+        The moments at which runs are taken.
+    descriptions : tuple of dict
+        What each of these runs is.
+    work : float
+        How much there is to do.
+    """
+
+    problem: str
+    algorithm: AlgorithmConfig
+    merged_value: Any
+    seed: int
+    budgets: tuple[Budget, ...]
+    descriptions: tuple[Mapping[str, Any], ...]
+    work: float
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The keys of its runs."""
+        return tuple(fingerprint(description) for description in self.descriptions)
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        merged = self.algorithm.merged_parameter
+        value = f" / {merged}={self.merged_value}" if merged else ""
+        return f"{self.problem} / {self.algorithm.name}{value} / seed {self.seed}"
+
+    @property
+    def search(self) -> dict[str, Any]:
+        """What the search is; the same, whichever of its runs are finished."""
+        description: dict[str, Any] = dict(self.descriptions[0])
+        if self.is_shared:
+            del description["budget"]
+        return description
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether all budgets are moments of the same search; else there is but one of them."""
+        return _is_shared(self.algorithm, self.budgets[0])
+
+    def without(self, finished: Collection[str]) -> Task:
+        """Return the task without runs that are finished."""
+        left = [k for k, key in enumerate(self.keys) if key not in finished]
+        return replace(
+            self,
+            budgets=tuple(self.budgets[k] for k in left),
+            descriptions=tuple(self.descriptions[k] for k in left),
+        )
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a call of `run_experiment` did.
+
+    Attributes
+    ----------
+    out : Path
+        The experiment's folder.
+    finished : int
+        Runs that were computed now.
+    reused : int
+        Runs that were there already.
+    skipped : tuple of str
+        What could not be done on this machine, and what to install.
+    """
+
+    out: Path
+    finished: int
+    reused: int
+    skipped: tuple[str, ...] = ()
+
+
+def run_experiment(
+    config: str | os.PathLike[str] | Experiment,
+    out: str | os.PathLike[str],
+    *,
+    jobs: int = 1,
+    engine: Engine | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    checkpoint: float | None = INTERVAL,
+) -> Done:
+    """Do all runs of an experiment that are not finished yet.
+
+    Parameters
+    ----------
+    config : path or Experiment
+        What to do.
+    out : path
+        A new folder, or that of an earlier, perhaps interrupted call. Runs that are found there and that are
+        asked for now are not done again; others are named, left there, and not used.
+    jobs : int
+        Number of processes. With 1, everything is done in this one. They are started anew, so in a script
+        the call has to stand under ``if __name__ == "__main__":``.
+    engine : Engine, optional
+        Where the searches are done, in place of ``jobs``: on a Dask cluster, say. The classic methods and the
+        writing are always done here.
+    folder : path, optional
+        Where the model files are, in place of what the configuration says.
+    progress : callable, optional
+        Told about the progress.
+    checkpoint : float or None
+        Seconds between two savings of the state of each search; None: it is not saved. A search that is done out of
+        reach of this folder (on a cluster), or whose algorithm holds what cannot be saved, begins anew after a crash.
+
+    Returns
+    -------
+    Done
+        What was done.
+
+    Raises
+    ------
+    ConfigError
+        If anything in the configuration is wrong; nothing has been run or written then.
+    ResultError
+        If the folder cannot be used, or a process died.
+    """
+    if jobs < 1:
+        raise ValueError(f"jobs is {jobs}; it must be 1 or more")
+    experiment = config if isinstance(config, Experiment) else read_experiment_file(config, folder=folder)
+    out = claim_experiment(out)
+    with locked(out):
+        store = RunStore(out)
+        store.clean()
+        tasks = plan(experiment)
+        finished = _finished(tasks, store)
+        content = _content(experiment, tasks, out)
+        write_experiment(out, content | {"classic": [], "skipped": []})
+        missing = [task.without(finished) for task in tasks]
+        missing = [task for task in missing if task.budgets]
+        classic_work = _classic_work(experiment)
+        shown = _Shown(progress, sum(task.work for task in missing) + sum(classic_work.values()))
+        own = Serial() if jobs == 1 or len(missing) < 2 else Processes(min(jobs, len(missing)))
+        with own:
+            _perform_all(missing, experiment, store, engine or own, shown, checkpoint)
+        with contextlib.suppress(OSError):
+            shutil.rmtree(out / CHECKPOINTS)
+        rows, skipped, computed = _classic(experiment, tasks, store, shown, classic_work)
+        write_experiment(out, content | {"classic": rows, "skipped": list(skipped)})
+        asked = {key for task in tasks for key in task.keys} | {row["key"] for row in rows}
+        _name_stale(store, asked)
+        for line in skipped:
+            warnings.warn(line, ExperimentWarning, stacklevel=2)
+    n_runs = sum(len(task.budgets) for task in missing)
+    return Done(out, n_runs + computed, len(finished) + len(rows) - computed, skipped)
+
+
+def plan(experiment: Experiment) -> list[Task]:
+    """Return all tasks of an experiment, in the order of the configuration; same results, whatever the order."""
+    tasks = []
+    described = {
+        (algorithm.name, value): algorithm.description(value)
+        for algorithm in experiment.algorithms
+        for value in algorithm.merged_values
+    }
+    for problem in experiment.problems:
+        what = problem.description()
+        for seed in experiment.seeds:
+            for algorithm in experiment.algorithms:
+                for value in algorithm.merged_values:
+                    for budgets in _moments(algorithm, experiment.budgets):
+                        descriptions = tuple(
+                            {
+                                "problem": what,
+                                "algorithm": described[algorithm.name, value],
+                                "seed": seed,
+                                "budget": budget.description(),
+                            }
+                            for budget in budgets
+                        )
+                        work = _work(problem, algorithm, budgets)
+                        tasks.append(Task(problem.name, algorithm, value, seed, budgets, descriptions, work))
+    return tasks
+
+
+def perform(
+    task: Task,
+    model: OpenModel,
+    options: Mapping[str, Any],
+    *,
+    checkpoint: Path | None = None,
+    interval: float = INTERVAL,
+) -> Iterator[tuple[int, dict[str, npt.NDArray[Any]], dict[str, Any]]]:
+    """Search, and yield each run of a task when its budget is reached.
+
+    Parameters
+    ----------
+    task : Task
+        What to do.
+    model : OpenModel
+        The model.
+    options : mapping
+        The options of its problem.
+    checkpoint : Path, optional
+        File for the state of the search. If there is one, the search goes on from there; it is removed at the end.
+    interval : float
+        Seconds between two savings.
+
+    Yields
+    ------
+    (int, dict, dict)
+        Index of the budget, the run's arrays, and facts about it.
+    """
+    from pymoo.core.termination import NoTermination
+    from pymoo.termination.max_eval import MaximumFunctionCallTermination
+    from pymoo.termination.max_gen import MaximumGenerationTermination
+    from pymoo.termination.max_time import TimeBasedTermination
+
+    problem = MeshProblem(model, **problem_arguments(options), n_threads=1)
+
+    def set_up() -> Any:
+        termination: Any = NoTermination()
+        if len(task.budgets) == 1:
+            budget = task.budgets[0]
+            terminations = {
+                "generations": MaximumGenerationTermination,
+                "evaluations": MaximumFunctionCallTermination,
+                "seconds": TimeBasedTermination,
+            }
+            termination = terminations[budget.kind](budget.amount)
+        return task.algorithm.build(task.merged_value).setup(problem, termination=termination, seed=task.seed)
+
+    start = time.perf_counter()
+    algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
+    if stored is not None:
+        try:
+            restore(stored, algorithm)
+            start -= float(stored.facts["seconds"])
+        except CheckpointError as damage:
+            warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=2)
+            algorithm = set_up()
+    keeper = None
+    if checkpoint is not None:
+        with contextlib.suppress(NotResumable):
+            keeper = Checkpoints(checkpoint, algorithm, _search_and_versions(task), interval=interval)
+    left = list(range(len(task.budgets)))
+    set_aside = 0.0  # seconds spent on runs already yielded
+    while left:
+        ended = not algorithm.has_next()
+        if not ended:
+            before = algorithm.n_iter
+            algorithm.next()
+            if algorithm.n_iter == before:  # in the middle of a generation
+                continue
+            ended = not algorithm.has_next()
+        seconds = time.perf_counter() - start - set_aside
+        generations, evaluations = algorithm.n_iter - 1, algorithm.evaluator.n_eval
+        reached = {"generations": generations, "evaluations": evaluations, "seconds": seconds}
+        for k in list(left):
+            if ended or reached[task.budgets[k].kind] >= task.budgets[k].amount:
+                facts = {
+                    "problem": task.problem,
+                    "algorithm": task.algorithm.name,
+                    "seed": task.seed,
+                    "budget": task.budgets[k].name,
+                    "generations": int(generations),
+                    "evaluations": int(evaluations),
+                    "seconds": round(seconds, 4),
+                    "versions": package_versions(),
+                }
+                yield k, _front_arrays(problem, algorithm.opt), facts
+                left.remove(k)
+        set_aside = time.perf_counter() - start - seconds
+        if left and keeper is not None and keeper.due():
+            try:
+                keeper.save(seconds=seconds, generations=int(generations), evaluations=int(evaluations))
+            except (CheckpointError, NotResumable) as trouble:
+                warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
+                keeper = None
+            set_aside = time.perf_counter() - start - seconds
+    if checkpoint is not None:
+        with contextlib.suppress(OSError):
+            checkpoint.unlink(missing_ok=True)
+
+
+def _search_and_versions(task: Task) -> dict[str, Any]:
+    """Return what a checkpoint of a task belongs to."""
+    versions = package_versions()
+    return {name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")} | {
+        "search": fingerprint(task.search)
+    }
+
+
+def _checkpoint_of(task: Task, folder: Path) -> Path:
+    return folder / CHECKPOINTS / f"{fingerprint(task.search)}.npz"
+
+
+def _usable_checkpoint(task: Task, path: Path) -> Stored | None:
+    """Return a task's checkpoint; None if there is none, or it is past a run that is missing; name a damaged one."""
+    if not path.exists():
+        return None
+    try:
+        stored = read_checkpoint(path)
+        if other := difference(stored.what, _search_and_versions(task)):
+            raise CheckpointError(f"{path}: belongs to another search ({other})")
+        if any(stored.facts[budget.kind] >= budget.amount for budget in task.budgets):
+            return None
+    except (CheckpointError, KeyError, TypeError) as damage:
+        warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=3)
+        with contextlib.suppress(OSError):
+            path.unlink()
+        return None
+    return stored
+
+
+def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[Any]]:
+    """Return the front of a population, sorted by triangles: subsets that are meshes and feasible."""
+    kept = np.zeros((0, problem.n_var), dtype=bool)
+    if optimum is not None and len(optimum):
+        feasible = optimum.get("feas").ravel().astype(bool)
+        kept = np.asarray(optimum.get("X"), dtype=bool).reshape(len(optimum), -1)[feasible] | problem.pinned
+    table = problem.evaluate_subsets(kept) if len(kept) else np.zeros((0, 6))
+    is_mesh = table[:, TRIANGLES] > 0
+    kept, table = kept[is_mesh], table[is_mesh]
+    measure, total = problem.objectives[0], problem.model.total_weight
+    F = np.column_stack([measured(table, measure, total), table[:, TRIANGLES]])
+    if len(F):
+        _, first = np.unique(F[:, ::-1], axis=0, return_index=True)
+        best = {tuple(row) for row in non_dominated(F[first]).tolist()}
+        rows = np.array([row for row in first if tuple(F[row].tolist()) in best])
+        kept, table, F = kept[rows], table[rows], F[rows]
+    quality = [problem.as_quality(row) for row in table]
+    nearest = F[:, 0]
+    if problem.outside != "nearest" and len(kept):
+        charged = evaluate_subsets(problem.model, kept, footprint=problem.footprint, outside="nearest")
+        nearest = measured(charged, measure, total)
+    return {
+        "F": F,
+        "kept": np.packbits(kept, axis=1),
+        "error_nearest": nearest,
+        **_quality_arrays(quality),
+    }
+
+
+def _quality_arrays(quality: Sequence[Quality]) -> dict[str, npt.NDArray[Any]]:
+    kinds = {"vertices": np.int64, "uncovered": np.int64}
+    return {
+        name: np.array([getattr(q, name) for q in quality], dtype=kinds.get(name, np.float64))
+        for name in QUALITY_COLUMNS
+    }
+
+
+def _moments(algorithm: AlgorithmConfig, budgets: Sequence[Budget]) -> list[tuple[Budget, ...]]:
+    """Return the budgets that one search can serve, together."""
+    together = tuple(b for b in budgets if _is_shared(algorithm, b))
+    alone = [(b,) for b in budgets if b not in together]
+    return ([together] if together else []) + alone
+
+
+def _is_shared(algorithm: AlgorithmConfig, budget: Budget) -> bool:
+    return bool(algorithm.preset) and budget.kind != "seconds"
+
+
+def _work(problem: ProblemConfig, algorithm: AlgorithmConfig, budgets: Sequence[Budget]) -> float:
+    """Return about how much work a task is, to tell the time left."""
+    population = int(algorithm.parameters.get("pop_size", 100))
+    evaluations = 0.0
+    for budget in budgets:
+        if budget.kind == "seconds":
+            return WORK_PER_SECOND * budget.amount
+        one = budget.amount * population if budget.kind == "generations" else budget.amount
+        costly = budget.kind == "generations" and "v2" in algorithm.preset
+        evaluations = max(evaluations, one * (2.1 if costly else 1.0))
+    return evaluations * (problem.model.n_vertices + OVERHEAD_VERTICES)
+
+
+def _finished(tasks: Sequence[Task], store: RunStore) -> set[str]:
+    """Return the keys of the runs that are there and whole; name those that are not."""
+    stored = store.paths
+    finished = {key for task in tasks for key in task.keys if key in stored and store.get(key) is not None}
+    for line in store.damaged:
+        warnings.warn(f"{line}; it is computed again", ExperimentWarning, stacklevel=3)
+    store.damaged.clear()
+    return finished
+
+
+def _content(experiment: Experiment, tasks: Sequence[Task], out: Path) -> dict[str, Any]:
+    """Return the resolved configuration, and store the models."""
+    return {
+        "title": experiment.title,
+        "config": experiment.path.name,
+        "problems": [
+            {
+                "name": problem.name,
+                "source": problem.source,
+                "options": dict(problem.options),
+                "stored": write_model(out, problem.model),
+                "hash": problem.model.hash,
+                "vertices": problem.model.n_vertices,
+                "triangles": len(problem.model.faces),
+            }
+            for problem in experiment.problems
+        ],
+        "algorithms": [
+            {
+                "name": algorithm.name,
+                "preset": algorithm.preset,
+                "class": algorithm.path,
+                "merged_parameter": algorithm.merged_parameter,
+                "merged_values": list(algorithm.merged_values),
+                "description": algorithm.description(algorithm.merged_values[0]),
+            }
+            for algorithm in experiment.algorithms
+        ],
+        "seeds": list(experiment.seeds),
+        "budgets": [{"name": budget.name, budget.kind: budget.amount} for budget in experiment.budgets],
+        "meshlab": None
+        if experiment.meshlab is None
+        else {
+            "methods": list(experiment.meshlab.methods),
+            "down_to_fronts": experiment.meshlab.down_to_fronts,
+            "steps": experiment.meshlab.steps,
+        },
+        "runs": [
+            {
+                "key": key,
+                "problem": task.problem,
+                "algorithm": task.algorithm.name,
+                "merged_value": task.merged_value,
+                "seed": task.seed,
+                "budget": budget.name,
+            }
+            for task in tasks
+            for budget, key in zip(task.budgets, task.keys, strict=True)
+        ],
+    }
+
+
+def _name_stale(store: RunStore, asked: set[str]) -> None:
+    stale = [path for key, path in sorted(store.paths.items()) if key not in asked]
+    if stale:
+        others = f" and {len(stale) - 1} more" if len(stale) > 1 else ""
+        warnings.warn(
+            f"{stale[0]}{others}: not asked for by this configuration; left there and not used",
+            ExperimentWarning,
+            stacklevel=3,
+        )
+
+
+class _Shown:
+    """How far the work is."""
+
+    def __init__(self, progress: Progress | None, total: float) -> None:
+        self.progress = progress
+        self.total = total
+        self.done = 0.0
+
+    def add(self, work: float, text: str) -> None:
+        self.done += work
+        if self.progress is not None:
+            self.progress(self.done, self.total, text)
+
+
+# ----------------------------------------------------------------------------------------- doing it, in processes
+
+
+@dataclass(frozen=True, eq=False)
+class _Shared:
+    """What every worker has to know: the models with their options, and where runs are written (None: not there)."""
+
+    problems: Mapping[str, tuple[OpenModel, dict[str, Any]]]
+    folder: Path | None
+    checkpoint: float | None
+
+
+def _perform_all(
+    tasks: Sequence[Task],
+    experiment: Experiment,
+    store: RunStore,
+    engine: Engine,
+    shown: _Shown,
+    checkpoint: float | None,
+) -> None:
+    problems = {problem.name: (problem.model, dict(problem.options)) for problem in experiment.problems}
+    shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint)
+    if shared.folder is not None and checkpoint is not None:
+        for task in tasks:  # damage is named here, not by the processes
+            _usable_checkpoint(task, _checkpoint_of(task, store.folder.parent))
+    if shown.progress is not None:
+        shown.progress(0.0, shown.total, "")
+    # big ones first, so that all workers end together
+    tasks = list(tasks) if engine.jobs == 1 else sorted(tasks, key=lambda task: -task.work)
+    try:
+        for place, finished in engine.each(_work_on, tasks, shared):
+            for run in finished:
+                store.add(run if isinstance(run, Path) else write_run(store.folder, *run))
+            shown.add(tasks[place].work, tasks[place].label)
+    except EngineError as problem:
+        raise ResultError(
+            f"{store.folder}: {problem}; what is finished is stored, the same command does the rest"
+        ) from None
+
+
+def _work_on(task: Task, shared: _Shared) -> list[Any]:
+    """Do a task; return the records of its runs, or, where the folder is out of reach, all that is to be written."""
+    if shared.folder is not None:
+        return list(_perform_and_write(task, shared, shared.folder))
+    model, options = shared.problems[task.problem]
+    return [
+        (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
+        for k, arrays, facts in perform(task, model, options)
+    ]
+
+
+def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
+    model, options = shared.problems[task.problem]
+    saved: dict[str, Any] = {}
+    if shared.checkpoint is not None:
+        saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
+    paths = []
+    for k, arrays, facts in perform(task, model, options, **saved):
+        label = f"{task.label} / {task.budgets[k].name}"
+        paths.append(write_run(folder, label, task.descriptions[k], arrays, facts))
+    return paths
+
+
+# ------------------------------------------------------------------------------------------------ classic methods
+
+
+def _classic_work(experiment: Experiment) -> dict[str, float]:
+    """Return the work of a classic method on each problem."""
+    if experiment.meshlab is None:
+        return {}
+    return {
+        problem.name: len(experiment.meshlab.methods) * BASELINE_EVALUATIONS * float(problem.model.n_vertices)
+        for problem in experiment.problems
+    }
+
+
+def _classic(
+    experiment: Experiment,
+    tasks: Sequence[Task],
+    store: RunStore,
+    shown: _Shown,
+    work: Mapping[str, float],
+) -> tuple[list[dict[str, Any]], tuple[str, ...], int]:
+    """Do what is missing of the classic methods; return rows for the record, what was skipped, how many done."""
+    if experiment.meshlab is None:
+        return [], (), 0
+    config = experiment.meshlab
+    available = meshlab_available()
+    rows: list[dict[str, Any]] = []
+    missing: list[str] = []
+    computed = 0
+    for problem in experiment.problems:
+        down_to = _fewest_triangles(problem, tasks, store) if config.down_to_fronts else None
+        paper = reductions(len(problem.model.faces))
+        asked = reductions(len(problem.model.faces), down_to=down_to, steps=config.steps)
+        for method in config.methods:
+            description = {
+                "meshlab": method,
+                "model": problem.model.hash,
+                "outside": problem.options.get("outside", "nearest"),
+                "asked": list(asked),
+            }
+            if _measure(problem) != "error":
+                description["measure"] = _measure(problem)
+            key = fingerprint(description)
+            if store.get(key) is None:
+                if not available:
+                    missing.append(f"{problem.name} / {method}")
+                    continue
+                label = f"{problem.name} / {method}"
+                store.add(_write_classic(store.folder, label, problem, method, asked, paper, description))
+                computed += 1
+            rows.append({"key": key, "problem": problem.name, "method": method})
+            shown.add(work[problem.name] / len(config.methods), f"{problem.name} / {method}")
+    for line in store.damaged:
+        warnings.warn(f"{line}; it is computed again", ExperimentWarning, stacklevel=3)
+    store.damaged.clear()
+    if not missing:
+        return rows, (), computed
+    try:
+        meshlab_front(experiment.problems[0].model, [1])
+        reason = "MeshLab's methods cannot be used here"
+    except MeshLabUnavailable as problem_of_machine:
+        reason = str(problem_of_machine)
+    return rows, (f"skipped: {', '.join(missing)}: {reason}",), computed
+
+
+def _measure(problem: ProblemConfig) -> str:
+    """Return the measure of the error that is minimised beside the triangles."""
+    return str(problem.options.get("objectives", ("error",))[0])
+
+
+def _fewest_triangles(problem: ProblemConfig, tasks: Sequence[Task], store: RunStore) -> int | None:
+    """Return the fewest triangles of any run on a problem."""
+    fewest = []
+    for task in tasks:
+        if task.problem == problem.name:
+            for run in map(store.get, task.keys):
+                if run is not None and len(run.arrays["F"]):
+                    fewest.append(int(run.arrays["F"][:, 1].min()))
+    return min(fewest, default=None)
+
+
+def _write_classic(
+    folder: Path,
+    label: str,
+    problem: ProblemConfig,
+    method: str,
+    asked: Sequence[int],
+    paper: Sequence[int],
+    description: Mapping[str, Any],
+) -> Path:
+    """Let a classic method simplify a model to all sizes, and write what it made."""
+    outside = problem.options.get("outside", "nearest")
+    measure = _measure(problem)
+    model = problem.model
+    none = Quality(np.inf, 0, 0, np.inf, np.inf, np.inf, model.n_vertices)
+    quality, nearest, vertices, faces, notes = [], [], [], [], []
+    start = time.perf_counter()
+    for number in asked:
+        try:
+            (mesh,) = meshlab_front(model, [number], methods=[method], outside=outside)
+        except MeshLabUnavailable:
+            raise
+        except ValueError as nothing:  # too few triangles to have an area, say
+            quality.append(none)
+            nearest.append(np.inf)
+            vertices.append(np.empty((0, 3)))
+            faces.append(np.empty((0, 3), dtype=np.int64))
+            notes.append(f"no mesh: {nothing}")
+            continue
+        quality.append(mesh.quality)
+        nearest.append(
+            getattr(
+                mesh.quality
+                if outside == "nearest"
+                else mesh_quality(model, mesh.vertices, mesh.faces, outside="nearest"),
+                measure,
+            )
+        )
+        vertices.append(mesh.vertices)
+        faces.append(mesh.faces)
+        notes.append(mesh.note)
+    seconds = time.perf_counter() - start
+    arrays = {
+        "asked": np.array(asked, dtype=np.int64),
+        "paper": np.isin(asked, paper),
+        "F": np.array([[getattr(q, measure), q.triangles] for q in quality], dtype=np.float64),
+        "error_nearest": np.array(nearest),
+        **_quality_arrays(quality),
+        "mesh_vertices": np.concatenate(vertices),
+        "mesh_faces": np.concatenate(faces).astype(np.int32),
+        "vertex_start": np.cumsum([0] + [len(v) for v in vertices]),
+        "face_start": np.cumsum([0] + [len(f) for f in faces]),
+    }
+    facts = {
+        "problem": problem.name,
+        "algorithm": method,
+        "seconds": round(seconds, 4),
+        "notes": notes,
+        "versions": package_versions(),
+    }
+    return write_run(folder, label, description, arrays, facts)

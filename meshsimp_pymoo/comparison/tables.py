@@ -1,0 +1,417 @@
+"""The tables of an experiment: the same numbers as CSV, Markdown and LaTeX, the same bytes for the same runs.
+
+========== =====================================================================================
+table      content
+========== =====================================================================================
+scores     every method against the pseudo-optimal front: HVR, epsilon, coverage, cardinality
+coverage   C between the runs of every two methods (the paper's Table 1)
+epsilon    multiplicative epsilon between the runs of every two methods (the paper's Table 2)
+wilcoxon   every two methods with chance: raw and corrected p, effect size, who is better
+selected   least error, fewest triangles, best trade-off and knees of every method
+meshlab    every mesh of MeshLab's methods, with the vertices that it leaves uncovered
+runs       every run: solutions, generations, evaluations
+========== =====================================================================================
+
+Measured seconds are in none of them: `times` makes a table of its own, times.csv beside the folder of tables.
+CSV has all digits; Markdown and LaTeX are rounded to four.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from meshsimp_pymoo.comparison.analysis import PairTable, Summary, magnitude, selected_solutions, summarise
+from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, SCORINGS, Case, Study
+
+__all__ = [
+    "COMPARISONS",
+    "INDICATOR_NAMES",
+    "Table",
+    "coverage",
+    "epsilon",
+    "meshlab",
+    "runs",
+    "scores",
+    "selected",
+    "times",
+    "wilcoxon",
+    "write_table",
+]
+
+Cell = str | int | float | None
+
+# Seeds the random weights that choose the best trade-off, so that the tables are the same every time.
+WEIGHTS_SEED = 1
+DIGITS = 4
+
+INDICATOR_NAMES = {
+    "hvr": "HVR",
+    "cardinality": "cardinality",
+    "epsilon": "epsilon, run over run",
+    "coverage": "coverage, run over run",
+    "epsilon_optimal": "epsilon to the pseudo-optimal front",
+}
+"""What `Study.comparisons` can compare by."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes
+    ----------
+    name : str
+        Name of its files.
+    title : str
+        One line.
+    columns : tuple of str
+        Headers.
+    rows : tuple of tuples
+        Text, whole numbers, floats, or None for an empty cell.
+    shown : Table, optional
+        The table to show to people, where it is laid out differently from the one for programs.
+    """
+
+    name: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    shown: Table | None = None
+
+    def csv(self) -> str:
+        """Return the table for programs, floats with all their digits."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.columns)
+        writer.writerows([["" if c is None else _full(c) for c in row] for row in self.rows])
+        return text.getvalue()
+
+    def markdown(self) -> str:
+        """Return the table for people, in GitHub's Markdown."""
+        if self.shown is not None:
+            return self.shown.markdown()
+        lines = [f"**{markdown_text(self.title)}**", "", _piped(self.columns)]
+        lines.append("|" + "|".join("---:" if right else "---" for right in self.right_aligned) + "|")
+        lines += [_piped(row) for row in self.rounded_rows]
+        return "\n".join(lines) + "\n"
+
+    def latex(self) -> str:
+        """Return the table for papers; needs the package booktabs."""
+        if self.shown is not None:
+            return self.shown.latex()
+        alignment = "".join("r" if right else "l" for right in self.right_aligned)
+        lines = [
+            r"\begin{table}",
+            r"\centering",
+            rf"\caption{{{_escaped(self.title)}}}",
+            rf"\label{{tab:{self.name}}}",
+            rf"\begin{{tabular}}{{{alignment}}}",
+            r"\toprule",
+            " & ".join(_escaped(header) for header in self.columns) + r" \\",
+            r"\midrule",
+        ]
+        lines += [" & ".join(_escaped(cell) for cell in row) + r" \\" for row in self.rounded_rows]
+        lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+        return "\n".join(lines) + "\n"
+
+    @property
+    def rounded_rows(self) -> list[list[str]]:
+        """The cells as people read them."""
+        return [[_rounded(cell) for cell in row] for row in self.rows]
+
+    @property
+    def right_aligned(self) -> list[bool]:
+        """Which columns are right-aligned: those without a word."""
+        return [
+            all(not isinstance(row[k], str) or row[k][:1].isdigit() for row in self.rows)  # type: ignore[index]
+            for k in range(len(self.columns))
+        ]
+
+
+def write_table(folder: Path, table: Table) -> None:
+    """Write a table as NAME.csv, NAME.md and NAME.tex."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{table.name}.csv").write_text(table.csv(), encoding="utf-8")
+    (folder / f"{table.name}.md").write_text(table.markdown(), encoding="utf-8")
+    (folder / f"{table.name}.tex").write_text(table.latex(), encoding="utf-8")
+
+
+def scores(study: Study, budget: str, scoring: str) -> Table:
+    """Return every method's indicators against the pseudo-optimal front of its model, mean and deviation."""
+    columns = (
+        "model", "method", "runs", "hvr_mean", "hvr_sd", "epsilon_mean", "epsilon_sd", "coverage_mean",
+        "coverage_sd", "cardinality_mean", "cardinality_sd", "merged_hvr", "merged_epsilon",
+        "merged_coverage", "merged_cardinality", "optimal_share", "evaluations_mean", "note",
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    shown: list[tuple[Cell, ...]] = []
+    for case in study.compared(budget, scoring):
+        for method, values in case.scores.items():
+            hvr, eps = summarise(values.hvr), summarise(values.epsilon)
+            cover, count = summarise(values.coverage), summarise(values.cardinality)
+            evaluations = None if method in case.classic else float(case.evaluations(method).mean())
+            rows.append(
+                (
+                    case.problem.name, method, len(values.seeds), hvr.mean, hvr.std, eps.mean, eps.std,
+                    cover.mean, cover.std, count.mean, count.std, values.merged_hvr, values.merged_epsilon,
+                    values.merged_coverage, values.merged_cardinality, case.optimal.share(method),
+                    evaluations, eps.note if math.isinf(eps.mean) else "",
+                )
+            )  # fmt: skip
+            shown.append(
+                (
+                    case.problem.name, method, len(values.seeds), _spread(hvr), _spread(eps), _spread(cover),
+                    _spread(count), values.merged_hvr, values.merged_cardinality,
+                    None if evaluations is None else round(evaluations),
+                )
+            )  # fmt: skip
+    title = f"Scores against the pseudo-optimal front ({_setting(budget, scoring)}; mean (sd) over runs)"
+    headers = (
+        "model", "method", "runs", "HVR", "epsilon", "coverage", "cardinality", "HVR merged",
+        "cardinality merged", "evaluations",
+    )  # fmt: skip
+    return Table("scores", title, columns, tuple(rows), Table("scores", title, headers, tuple(shown)))
+
+
+def coverage(study: Study, budget: str, scoring: str) -> Table:
+    """Return the coverage between the runs of every two methods, as in the paper's Table 1."""
+    title = f"Coverage C of the column's runs by the row's ({_setting(budget, scoring)}; mean (sd) over pairs)"
+    return _pairs("coverage", title, study.compared(budget, scoring), lambda case: case.coverage)
+
+
+def epsilon(study: Study, budget: str, scoring: str) -> Table:
+    """Return the multiplicative epsilon between the runs of every two methods, as in the paper's Table 2."""
+    title = (
+        f"Epsilon I(row, column), {EPSILON_SHIFT:.0%} of the largest error added to every error; 1 or less: the row "
+        f"covers the column ({_setting(budget, scoring)}; mean (sd) over pairs)"
+    )
+    cases = study.compared(budget, scoring)
+    table = _pairs("epsilon", title, cases, lambda case: case.epsilon)
+    literal = _pairs("epsilon", title, cases, lambda case: case.literal_epsilon)
+    columns = (*table.columns[:-1], "mean_without_shift", "median_without_shift", "note")
+    rows = tuple((*row[:-1], other[3], other[5], other[7]) for row, other in zip(table.rows, literal.rows, strict=True))
+    return Table("epsilon", title, columns, rows, table.shown)
+
+
+def wilcoxon(study: Study, budget: str, scoring: str) -> Table:
+    """Return all rank-sum tests; each indicator is a family of its own for Holm's correction."""
+    columns = (
+        "model", "indicator", "a", "b", "mean_a", "mean_b", "p", "p_holm", "a12", "effect", "better",
+        "better_holm", "note",
+    )  # fmt: skip
+    rows = [
+        (
+            c.model, INDICATOR_NAMES[indicator], c.a, c.b, float(np.mean(c.sample_a)),
+            float(np.mean(c.sample_b)), c.p, c.p_holm, c.a12, magnitude(c.a12), c.winner, c.winner_holm, c.note,
+        )
+        for indicator in INDICATOR_NAMES
+        for c in study.comparisons(budget, scoring, indicator)
+    ]  # fmt: skip
+    title = f"Wilcoxon rank-sum tests ({_setting(budget, scoring)}); samples so that larger is better"
+    return Table("wilcoxon", title, columns, tuple(rows))
+
+
+def selected(study: Study, budget: str, scoring: str) -> Table:
+    """Return the paper's three solutions of every method, and its knees."""
+    columns = (
+        "model", "method", "solution", "error", "triangles", "vertices", "uncovered", "error_as_searched",
+        "mean_as_searched", "rms_as_searched", "max_as_searched", "error_every_vertex", "seed", "found_in_runs",
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    for case in study.compared(budget, scoring):
+        chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
+        for method, solutions in chosen.items():
+            for solution in solutions:
+                found = case.find(method, solution.error, solution.triangles)
+                rows.append(
+                    (
+                        case.problem.name, method, solution.kind.replace("_", " "), solution.error,
+                        solution.triangles, int(found.number("vertices")), int(found.number("uncovered")),
+                        float(found.run.arrays["F"][found.row, 0]), found.number("mean_error"),
+                        found.number("rms_error"), found.number("max_error"), found.number("error_nearest"),
+                        None if method in case.classic else found.seed, len(solution.seeds),
+                    )
+                )  # fmt: skip
+    title = f"Selected solutions of the merged fronts ({_setting(budget, scoring)})"
+    shown_columns = (
+        "model", "method", "solution", "triangles", "error as searched", "error, every vertex", "uncovered", "seed",
+    )  # fmt: skip
+    shown = tuple((*row[:3], row[4], row[7], row[11], row[6], row[12]) for row in rows if row[2] != "knee")
+    return Table("selected", title, columns, tuple(rows), Table("selected", title, shown_columns, shown))
+
+
+COMPARISONS: tuple[Callable[[Study, str, str], Table], ...] = (scores, coverage, epsilon, wilcoxon, selected)
+"""The tables of one budget and scoring."""
+
+
+def meshlab(study: Study, budget: str) -> Table | None:
+    """Return every mesh of MeshLab's methods, and the least error of an evolutionary one no larger.
+
+    None if there is no such mesh. The last columns compare by the error of every vertex.
+    """
+    columns = (
+        "model", "method", "series", "asked", "triangles", "vertices", "error_as_searched", "error_every_vertex",
+        "mean_as_searched", "rms_as_searched", "max_as_searched", "uncovered", "uncovered_share",
+        "evolution_error_every_vertex", "evolution_method", "note",
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    for problem in study.problems:
+        case = study.cases.get((problem.name, budget, "nearest"))
+        for (name, method), run in study.classic_runs.items():
+            if name != problem.name:
+                continue
+            for k, asked in enumerate(run.arrays["asked"].tolist()):
+                a, (error, triangles) = run.arrays, run.arrays["F"][k]
+                label, note = CLASSIC_NAMES.get(method, method), run.record["notes"][k]
+                series = "paper" if a["paper"][k] else "down to the fronts"
+                if not triangles:
+                    rows.append((name, label, series, asked, 0, *[None] * 10, note))
+                    continue
+                best, by = _best_up_to(case, triangles)
+                rows.append(
+                    (
+                        name, label, series, asked, int(triangles), int(a["vertices"][k]), float(error),
+                        float(a["error_nearest"][k]), float(a["mean_error"][k]), float(a["rms_error"][k]),
+                        float(a["max_error"][k]), int(a["uncovered"][k]),
+                        float(a["uncovered"][k] / problem.vertices), best, by, note,
+                    )
+                )  # fmt: skip
+    if not rows:
+        return None
+    title = f"MeshLab's meshes, and the best evolutionary one of at most as many triangles ({budget})"
+    shown_columns = (
+        "model", "method", "asked", "triangles", "error as searched", "error, every vertex", "uncovered",
+        "evolution, every vertex", "by",
+    )  # fmt: skip
+    shown = tuple((row[0], row[1], row[3], row[4], row[6], row[7], row[11], row[13], row[14]) for row in rows)
+    return Table("meshlab", title, columns, tuple(rows), Table("meshlab", title, shown_columns, shown))
+
+
+def runs(study: Study) -> Table:
+    """Return all evolutionary runs."""
+    columns = (
+        "model", "method", "merged_value", "seed", "budget", "solutions", "generations", "evaluations", "key",
+    )  # fmt: skip
+    rows = []
+    for run in study.all_runs:
+        record, merged = run.record, run.record["description"]["algorithm"].get("merged", {})
+        rows.append(
+            (
+                record["problem"], record["algorithm"], next(iter(merged.values()), None), record["seed"],
+                record["budget"], len(run.arrays["F"]), record["generations"], record["evaluations"],
+                run.path.stem.rpartition(".")[2],
+            )
+        )  # fmt: skip
+    return Table("runs", "All runs", columns, tuple(rows))
+
+
+def times(study: Study) -> Table:
+    """Return the measured seconds of every run; unlike all other tables, these are never the same twice."""
+    columns = ("model", "method", "merged_value", "seed", "budget", "evaluations", "seconds")
+    rows: list[tuple[Cell, ...]] = []
+    for run in study.all_runs:
+        record, merged = run.record, run.record["description"]["algorithm"].get("merged", {})
+        rows.append(
+            (
+                record["problem"], record["algorithm"], next(iter(merged.values()), None), record["seed"],
+                record["budget"], record["evaluations"], record["seconds"],
+            )
+        )  # fmt: skip
+    for (problem, method), run in study.classic_runs.items():
+        rows.append((problem, CLASSIC_NAMES.get(method, method), None, None, None, None, run.record["seconds"]))
+    return Table("times", "Measured seconds", columns, tuple(rows))
+
+
+def _pairs(name: str, title: str, cases: Sequence[Case], table_of: Callable[[Case], PairTable]) -> Table:
+    """Return a binary indicator: one row for each pair, shown as one square for each model."""
+    rows: list[tuple[Cell, ...]] = []
+    shown: list[tuple[Cell, ...]] = []
+    methods = list(dict.fromkeys(method for case in cases for method in case.runs))
+    for case in cases:
+        table = table_of(case)
+        for a in table.methods:
+            square: list[Cell] = []
+            for b in methods:
+                if a == b or b not in table.methods:
+                    square.append(None)
+                    continue
+                cell = table.cell(a, b)
+                values = table.values[a, b]
+                rows.append((case.problem.name, a, b, cell.mean, cell.std, float(np.median(values)), cell.n, cell.note))
+                square.append(_spread(cell))
+            shown.append((case.problem.name, a, *square))
+    columns = ("model", "a", "b", "mean", "sd", "median", "pairs", "note")
+    return Table(name, title, columns, tuple(rows), Table(name, title, ("model", "", *methods), tuple(shown)))
+
+
+def _best_up_to(case: Case | None, triangles: float) -> tuple[float | None, str | None]:
+    """Return the least error of an evolutionary solution with at most so many triangles, and whose it is."""
+    best: tuple[float | None, str | None] = (None, None)
+    for method, seeds in case.evolutionary.items() if case is not None else ():
+        for F in seeds.values():
+            errors = F[F[:, 1] <= triangles, 0]
+            if len(errors) and (best[0] is None or errors.min() < best[0]):
+                best = float(errors.min()), method
+    return best
+
+
+def _setting(budget: str, scoring: str) -> str:
+    return f"{budget}, error {SCORINGS[scoring]}"
+
+
+def _spread(summary: Summary) -> str:
+    mean = _rounded(summary.mean)
+    return mean if math.isnan(summary.std) else f"{mean} ({summary.std:.2g})"
+
+
+def _full(cell: str | int | float) -> str:
+    """Return a cell with all its digits; NaN, where there is no number, as nothing."""
+    if isinstance(cell, float):
+        return "" if math.isnan(cell) else repr(float(cell))
+    return str(cell)
+
+
+def _rounded(cell: Cell) -> str:
+    if cell is None:
+        return ""
+    if not isinstance(cell, float):
+        return str(cell)
+    if math.isnan(cell):
+        return ""
+    return f"{cell:.0f}" if 10 ** (DIGITS - 1) <= abs(cell) < 1e7 else f"{cell:.{DIGITS}g}"
+
+
+def _piped(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(markdown_text(cell) for cell in cells) + " |"
+
+
+def markdown_text(text: str) -> str:
+    r"""Return a text in which nothing is a tag, a link or the end of a cell to Markdown.
+
+    >>> markdown_text("<b> [a](javascript:b) | c_d 5 < 6")
+    '&lt;b> \\[a\\](javascript:b) \\| c_d 5 &lt; 6'
+    """
+    spelled = " ".join(text.split()).replace("<", "&lt;").replace("\\", "\\\\")
+    for sign in "|[]`":
+        spelled = spelled.replace(sign, f"\\{sign}")
+    return spelled
+
+
+def _escaped(text: str) -> str:
+    r"""Return a text in which no character means anything to LaTeX.
+
+    >>> print(_escaped("5 % of M_1"))
+    5 \% of M\_1
+    """
+    special = {
+        "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{",
+        "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    }  # fmt: skip
+    return "".join(special.get(c, c) for c in text)

@@ -1,0 +1,47 @@
+"""What can be wrong with what a user gives, each said in one line: what is wrong, where, its value, and the way out."""
+
+from __future__ import annotations
+
+import warnings
+
+# Of a foreign exception's text, in a line of ours.
+LONGEST_REASON = 200
+
+
+class InputError(ValueError):
+    """Bad input, said in one line; the shell command ends with code 2 and nothing is written."""
+
+
+class ModelError(InputError):
+    """The input cannot be used. One line: the file, the cause with its value, the way out."""
+
+
+class NoFullGrid(ModelError):
+    """The model is not a full grid of heights along its axes, which can be cut into tiles."""
+
+
+class ResultError(InputError):
+    """An output folder cannot be used or does not hold what it should: one line with the way out."""
+
+
+class UsageError(InputError):
+    """Options that do not go together, or a command line that cannot be understood."""
+
+
+class ModelWarning(UserWarning):
+    """The input is usable, but something in it was dropped or is doubtful."""
+
+
+def reason_of(error: BaseException) -> str:
+    """Return what an exception says, in one line of at most LONGEST_REASON characters.
+
+    >>> reason_of(OSError(28, "No space left on device")), reason_of(KeyError())
+    ('No space left on device', 'KeyError')
+    """
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return " ".join(str(text).split())[:LONGEST_REASON]
+
+
+def warn_of(message: str) -> None:
+    """Warn the caller's caller that something in the input was dropped or is doubtful."""
+    warnings.warn(message, ModelWarning, stacklevel=3)

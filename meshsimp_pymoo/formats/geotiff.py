@@ -1,0 +1,369 @@
+"""Heights out of a GeoTIFF, in the raster's own coordinates; needs rasterio (the extra ``geo``).
+
+GDAL can open a great many things under one name, other files and addresses in a network among them. Here it may open
+a TIFF and nothing else, and what the TIFF declares is compared with its size before anything is allocated.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import threading
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, reason_of, warn_of
+from meshsimp_pymoo.files import DEFLATE_LIMIT, UNPACKED_LIMIT
+from meshsimp_pymoo.formats.load import SourceMesh, Window, check_window, grid_mesh
+
+__all__ = ["RasterHeights", "count_raster_samples", "read_raster"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# rasterio logs what GDAL says; without a handler Python would print that to stderr.
+logging.getLogger("rasterio").addHandler(logging.NullHandler())
+
+# What a small file may unpack to, whatever its packing: some packings shrink a constant raster to nearly nothing.
+UNPACKED_FLOOR = 64 << 20
+# Files beside the raster that GDAL knows by name (.tfw, .aux.xml) are used, but their folder is not listed.
+GDAL_SETTINGS = {"GDAL_DISABLE_READDIR_ON_OPEN": "TRUE", "CPL_LOG_ERRORS": "OFF"}
+# Megabytes of unpacked blocks that GDAL may keep while a raster is read by windows.
+CACHE_MEGABYTES = 128
+# Samples that scattered heights are read from together: some tens of megabytes.
+BAND_SAMPLES = 2_000_000
+
+
+def read_raster(
+    path: Path,
+    name: str,
+    steps: tuple[float, float] | None,
+    nodata: float | None,
+    window: Window | None,
+) -> SourceMesh:
+    """Read the one band of a GeoTIFF as a triangle mesh.
+
+    A sample lies at the middle of its pixel, at the place that the raster's transform says; rotated and mirrored
+    rasters are read as they lie. Only the window is read. A scale and an offset of the band are applied, and samples
+    without data (the declared value, or a mask in the file) are no vertices.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    name : str
+        What messages call it.
+    steps : (dx, dy), optional
+        Distance between columns and rows in place of the transform's; the raster's north-west corner stays.
+    nodata : float, optional
+        Height that marks missing samples in place of what the file says, before scale and offset.
+    window : (column, row, columns, rows), optional
+        The part to take.
+
+    Returns
+    -------
+    SourceMesh
+        ``georeference`` holds ``crs`` (WKT), ``epsg``, ``unit``, ``transform`` (a, b, c, d, e, f: the corner of pixel
+        (column, row) is (a column + b row + c, d column + e row + f)), ``size`` (columns, rows), ``window`` and
+        ``nodata``.
+
+    Raises
+    ------
+    ModelError
+        If rasterio is not installed, or the file is no GeoTIFF of one band of real numbers.
+
+    Warns
+    -----
+    ModelWarning
+        If its coordinates are degrees.
+    """
+    with _opened(path, name) as raster:
+        return _band_mesh(raster, path.stat().st_size, name, steps, nodata, window)
+
+
+class RasterHeights:
+    """The heights of a GeoTIFF, read by windows as they are asked for.
+
+    It is indexed as an array of two dimensions, by slices or by arrays of rows and columns; what comes back is double
+    precision, scale and offset applied, NaN where there is no sample. Threads may share it.
+
+    Parameters
+    ----------
+    path, name, steps, nodata, window
+        As in :func:`read_raster`.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Rows and columns of the part.
+    dtype : numpy dtype
+        float64.
+    x, y : (columns,), (rows,) float arrays
+        Where the columns and rows lie, as :func:`read_raster` places them [file units].
+    corner : (int, int)
+        Row and column of the part in the raster.
+    file_columns : int
+        Columns of the whole raster.
+    georeference : dict
+        See :func:`read_raster`.
+
+    Raises
+    ------
+    ModelError
+        If rasterio is not installed, the file is no GeoTIFF of one band of real numbers, or its rows do not run from
+        north to south along the axes. Later, if a part of it cannot be read.
+    """
+
+    dtype = np.dtype(np.float64)
+    ndim = 2
+
+    def __init__(
+        self,
+        path: Path,
+        name: str,
+        steps: tuple[float, float] | None = None,
+        nodata: float | None = None,
+        window: Window | None = None,
+    ) -> None:
+        self.path, self.name = path, name
+        self._lock = threading.Lock()
+        with _opened(path, name, keep=True) as raster:
+            kind, shape = _checked_band(raster, name)
+            column, row, columns, rows = check_window(window, shape, name)
+            _check_size(raster, kind, (columns, rows), path.stat().st_size, name, by_windows=True)
+            place, mirrored = _placement(raster, steps, name)
+            a, b, _, d = tuple(raster.transform)[:4]
+            if mirrored or (b, d) != (0, 0) or a < 0:
+                raise NoFullGrid(
+                    f"{name}: its transform turns or mirrors it, and tiles want rows from north to south; warp it "
+                    "(gdalwarp), or leave the tiles out (--tile none)"
+                )
+            self.shape = (rows, columns)
+            self.corner = (row, column)
+            self.file_columns = shape[1]
+            i, j = row + np.arange(rows, dtype=np.int64), column + np.arange(columns, dtype=np.int64)
+            self.x: FloatArray = np.asarray(place(np.int64(row), j)[0], np.float64)
+            self.y: FloatArray = np.asarray(place(i, np.int64(column))[1], np.float64)
+            self.georeference = _georeference(raster, name) | {"window": [column, row, columns, rows]}
+            self._raster, self._nodata = raster, nodata
+
+    def __getitem__(self, key: Any) -> FloatArray:
+        rows, columns = key if isinstance(key, tuple) else (key, slice(None))
+        if isinstance(rows, slice) and isinstance(columns, slice):
+            top, bottom, _ = rows.indices(self.shape[0])
+            left, right, _ = columns.indices(self.shape[1])
+            return self._read(top, bottom, left, right)
+        return self._scattered(np.asarray(rows), np.asarray(columns))
+
+    def _read(self, top: int, bottom: int, left: int, right: int) -> FloatArray:
+        part = (self.corner[1] + left, self.corner[0] + top, right - left, bottom - top)
+        with self._lock, _guarded(self.name), _environment():
+            height, hidden, missing = _read_part(self._raster, part, self._nodata)
+        values = height.astype(np.float64)
+        if missing is not None:
+            # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
+            hidden |= height == (height.dtype.type(missing) if height.dtype.kind == "f" else missing)
+        values[hidden] = np.nan
+        return values
+
+    def _scattered(self, rows: IntArray, columns: IntArray) -> FloatArray:
+        """Return the heights at samples in any order, band by band."""
+        values = np.empty(rows.shape)
+        step = max(1, BAND_SAMPLES // self.shape[1])
+        order = np.argsort(rows, kind="stable")
+        band = rows[order] // step
+        for group in np.split(order, np.flatnonzero(np.diff(band)) + 1):
+            if len(group) == 0:
+                continue
+            i, j = rows[group], columns[group]
+            top, left = int(i.min()), int(j.min())
+            part = self._read(top, int(i.max()) + 1, left, int(j.max()) + 1)
+            values[group] = part[i - top, j - left]
+        return values
+
+
+def count_raster_samples(path: Path, name: str) -> int:
+    """Return rows times columns of a GeoTIFF, from its header alone.
+
+    Raises
+    ------
+    ModelError
+        If rasterio is not installed, or the file is no GeoTIFF.
+    """
+    with _opened(path, name) as raster:
+        return int(raster.width) * int(raster.height)
+
+
+def _environment() -> Any:
+    import rasterio
+
+    return rasterio.Env(**GDAL_SETTINGS, GDAL_CACHEMAX=CACHE_MEGABYTES)
+
+
+@contextlib.contextmanager
+def _guarded(name: str) -> Iterator[None]:
+    """Say in one line what GDAL and rasterio say, and ignore their warnings."""
+    try:
+        import rasterio  # noqa: F401 - its parts may have been imported where it is missing now
+        from rasterio.errors import NotGeoreferencedWarning
+    except ImportError:
+        raise ModelError(f"{name}: GeoTIFF needs rasterio; install it by pip install 'meshsimp-pymoo[geo]'") from None
+    try:
+        with warnings.catch_warnings():
+            for kind in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
+                warnings.simplefilter("ignore", kind)
+            yield
+    except (ModelError, ModelWarning, MemoryError):
+        raise
+    except Exception as error:  # GDAL's own errors, and what its answers break in a damaged file
+        raise ModelError(f"{name}: cannot be read as a GeoTIFF ({reason_of(error)}); export it again") from error
+
+
+@contextlib.contextmanager
+def _opened(path: Path, name: str, *, keep: bool = False) -> Iterator[Any]:
+    """Open a TIFF, and nothing else; with ``keep`` it stays open after the block unless that fails."""
+    with _guarded(name), _environment():
+        import rasterio
+
+        raster = rasterio.open(str(path.resolve()), driver="GTiff")
+        try:
+            yield raster
+        except BaseException:
+            raster.close()
+            raise
+        if not keep:
+            raster.close()
+
+
+def _band_mesh(
+    raster: Any,
+    file_size: int,
+    name: str,
+    steps: tuple[float, float] | None,
+    nodata: float | None,
+    window: Window | None,
+) -> SourceMesh:
+    kind, shape = _checked_band(raster, name)
+    column, row, columns, rows = check_window(window, shape, name)
+    _check_size(raster, kind, (columns, rows), file_size, name)
+    place, mirrored = _placement(raster, steps, name)
+    height, hidden, missing = _read_part(raster, (column, row, columns, rows), nodata)
+    return grid_mesh(
+        height,
+        hidden,
+        place,
+        nodata=missing,
+        name=name,
+        corner=(row, column),
+        file_columns=shape[1],
+        mirrored=mirrored,
+        georeference=_georeference(raster, name) | {"window": [column, row, columns, rows]},
+    )
+
+
+def _checked_band(raster: Any, name: str) -> tuple[np.dtype[Any], tuple[int, int]]:
+    """Return the type of the heights and the rows and columns, if they are one band of real numbers."""
+    if raster.count != 1:
+        raise ModelError(
+            f"{name}: has {raster.count} bands; heights are one band: take it out (gdal_translate -b 1, say)"
+        )
+    kind = np.dtype(raster.dtypes[0])
+    if kind.kind not in "iuf":
+        raise ModelError(f"{name}: heights have the type {kind}; give real numbers")
+    return kind, (raster.height, raster.width)
+
+
+def _read_part(
+    raster: Any, part: tuple[int, int, int, int], nodata: float | None
+) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_], float | None]:
+    """Read (column, row, columns, rows): heights, which are hidden, and the height that means "no sample" besides."""
+    from rasterio.enums import MaskFlags
+    from rasterio.windows import Window as Part
+
+    kind = np.dtype(raster.dtypes[0])
+    window = Part(*part)
+    height = raster.read(1, window=window)
+    flags = raster.mask_flag_enums[0]
+    hidden = np.zeros(height.shape, bool)
+    if MaskFlags.all_valid not in flags and MaskFlags.nodata not in flags:
+        hidden = raster.read_masks(1, window=window) == 0
+    missing = raster.nodata if nodata is None else nodata
+    if missing is not None and math.isnan(missing):
+        missing = None  # NaN is missing anyway
+    scale, offset = float(raster.scales[0]), float(raster.offsets[0])
+    if (scale, offset) != (1.0, 0.0):
+        if missing is not None:
+            hidden |= height == (kind.type(missing) if kind.kind == "f" else missing)
+            missing = None
+        height = height * scale + offset
+    return height, hidden, missing
+
+
+def _check_size(
+    raster: Any,
+    kind: np.dtype[Any],
+    part: tuple[int, int],
+    file_size: int,
+    name: str,
+    *,
+    by_windows: bool = False,
+) -> None:
+    """Refuse what no file of this size can hold, before anything is allocated; read by windows it may be larger."""
+    credible = max(UNPACKED_FLOOR, DEFLATE_LIMIT * file_size)
+    blocks = [(raster.width, raster.height)] if raster.compression is None else []
+    # a strip or tile is unpacked whole, however small the window is
+    whole = [(width, height) for height, width in raster.block_shapes]
+    for columns, rows in (part, *whole, *blocks):
+        needed = columns * rows * kind.itemsize
+        if needed > (credible if by_windows and (columns, rows) not in whole else min(credible, UNPACKED_LIMIT)):
+            raise ModelError(
+                f"{name}: declares {raster.width} x {raster.height} samples, of which {columns} x {rows} in one piece "
+                f"({needed} bytes), in a file of {file_size} bytes; export it again, or take a part of it with --window"
+            )
+
+
+def _placement(raster: Any, steps: tuple[float, float] | None, name: str) -> tuple[Any, bool]:
+    """Return where rows and columns lie, and whether the raster is mirrored."""
+    a, b, c, d, e, f = tuple(raster.transform)[:6]
+    if raster.transform.is_identity:
+        if raster.gcps[0]:
+            raise ModelError(f"{name}: is placed by ground control points alone; rectify it (gdalwarp) first")
+        a, b, c, d, e, f = 1.0, 0.0, -0.5, 0.0, -1.0, 0.5  # as any other grid: north at the top, from 0, 1 apart
+    if not all(map(math.isfinite, (a, b, c, d, e, f))) or a * e - b * d == 0:
+        raise ModelError(f"{name}: its transform {(a, b, c, d, e, f)} is none; export it again")
+    if steps is not None:
+        if (b, d) != (0, 0) or a <= 0 or e >= 0:
+            raise ModelError(f"{name}: its transform turns or mirrors it, so one spacing cannot say it; leave it out")
+        if not all(math.isfinite(step) and step > 0 for step in steps):
+            raise ModelError(f"{name}: the spacing is {steps}; give positive numbers")
+        a, e = steps[0], -steps[1]
+
+    def place(row: npt.NDArray[np.int64], column: npt.NDArray[np.int64]) -> tuple[Any, Any]:
+        i, j = row + 0.5, column + 0.5
+        return c + (a * j + b * i), f + (d * j + e * i)
+
+    return place, a * e - b * d > 0
+
+
+def _georeference(raster: Any, name: str) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "transform": [float(value) for value in tuple(raster.transform)[:6]],
+        "size": [raster.width, raster.height],
+        "nodata": None if raster.nodata is None else repr(float(raster.nodata)),
+    }
+    crs = raster.crs
+    if crs:
+        facts |= {"crs": crs.to_wkt(), "epsg": crs.to_epsg()}
+        facts["unit"] = crs.linear_units if crs.is_projected else "degree"
+        if crs.is_geographic:
+            warn_of(
+                f"{name}: its coordinates are degrees, its heights are not; triangles are shaped in degrees: for "
+                "shapes in metres project it first (gdalwarp -t_srs)"
+            )
+    return facts

@@ -1,0 +1,397 @@
+"""Move kept vertices to better places at a given number of triangles: simulated annealing on the live triangulation.
+
+One move drops a kept vertex and keeps another one instead: a vertex one or two edges of the original mesh away, or one
+from a triangle with a large error. Some moves only drop one, and where there is room for more triangles one is added.
+The change of the error is exact and looks at the triangles touched only, so a move costs a microsecond or two at any N.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.search.greedy import thin_live
+from meshsimp_pymoo.search.operators.requirements import summed_measure
+from meshsimp_pymoo.surface.live import (
+    N_EMITTED,
+    N_SITES,
+    Ground,
+    Live,
+    build,
+    exchange,
+    lent_live,
+    make_ground,
+    total_cost,
+    try_exchange,
+)
+from meshsimp_pymoo.workers import thread_pool
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.surface.model import OpenModel
+
+
+class MoveShares(NamedTuple):
+    """How often each kind of move is tried.
+
+    Attributes
+    ----------
+    near : float
+        Of the moves of a vertex those to a neighbour on the mesh; the others go to a triangle with a large error.
+    fill : float
+        Of the steps with room for two triangles those that add a vertex.
+    border : float
+        Of the steps with room for one triangle those that add a vertex on the border.
+    drop : float
+        Of the steps those that drop a vertex.
+    """
+
+    near: float = 0.9
+    fill: float = 0.2
+    border: float = 0.02
+    drop: float = 0.01
+
+
+USUAL_MOVES = MoveShares()
+# Triangles compared for a far move, and vertices compared for a change of size.
+FAR_TRIES = 4
+SIZE_TRIES = 12
+# Rounds of changing the size that find no vertex before it is given up.
+FIT_FAILURES = 20
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _next(state: np.ndarray) -> int:
+    """Advance a xorshift64* generator (Vigna 2016); 63 bits."""
+    x = state[0]
+    x ^= x >> np.uint64(12)
+    x ^= x << np.uint64(25)
+    x ^= x >> np.uint64(27)
+    state[0] = x
+    return np.int64((x * np.uint64(2685821657736338717)) >> np.uint64(1))
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _below(state: np.ndarray, n: int) -> int:
+    return _next(state) % n
+
+
+@njit(cache=True, nogil=True, forceinline=True)
+def _unit(state: np.ndarray) -> float:
+    return ((_next(state) >> 10) + 1) * 2.0**-53
+
+
+@njit(cache=True, nogil=True)
+def _taken(xy: np.ndarray, site: np.ndarray, w: int) -> bool:
+    """Whether some site has the position of vertex w; those at one position follow each other."""
+    if site[w]:
+        return True
+    for step in (-1, 1):
+        i = w + step
+        while 0 <= i < len(site) and xy[2 * i] == xy[2 * w] and xy[2 * i + 1] == xy[2 * w + 1]:
+            if site[i]:
+                return True
+            i += step
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _urgent(g: Ground, live: Live, n: int, state: np.ndarray) -> int:
+    """Draw a vertex that is no site, from the triangle with the largest error of a few; -1 if none was met."""
+    best = -1
+    most = -1.0
+    for _ in range(FAR_TRIES):
+        i = _below(state, n)
+        if not live.site[i]:
+            amount = live.subtotal[live.place[i] >> 3] if live.bare_at[i] < 0 else live.cost[i]
+            if amount > most:
+                most = amount
+                best = i
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _anneal(
+    g: Ground,
+    live: Live,
+    movable: np.ndarray,
+    n_movable: int,
+    border: np.ndarray,
+    indptr: np.ndarray,
+    indices: np.ndarray,
+    moves: int,
+    hot: float,
+    cooling: float,
+    most: int,
+    shares: tuple,  # type: ignore[type-arg]
+    state: np.ndarray,
+    stop: np.ndarray,
+    best_movable: np.ndarray,
+) -> int:
+    """Walk among the subsets of at most ``most`` triangles; return the number of entries of ``best_movable``."""
+    g = borrowed(g)
+    live = borrowed(live)
+    movable = borrowed(movable)
+    border = borrowed(border)
+    indptr = borrowed(indptr)
+    indices = borrowed(indices)
+    state = borrowed(state)
+    n = len(g.z)
+    near, fill, on_border, drop = shares
+    site = live.site
+    count = live.tally
+    now = total_cost(live)
+    best = now
+    n_best = n_movable
+    best_movable[:n_best] = movable[:n_best]
+    kept_best = True  # whether best_movable holds the best state already
+    temperature = hot
+    for step in range(moves):
+        if step % 64 == 0:
+            temperature = hot * cooling ** (step / moves)
+            if stop[0]:
+                break
+        slack = most - count[N_EMITTED]
+        kind = _unit(state)
+        q = _below(state, n_movable) if n_movable > 0 else 0
+        v = np.int64(-1)
+        w = np.int64(-1)
+        if slack > 0 and kind < (fill if slack > 1 else on_border):
+            # Room for a vertex more; where there is room for one triangle only, it must be on the border.
+            w = _urgent(g, live, n, state) if slack > 1 else np.int64(border[_below(state, len(border))])
+        elif n_movable == 0:
+            continue
+        else:
+            v = movable[q]
+            if kind < 1.0 - drop:
+                if _unit(state) < near:
+                    w = v
+                    for _ in range(1 + _below(state, 2)):
+                        degree = indptr[w + 1] - indptr[w]
+                        w = np.int64(indices[indptr[w] + _below(state, degree)])
+                else:
+                    w = _urgent(g, live, n, state)
+                if w < 0:
+                    continue
+        if w >= 0 and _taken(g.xy, site, w):
+            continue
+        if v < 0 and w < 0:
+            continue
+        limit = -temperature * np.log(_unit(state))
+        change, triangles = try_exchange(g, live, v, w, limit)
+        if not change <= limit or triangles > slack:
+            continue
+        if change > 0.0 and not kept_best and now <= best:
+            best_movable[:n_movable] = movable[:n_movable]
+            n_best = n_movable
+            kept_best = True
+        if not exchange(g, live, v, w):
+            continue
+        if v >= 0 and w >= 0:
+            movable[q] = w
+        elif w >= 0:
+            movable[n_movable] = w
+            n_movable += 1
+        else:
+            n_movable -= 1
+            movable[q] = movable[n_movable]
+        now = total_cost(live)
+        if now < best:
+            best = now
+            kept_best = False
+    if not kept_best and now <= best:
+        best_movable[:n_movable] = movable[:n_movable]
+        n_best = n_movable
+    return n_best
+
+
+@njit(cache=True, nogil=True)
+def _fit(g: Ground, live: Live, fixed: np.ndarray, which: int, wanted: int, state: np.ndarray) -> None:
+    """Drop or add vertices, each the best of a few drawn, until ``tally[which]`` is ``wanted`` or just below it."""
+    g = borrowed(g)
+    live = borrowed(live)
+    n = len(g.z)
+    count = live.tally
+    failures = 0
+    while count[which] != wanted and failures < FIT_FAILURES:
+        shrink = count[which] > wanted
+        best_v = np.int64(-1)
+        best_w = np.int64(-1)
+        least = np.inf
+        for _ in range(SIZE_TRIES):
+            i = np.int64(_below(state, n))
+            v = np.int64(-1)
+            w = np.int64(-1)
+            if shrink:
+                # The vertex drawn or the next site along the curve.
+                for _step in range(n):
+                    i = i + 1 if i + 1 < n else 0
+                    if live.site[i] and not fixed[i]:
+                        v = i
+                        break
+                if v < 0:
+                    break
+            else:
+                w = np.int64(_urgent(g, live, n, state))
+                if w < 0 or _taken(g.xy, live.site, w):
+                    continue
+            change, triangles = try_exchange(g, live, v, w, np.inf)
+            if not shrink and which == N_EMITTED and count[N_EMITTED] + triangles > wanted:
+                continue
+            if change < least:
+                least = change
+                best_v = v
+                best_w = w
+        if (best_v < 0 and best_w < 0) or not exchange(g, live, best_v, best_w):
+            failures += 1
+
+
+def _thin_to(ground: Ground, live: Live, pinned: NDArray[np.bool_], triangles: int) -> None:
+    """Remove the vertices that add the least error until there are at most so many triangles."""
+    if live.tally[N_EMITTED] > triangles:
+        sites = np.flatnonzero(live.site[: len(pinned)])
+        n = len(sites) + 1
+        removed, error, counts = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
+        thin_live(ground, live, sites, pinned, triangles, np.inf, removed, error, counts)
+
+
+def relocate(
+    model: OpenModel,
+    kept: NDArray[np.bool_],
+    pinned: NDArray[np.bool_],
+    *,
+    moves: int,
+    seed: int,
+    size: int | None = None,
+    triangles: int | None = None,
+    temperature: float = 0.3,
+    cooling: float = 0.03,
+    shares: MoveShares = USUAL_MOVES,
+    footprint: str = "model",
+    outside: str = "nearest",
+    measure: str = "error",
+    stop: NDArray[np.bool_] | None = None,
+) -> NDArray[np.bool_]:
+    """Return a subset of no more triangles with less error, or ``kept`` itself: annealed moves, the best state seen.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    kept : (N,) bool array
+        Where to start; must span a triangle of the mesh.
+    pinned : (N,) bool array
+        Vertices that stay.
+    moves : int
+        Number of moves to try, a microsecond or two each.
+    seed : int
+        Of the random moves, 1 or more.
+    size : int, optional
+        Number of vertices to bring the subset to before the moves.
+    triangles : int, optional
+        Number of triangles to bring it to before the moves, which is not exceeded by them; by default as many as the
+        subset has.
+    temperature : float
+        Initial temperature, in units of the error per kept vertex. 0 accepts improvements only.
+    cooling : float
+        Share of the temperature that is left in the end; in between it falls geometrically.
+    shares : MoveShares
+        How often each kind of move is tried.
+    footprint, outside : str
+        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
+    measure : {"error", "rms_error"}
+        What is lowered: the sum of w_p d_p, or of w_p times the square of d_p.
+    stop : (1,) bool array, optional
+        The moves end soon after another thread has set it.
+
+    Returns
+    -------
+    (N,) bool array
+        Kept vertices at the position of another kept one are left out: they are in no mesh.
+    """
+    n = model.n_vertices
+    live = lent_live(n)
+    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
+    kept = kept | pinned
+    sites = np.flatnonzero(kept)
+    if model.kernel_arguments[3]:
+        sites = sites[np.r_[True, (model.xy[sites[1:]] != model.xy[sites[:-1]]).any(axis=1)]]
+    build(ground, live, model, sites)
+    state = np.array([seed], np.uint64)
+    if size is not None:
+        _fit(ground, live, pinned, N_SITES, size, state)
+    if triangles is not None:
+        _thin_to(ground, live, pinned, triangles)
+        _fit(ground, live, pinned, N_EMITTED, triangles, state)
+    result = live.site[:n] == 1
+    rows = np.flatnonzero(result & ~pinned)
+    total = max(float(total_cost(live)), 0.0)
+    if moves > 0 and np.isfinite(total):
+        movable = np.empty(n, np.int64)
+        movable[: len(rows)] = rows
+        best = np.empty(n, np.int64)
+        n_best = _anneal(
+            ground,
+            live,
+            movable,
+            len(rows),
+            model.border,
+            *model.neighbours,
+            moves,
+            temperature * total / max(len(rows), 1),
+            cooling,
+            int(live.tally[N_EMITTED]) if triangles is None else triangles,
+            tuple(map(float, shares)),
+            state,
+            np.zeros(1, np.bool_) if stop is None else stop,
+            best,
+        )
+        result &= pinned
+        result[best[:n_best]] = True
+    return result
+
+
+def relocate_all(
+    problem: Any,
+    X: NDArray[np.bool_],
+    moves: NDArray[np.integer],
+    random_state: np.random.Generator,
+    *,
+    sizes: NDArray[np.integer] | None = None,
+    triangles: NDArray[np.integer] | None = None,
+    temperature: float = 0.3,
+    cooling: float = 0.03,
+    shares: MoveShares = USUAL_MOVES,
+) -> NDArray[np.bool_]:
+    """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number."""
+    measure = summed_measure(problem)
+    stop = np.zeros(1, np.bool_)
+    seeds = random_state.integers(1, 2**63 - 1, size=len(X))
+
+    def one(k: int) -> NDArray[np.bool_]:
+        return relocate(
+            problem.model,
+            X[k],
+            problem.pinned,
+            moves=int(moves[k]),
+            seed=int(seeds[k]),
+            size=None if sizes is None else int(sizes[k]),
+            triangles=None if triangles is None else int(triangles[k]),
+            temperature=temperature,
+            cooling=cooling,
+            shares=shares,
+            footprint=problem.footprint,
+            outside=problem.outside,
+            measure=measure,
+            stop=stop,
+        )
+
+    try:
+        rows = list(thread_pool().map(one, range(len(X))))
+    except BaseException:  # Ctrl-C: the other threads are not to keep the process alive
+        stop[0] = True
+        raise
+    return np.array(rows) if rows else X.copy()

@@ -1,0 +1,411 @@
+"""Search that starts from the greedy pass and anneals down a ladder of sizes: the front to beat.
+
+The population is a ladder: every rung is a number of triangles and holds the best mesh found of at most that many. In a
+generation some rungs, far apart, get a child each, annealed at the rung's size: in the first generation their own
+mesh, in the following ones, one rung lower each, the mesh of the rung above, so that good places are handed down the
+ladder (Ho, Shu, Chen 2004 call the passing on of solutions between neighbouring sizes inheritance). When all rungs have
+had their turn, a sweep, the next sweep begins, with twice as many moves, or with as many as fit in the time that is
+left. One slow sweep gives better meshes than several quick ones.
+
+The error on a rung never grows, so the front is never worse than the thinning it started from.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.algorithms.base.genetic import GeneticAlgorithm
+from pymoo.core.mating import Mating
+from pymoo.core.population import Population
+from pymoo.core.survival import Survival
+from pymoo.termination.max_time import TimeBasedTermination
+from pymoo.util.display.multi import MultiObjectiveOutput
+from pymoo.util.optimum import filter_optimum
+
+from meshsimp_pymoo.search.greedy import NestedFront, thinning
+from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
+from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
+from meshsimp_pymoo.search.operators.requirements import summed_measure
+from meshsimp_pymoo.search.operators.sampling import nested_front
+from meshsimp_pymoo.workers import thread_pool
+
+# Rungs that get a child in the same generation.
+CHAINS = 16
+# Above this share of the vertices a rung gets no more moves than there, however many it keeps.
+FULL_SHARE = 0.25
+# Temperatures, in units of the error per kept vertex, and the share left in the end: where a chain begins, and below.
+FRESH = (0.3, 0.03)
+AGAIN = (0.15, 0.1)
+# Moves a kept vertex in the first sweep unless told: as many as make this total, within the bounds.
+TOTAL_MOVES = 2e7
+MOVES_PER_VERTEX = (20.0, 1000.0)
+# With a time limit: the share of the first sweep, the most moves a kept vertex, and seconds a move before any is timed.
+FIRST_SHARE = 0.12
+SLOWEST = 4000.0
+SECONDS_A_MOVE = 2e-6
+# Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs.
+LAST_SHARE = 0.03
+FILL_SECONDS = 40.0
+# The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
+IDLE = 12
+# In the final front neighbours differ by this share of the error, or by the smaller one where a rung is better than the
+# thinned model by less than twice the first, so that no gap is worse than thinning; with at most so many meshes between
+# two rungs and so many entries of their subsets in all.
+STEP = 0.015
+SMALL_STEP = 0.008
+BETWEEN = 24
+ENTRIES = 2e8
+
+
+class SizeLadder(Survival):
+    """On every rung the individual of least error among those of at most so many triangles.
+
+    Parameters
+    ----------
+    rungs : (R,) int array, optional
+        Numbers of triangles; by default those of the first population.
+    """
+
+    def __init__(self, rungs: NDArray[np.integer] | None = None) -> None:
+        super().__init__(filter_infeasible=False)
+        self.rungs = None if rungs is None else np.unique(rungs)
+
+    def best(self, problem: Any, pop: Population) -> NDArray[np.int64]:
+        """Return for each rung the row of its best individual in the population, -1 where none is small enough."""
+        F = pop.get("F")
+        if self.rungs is None:
+            self.rungs = np.unique(F[:, 1])
+        violation = pop.get("CV").ravel() if problem.has_constraints() else np.zeros(len(pop))
+        # By violation, then error, then triangles: the first of those small enough is a rung's best.
+        order = np.lexsort((F[:, 1], F[:, 0], violation))
+        triangles = F[order, 1]
+        rows = np.full(len(self.rungs), -1)
+        for k, rung in enumerate(self.rungs):
+            fitting = np.flatnonzero(triangles <= rung)
+            if len(fitting):
+                rows[k] = order[fitting[0]]
+        return rows
+
+    def _do(self, problem: Any, pop: Population, *args: Any, n_survive: int | None = None, **kwargs: Any) -> Population:
+        rows = self.best(problem, pop)
+        return pop[np.unique(rows[rows >= 0])]
+
+
+class DownTheLadder(Mating):
+    """Children of the next larger rung, annealed at the rung's size; see the module's text.
+
+    Parameters
+    ----------
+    ladder : SizeLadder
+        The rungs.
+    moves_per_vertex : float, optional
+        Moves for each kept vertex in the first sweep; twice as many in each later one, up to 1000. By default as many
+        as take some tens of seconds. With a time limit as many as fit.
+    n_chains : int
+        Children in a generation, on rungs far apart.
+    inherit : bool
+        Whether a rung is given the mesh of the rung above, or goes on from its own.
+    heat : float
+        Factor of all temperatures; 0 accepts improvements only.
+    shares : MoveShares
+        How often each kind of move is tried.
+    """
+
+    def __init__(
+        self,
+        ladder: SizeLadder,
+        moves_per_vertex: float | None = None,
+        *,
+        n_chains: int = CHAINS,
+        inherit: bool = True,
+        heat: float = 1.0,
+        shares: MoveShares = USUAL_MOVES,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(None, None, None, **kwargs)
+        self.ladder = ladder
+        self.moves_per_vertex = moves_per_vertex
+        self.n_chains = n_chains
+        self.inherit = inherit
+        self.heat = heat
+        self.shares = shares
+        self.sweep = 0
+        self.step = 0
+        self.moves_done = 0.0
+        self.seconds = 0.0
+
+    def do(
+        self,
+        problem: Any,
+        pop: Population,
+        n_offsprings: int,
+        *,
+        random_state: np.random.Generator,
+        algorithm: Any = None,
+        **kwargs: Any,
+    ) -> Population:
+        """Return the children of the rungs whose turn it is, not evaluated."""
+        rungs = self.ladder.rungs
+        assert rungs is not None
+        rows = self.ladder.best(problem, pop)
+        X = pop.get("X")
+        # Rungs from the largest down, cut into chains; each chain does one rung a generation.
+        chains = [chain for chain in np.array_split(np.arange(len(rungs))[::-1], self.n_chains) if len(chain)]
+        turn = np.array([chain[self.step] for chain in chains if self.step < len(chain)])
+        turn = turn[rows[turn] >= 0]
+        # A chain begins with its own first rung, shaken thoroughly, and hands the result down.
+        fresh = self.step == 0 or not self.inherit
+        temperature, cooling = FRESH if fresh else AGAIN
+        temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
+        parents = rows[turn if fresh else turn + 1]
+        work = self._work(problem, pop, rows)
+        left = sum(work[chain[self.step :]].sum() for chain in chains)
+        moves = np.ceil(self._pace(problem, algorithm, work.sum(), left) * work[turn]).astype(int)
+        begun = time.perf_counter()
+        children = relocate_all(
+            problem,
+            X[parents],
+            moves,
+            random_state,
+            triangles=rungs[turn].astype(int),
+            temperature=temperature,
+            cooling=cooling,
+            shares=self.shares,
+        )
+        self.seconds += time.perf_counter() - begun
+        self.moves_done += float(moves.sum())
+        self.step += 1
+        if self.step >= max(len(chain) for chain in chains):
+            self.step = 0
+            self.sweep += 1
+        return self.eliminate_duplicates.do(Population.new(X=children), pop)
+
+    @staticmethod
+    def _work(problem: Any, pop: Population, rows: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the moves of each rung if there is one for each kept vertex, up to a share of all vertices."""
+        kept = (pop.get("X") & ~problem.pinned).sum(axis=1)[np.maximum(rows, 0)]
+        return np.minimum(np.maximum(kept, 1), FULL_SHARE * problem.n_var)
+
+    def _pace(self, problem: Any, algorithm: Any, whole: float, left: float) -> float:
+        """Return the moves for each kept vertex, given the work of a whole sweep and of what is left of it."""
+        deadline = time_limit(algorithm)
+        if deadline is None:
+            lowest, highest = MOVES_PER_VERTEX
+            given = self.moves_per_vertex
+            first = min(max(TOTAL_MOVES / whole, lowest), highest) if given is None else given
+            return min(first * 2.0**self.sweep, max(first, highest))
+        a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
+        span, remaining = deadline
+        if self.sweep == 0:
+            remaining -= (1.0 - FIRST_SHARE) * span
+        return min(max(remaining / (a_move * left), 1.0), SLOWEST)
+
+
+def time_limit(algorithm: Any) -> tuple[float, float] | None:
+    """Return the seconds a run has for its search and those left; None where it does not end by time."""
+    termination = getattr(algorithm, "termination", None)
+    for part in getattr(termination, "terminations", [termination]):
+        if isinstance(part, TimeBasedTermination):
+            whole = float(part.max_time)
+            last = max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6)
+            return whole, whole - last - (time.time() - algorithm.start_time)
+    return None
+
+
+class MemeticSearch(GeneticAlgorithm):
+    """The algorithm of :func:`memetic`; in the end it fills the gaps between the rungs."""
+
+    pop: Any
+    opt: Any
+
+    def __init__(self, pop_size: int, triangles: tuple[int, int] | None, **kwargs: Any) -> None:
+        super().__init__(pop_size, **kwargs)
+        self.triangles = triangles
+        self.idle = 0
+
+    def _setup(self, problem: Any, **kwargs: Any) -> None:
+        if problem.n_obj != 2:
+            raise ValueError(f"memetic() is for two objectives and the problem has {problem.n_obj}; use nsga3()")
+        super()._setup(problem, **kwargs)
+
+    def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
+        ladder = self.survival
+        if ladder.rungs is None:
+            low, high = (int(f(infills.get("F")[:, 1])) for f in (np.min, np.max))
+            if self.triangles is not None:
+                low, high = max(low, self.triangles[0]), min(max(high, low), self.triangles[1])
+            ladder.rungs = np.unique(np.round(np.geomspace(low, max(high, low), self.pop_size)).astype(int))
+        super()._initialize_advance(infills=infills, **kwargs)
+
+    def _infill(self) -> Population:
+        deadline = time_limit(self)
+        if deadline is not None and deadline[1] <= 0.0:
+            self.termination.force_termination = True
+            return Population.create()
+        children = self.mating.do(
+            self.problem, self.pop, self.n_offsprings, algorithm=self, random_state=self.random_state
+        )
+        # All of them known: no child may be left to find, and a budget of evaluations would never be used up.
+        self.idle = 0 if len(children) else self.idle + 1
+        if self.idle >= max(IDLE, 2 * sweep_generations(self.pop_size)):
+            self.termination.force_termination = True
+        return children
+
+    def _advance(self, infills: Any = None, **kwargs: Any) -> None:
+        if not len(infills):
+            return
+        self.pop = self.survival.do(
+            self.problem,
+            Population.merge(self.pop, infills),
+            n_survive=self.pop_size,
+            algorithm=self,
+            random_state=self.random_state,
+        )
+
+    def _finalize(self) -> None:
+        """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
+        pop = self.pop
+        thinned = nested_front(self.problem, self)
+        X = between_the_rungs(self.problem, pop.get("X"), pop.get("F"), thinned, most=self.survival.rungs[-1])
+        if len(X):
+            extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
+            self.evaluator.eval(self.problem, extra, algorithm=self)
+            self.opt = filter_optimum(Population.merge(self.opt, extra), least_infeasible=True)
+
+
+def between_the_rungs(
+    problem: Any, X: NDArray[np.bool_], F: NDArray[np.float64], thinned: NestedFront, *, most: float
+) -> NDArray[np.bool_]:
+    """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
+
+    Beyond the most accurate of them, where keeping all vertices is not the best (a scan whose outline is not covered),
+    those of the thinned model that are better, of at most ``most`` triangles.
+    """
+    order = np.argsort(F[:, 1], kind="stable")
+    measure = summed_measure(problem)
+    most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
+
+    def one(k: int) -> list[NDArray[np.bool_]]:
+        low, high = F[order[k - 1], 1], F[order[k], 1]
+        ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
+        by_thinning = _best_of(thinned, high)[0]
+        step = STEP if F[order[k], 0] < (1.0 - 2.0 * STEP) * by_thinning else SMALL_STEP
+        n_rows = min(max(int(np.log(max(ratio, 1.0)) / step), 1), BETWEEN, most_rows)
+        wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
+        wanted = wanted[(wanted > low) & (wanted < high)]
+        if not len(wanted):
+            return []
+        fronts = [thinned]
+        if F[order[k], 0] < by_thinning:
+            # The rung is better than the thinned model: so may be what it is thinned to.
+            fronts.append(
+                thinning(
+                    problem.model,
+                    problem.pinned,
+                    kept=X[order[k]],
+                    footprint=problem.footprint,
+                    outside=problem.outside,
+                    measure=measure,
+                    least=int(low),
+                )
+            )
+        rows = []
+        for size in wanted:
+            best = min((_best_of(front, size) for front in fronts), key=lambda choice: choice[0])
+            if best[0] < F[order[k - 1], 0]:
+                rows.append(best[1].kept(best[2]))
+        return rows
+
+    found = [kept for rows in thread_pool().map(one, range(1, len(order))) for kept in rows]
+    better = np.flatnonzero((thinned.error < F[:, 0].min()) & (thinned.triangles <= most))
+    if len(better):
+        best = better[np.argmin(thinned.error[better])]
+        better = better[better <= best]
+        found += [thinned.kept(int(k)) for k in better[np.linspace(0, len(better) - 1, BETWEEN).astype(int)]]
+    return np.array(found).reshape(-1, X.shape[1]).astype(bool)
+
+
+def _best_of(front: NestedFront, most: float) -> tuple[float, NestedFront, int]:
+    """Return the least error of a nested front's meshes of at most so many triangles, the front and the mesh's row."""
+    rows = np.flatnonzero((front.triangles > 0) & (front.triangles <= most))
+    if not len(rows):
+        return np.inf, front, 0
+    k = int(rows[np.argmin(front.error[rows])])
+    return float(front.error[k]), front, k
+
+
+def memetic(
+    pop_size: int = 100,
+    *,
+    triangles: tuple[int, int] | None = None,
+    moves_per_vertex: float | None = None,
+    **kwargs: Any,
+) -> MemeticSearch:
+    """Return the seeded memetic algorithm: thinning, then annealing down a ladder of sizes.
+
+    It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error"). By
+    default it ends after one sweep of the ladder, some tens of seconds for thousands of vertices; with a termination by
+    time it takes as many moves as fit.
+
+    Parameters
+    ----------
+    pop_size : int
+        Rungs of the ladder.
+    triangles : (int, int), optional
+        Smallest and largest number of triangles to look at; all by default.
+    moves_per_vertex : float, optional
+        Moves of the annealing for each kept vertex in the first sweep, twice as many in each later one, up to 1000. By
+        default as many as make twenty million in all, within 20 and 1000; with a termination by time, as many as fit.
+    **kwargs
+        Further arguments of pymoo's ``GeneticAlgorithm``; they replace those set here.
+
+    Raises
+    ------
+    ValueError
+        If ``moves_per_vertex`` is negative.
+    TypeError
+        If ``kwargs`` has a selection, crossover or mutation, which this algorithm does in one step.
+
+    Returns
+    -------
+    MemeticSearch
+        A pymoo algorithm. Its result holds some meshes between the rungs beside the population's.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from meshsimp_pymoo import MeshProblem
+    >>> problem = MeshProblem("roof:9")
+    >>> result = minimize(problem, memetic(20, triangles=(2, 20)), ("n_gen", 4), seed=1)
+    >>> sorted({(float(e), int(t)) for e, t in result.F}, key=lambda row: row[1])[-1]
+    (0.0, 4)
+    """
+    if moves_per_vertex is not None and not moves_per_vertex >= 0:
+        raise ValueError(f"moves_per_vertex = {moves_per_vertex} is no number of at least 0")
+    for name in ("selection", "crossover", "mutation"):
+        if name in kwargs:
+            raise TypeError(f"memetic() makes its children in one step; give mating=... in place of {name}=...")
+    ladder = SizeLadder()
+    duplicates = PackedDuplicates()
+    defaults: dict[str, Any] = {
+        "sampling": NestedSubsets(triangles),
+        "mating": DownTheLadder(ladder, moves_per_vertex, eliminate_duplicates=duplicates),
+        "survival": ladder,
+        "repair": PinnedCorners(),
+        "eliminate_duplicates": duplicates,
+        "output": MultiObjectiveOutput(),
+        "advance_after_initial_infill": True,
+        "n_offsprings": CHAINS,
+    }
+    algorithm = MemeticSearch(pop_size, triangles, **(defaults | kwargs))
+    # What pymoo's constructor would put here cannot compare bool vectors.
+    algorithm.termination = kwargs.get("termination", ("n_gen", sweep_generations(pop_size)))
+    return algorithm
+
+
+def sweep_generations(pop_size: int) -> int:
+    """Return the generations that a sweep of so many rungs takes, the first population included."""
+    return 1 + -(-pop_size // CHAINS)

@@ -1,0 +1,273 @@
+"""Mutations: kept vertices move to other positions, become more or fewer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.mutation import Mutation
+
+from meshsimp_pymoo.search.local_search import relocate_all
+from meshsimp_pymoo.search.operators.requirements import (
+    mesh_neighbours,
+    pinned_vertices,
+    require_bool,
+    require_probability,
+)
+
+# Rows are mutated in blocks of about this many genes, so that even high rates need little memory beside X.
+GENES_PER_BLOCK = 1 << 24
+
+
+class NeighbourShift(Mutation):
+    """Move kept vertices to neighbouring positions; the number of kept vertices never changes.
+
+    Each kept, unpinned vertex tries to move with probability ``prob_var``, independently of the others, to
+    one position drawn uniformly from its neighbours. In the paper this exchanges two neighbouring genes, so a
+    move is possible only where the position is free:
+
+    * the neighbour is kept already: exchanging two equal genes changes nothing, the vertex stays;
+    * the neighbour is pinned: it counts as kept, the vertex stays;
+    * two vertices choose the same free position: the first in vector order gets it, the other stays;
+    * at either end of the vector there is only one neighbour, which is then chosen;
+    * a vertex without neighbours in the mesh stays.
+
+    "Kept already" refers to the solution before the mutation: a position that another move frees counts as
+    taken.
+
+    Parameters
+    ----------
+    prob_var : float, optional
+        The paper's p_m: the probability of one vertex to move. 1 / N by default.
+    along : {"vector", "mesh"}
+        ``"vector"``: to index - 1 or index + 1, as in the paper (neighbours on the vector are close in space,
+        because the vertices are in Hilbert order). ``"mesh"``: to a vertex of the one-ring in the original
+        mesh.
+    prob : float
+        The probability of an individual to be mutated at all.
+
+    Raises
+    ------
+    ValueError
+        If ``along`` is unknown or a probability is not in [0, 1].
+    TypeError
+        When applied to a problem without ``pinned`` (or ``model.neighbours``, along the mesh), or to
+        chromosomes that are not bool.
+    """
+
+    def __init__(self, prob_var: float | None = None, *, along: str = "vector", prob: float = 1.0) -> None:
+        if along not in ("vector", "mesh"):
+            raise ValueError(f"along = {along!r} is unknown; choose 'vector' (as in the paper) or 'mesh'")
+        if prob_var is not None:
+            require_probability("prob_var", prob_var)
+        super().__init__(prob=require_probability("prob", prob), prob_var=prob_var)
+        self.along = along
+
+    def _do(
+        self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
+    ) -> NDArray[np.bool_]:
+        require_bool(X, self)
+        pinned = pinned_vertices(problem, self)
+        neighbours = mesh_neighbours(problem, self) if self.along == "mesh" else None
+        rate = float(self.get_prob_var(problem))
+        shifted = X.copy()
+        rows = max(1, GENES_PER_BLOCK // X.shape[1])
+        for start in range(0, len(X), rows):
+            shift_kept(shifted[start : start + rows], pinned, rate, neighbours, random_state)
+        return shifted
+
+
+class Relocation(Mutation):
+    """Move kept vertices to better places by annealing on the live triangulation; the size stays.
+
+    A local search with a bounded effort whose result is inherited (Lamarckian): the child never has a larger
+    error than it came with. See :func:`~meshsimp_pymoo.search.local_search.relocate` for a single move.
+
+    Parameters
+    ----------
+    moves_per_vertex : float
+        Moves to try for each kept vertex that is not pinned.
+    max_moves : int
+        Moves of all rows together; where there would be more, all rows get fewer. A move takes some
+        microseconds.
+    temperature : float
+        Initial temperature, in units of the error per kept vertex; 0 accepts improvements only.
+    prob : float
+        The probability of an individual to keep the result.
+
+    Raises
+    ------
+    ValueError
+        If one of the numbers is negative or ``prob`` not in [0, 1], and when the problem minimises the maximum.
+    TypeError
+        When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
+    """
+
+    def __init__(
+        self,
+        moves_per_vertex: float = 30.0,
+        *,
+        max_moves: int = 300_000,
+        temperature: float = 0.2,
+        prob: float = 1.0,
+    ) -> None:
+        super().__init__(prob=require_probability("prob", prob))
+        given = {"moves_per_vertex": moves_per_vertex, "max_moves": max_moves, "temperature": temperature}
+        for name, value in given.items():
+            if not value >= 0:
+                raise ValueError(f"{name} = {value} is no number of at least 0")
+        self.moves_per_vertex = moves_per_vertex
+        self.max_moves = max_moves
+        self.temperature = temperature
+
+    def _do(
+        self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
+    ) -> NDArray[np.bool_]:
+        pinned = _require_mesh(problem, X, self)
+        moves = self.moves_per_vertex * (X & ~pinned).sum(axis=1)
+        total = moves.sum()
+        if total > self.max_moves:
+            moves = moves * (self.max_moves / total)
+        return relocate_all(problem, X, moves.astype(int), random_state, temperature=self.temperature)
+
+
+class SizeStep(Mutation):
+    """Change the number of kept vertices by a controlled step: good insertions, or cheap removals.
+
+    The wanted size is the old one times a factor drawn uniformly on the logarithm from 1 / (1 + step) to 1 + step.
+    Vertices are then added or removed one at a time until it is reached, each the best of some drawn by the exact
+    change of the error: candidates for insertion come from triangles with large errors.
+
+    Parameters
+    ----------
+    step : float
+        Largest relative change of the size; at least one vertex.
+    prob : float
+        The probability of an individual to keep the result.
+
+    Raises
+    ------
+    ValueError
+        If ``step`` is negative or ``prob`` not in [0, 1], and when the problem minimises the maximum.
+    TypeError
+        When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
+    """
+
+    def __init__(self, step: float = 0.1, *, prob: float = 1.0) -> None:
+        super().__init__(prob=require_probability("prob", prob))
+        if not step >= 0:
+            raise ValueError(f"step = {step} is no number of at least 0")
+        self.step = step
+
+    def _do(
+        self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
+    ) -> NDArray[np.bool_]:
+        pinned = _require_mesh(problem, X, self)
+        if self.step == 0:
+            return X.copy()
+        free = (X & ~pinned).sum(axis=1)
+        draw = random_state.uniform(-1.0, 1.0, size=len(X))
+        wanted = np.round(free * (1.0 + self.step) ** draw).astype(int)
+        wanted = np.where(wanted == free, free + np.where(draw < 0.0, -1, 1), wanted)
+        sizes = pinned.sum() + np.clip(wanted, 0, int((~pinned).sum()))
+        return relocate_all(problem, X, np.zeros(len(X), int), random_state, sizes=sizes)
+
+
+def _require_mesh(problem: Any, X: NDArray[np.bool_], operator: object) -> NDArray[np.bool_]:
+    """Return the pinned vertices (N,) of a mesh problem; refuse other problems, and chromosomes that are not bool."""
+    pinned = pinned_vertices(problem, operator)
+    mesh_neighbours(problem, operator)
+    require_bool(X, operator)
+    return pinned
+
+
+def shift_kept(
+    X: NDArray[np.bool_],
+    pinned: NDArray[np.bool_],
+    rate: float,
+    neighbours: tuple[NDArray[np.integer], NDArray[np.integer]] | None,
+    rng: np.random.Generator,
+) -> None:
+    """Move kept vertices of all rows in place, by the rules of `NeighbourShift`.
+
+    Parameters
+    ----------
+    X : (n, N) bool array
+        Chromosomes; changed in place.
+    pinned : (N,) bool array
+        Vertices that neither move nor give way.
+    rate : float
+        The probability of each kept, unpinned vertex to try a move.
+    neighbours : (indptr, indices) or None
+        CSR one-rings, or None for the positions before and after on the vector.
+    rng : numpy.random.Generator
+        Source of randomness.
+    """
+    n_vertices = X.shape[1]
+    # Every gene of the block is drawn with the rate; those that are not a kept, free-to-move vertex drop out.
+    row, vertex = np.divmod(bernoulli_positions(X.size, rate, rng), n_vertices)
+    movable = X[row, vertex] & ~pinned[vertex]
+    if not movable.any():
+        return
+    row, vertex = row[movable], vertex[movable]
+
+    if neighbours is None:
+        target = vertex + np.where(rng.random(len(vertex)) < 0.5, -1, 1)
+        target[target < 0] = 1
+        target[target == n_vertices] = n_vertices - 2
+    else:
+        indptr, indices = neighbours
+        degree = indptr[vertex + 1] - indptr[vertex]
+        chosen = (rng.random(len(vertex)) * degree).astype(np.int64)
+        connected = degree > 0
+        row, vertex, chosen = row[connected], vertex[connected], chosen[connected]
+        target = indices[indptr[vertex] + chosen].astype(np.int64)
+
+    free = ~(X[row, target] | pinned[target])
+    row, vertex, target = row[free], vertex[free], target[free]
+    if len(row) > 1:
+        first = np.unique(row * n_vertices + target, return_index=True)[1]
+        row, vertex, target = row[first], vertex[first], target[first]
+    X[row, vertex] = False
+    X[row, target] = True
+
+
+def bernoulli_positions(n: int, rate: float, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return the positions of the successes among ``n`` independent trials, ascending.
+
+    Draws the gaps between successes (geometric), hence time and memory of the order of the successes, not of
+    ``n``.
+
+    Parameters
+    ----------
+    n : int
+        Number of trials.
+    rate : float
+        Probability of success of each.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    (k,) int array
+        Positions in 0 ... n - 1, k being binomially distributed.
+
+    Examples
+    --------
+    >>> bernoulli_positions(5, 1.0, np.random.default_rng(0)).tolist()
+    [0, 1, 2, 3, 4]
+    """
+    if rate <= 0.0:
+        return np.empty(0, dtype=np.int64)
+    expected = n * rate
+    size = int(expected + 4.0 * np.sqrt(expected)) + 8
+    parts: list[NDArray[np.int64]] = []
+    last = -1
+    while last < n:
+        # A gap beyond the end ends the draw; cut it, or very small rates would overflow the sum.
+        gaps = np.minimum(rng.geometric(rate, size=size), n + 1)
+        parts.append(last + np.cumsum(gaps))
+        last = int(parts[-1][-1])
+    positions = parts[0] if len(parts) == 1 else np.concatenate(parts)
+    return positions[: np.searchsorted(positions, n)]

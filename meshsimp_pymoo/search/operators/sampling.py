@@ -1,0 +1,121 @@
+"""Where evolution starts: random subsets of the vertices, or those of a greedy pass."""
+
+from __future__ import annotations
+
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.sampling import Sampling
+
+from meshsimp_pymoo.search.greedy import NestedFront, thinning
+from meshsimp_pymoo.search.operators.requirements import (
+    mesh_neighbours,
+    pinned_vertices,
+    require_probability,
+    summed_measure,
+)
+
+
+class RandomSubset(Sampling):
+    """Random subsets of every size: the first population of the paper.
+
+    Each individual draws its own size, uniformly from the number of pinned vertices to N (both included),
+    then a subset of that size, uniformly among those that hold all pinned vertices. The population therefore
+    spreads over the whole range of triangle counts from the start; independent coin flips would put all of it
+    at N / 2.
+
+    Raises
+    ------
+    TypeError
+        When sampling for a problem without ``pinned``.
+    """
+
+    def _do(
+        self, problem: Any, n_samples: int, *args: Any, random_state: np.random.Generator, **kwargs: Any
+    ) -> NDArray[np.bool_]:
+        pinned = pinned_vertices(problem, self)
+        free = np.flatnonzero(~pinned)
+        sizes = random_state.integers(0, len(free), size=n_samples, endpoint=True)
+        X = np.empty((n_samples, len(pinned)), dtype=bool)
+        for kept, size in zip(X, sizes, strict=True):
+            # Draw whichever of the two sides is smaller: kept or dropped vertices.
+            draw_dropped = 2 * size > len(free)
+            n_drawn = len(free) - size if draw_dropped else size
+            drawn = free[random_state.choice(len(free), n_drawn, replace=False, shuffle=False)]
+            kept[:] = draw_dropped
+            kept[drawn] = not draw_dropped
+            kept[pinned] = True
+        return X
+
+
+class NestedSubsets(Sampling):
+    """Subsets of adaptive thinning at sizes spread evenly over the logarithm, mixed with random ones.
+
+    Thinning runs once and gives a subset of every size (see :func:`~meshsimp_pymoo.search.greedy.thinning`).
+
+    Parameters
+    ----------
+    triangles : (int, int), optional
+        Smallest and largest number of triangles to sample; all by default.
+    random_share : float
+        Share of the population that are random subsets instead.
+
+    Raises
+    ------
+    ValueError
+        If the range or the share makes no sense.
+    TypeError
+        When sampling for a problem that is no ``MeshProblem``.
+    """
+
+    def __init__(self, triangles: tuple[int, int] | None = None, random_share: float = 0.0) -> None:
+        super().__init__()
+        if triangles is not None and not 1 <= triangles[0] <= triangles[1]:
+            raise ValueError(f"triangles={triangles} is no range; give (lowest, highest), from 1 upwards")
+        self.triangles = triangles
+        self.random_share = require_probability("random_share", random_share)
+
+    def _do(
+        self, problem: Any, n_samples: int, *args: Any, random_state: np.random.Generator, **kwargs: Any
+    ) -> NDArray[np.bool_]:
+        pinned = pinned_vertices(problem, self)
+        n_random = int(self.random_share * n_samples)
+        front = nested_front(problem, self)
+        rows = np.flatnonzero(front.triangles > 0)
+        if self.triangles is not None:
+            low, high = self.triangles
+            inside = rows[(front.triangles[rows] >= low) & (front.triangles[rows] <= high)]
+            if not len(inside):
+                raise ValueError(
+                    f"thinning has no mesh of {low} to {high} triangles; it goes from {front.triangles[rows].min()} to "
+                    f"{front.triangles[rows].max()}"
+                )
+            rows = inside
+        wanted = np.geomspace(rows[0] + 1, rows[-1] + 1, n_samples - n_random) - 1
+        X = np.empty((n_samples, len(pinned)), dtype=bool)
+        for kept, k in zip(X, np.clip(np.round(wanted).astype(int), rows[0], rows[-1]), strict=False):
+            kept[:] = front.kept(int(k))
+        if n_random:
+            X[n_samples - n_random :] = RandomSubset()._do(problem, n_random, random_state=random_state)
+        return X
+
+
+def nested_front(problem: Any, operator: object) -> NestedFront:
+    """Return the thinning of the problem's model, computed once a problem."""
+    mesh_neighbours(problem, operator)  # asks for a MeshProblem, with its message
+    front = _FRONTS.get(problem)
+    if front is None:
+        front = thinning(
+            problem.model,
+            problem.pinned,
+            footprint=problem.footprint,
+            outside=problem.outside,
+            measure=summed_measure(problem),
+        )
+        _FRONTS[problem] = front
+    return front
+
+
+_FRONTS: WeakKeyDictionary[Any, NestedFront] = WeakKeyDictionary()

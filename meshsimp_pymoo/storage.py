@@ -1,0 +1,898 @@
+"""What a simplification leaves on disk: written whole or not at all, read back with every number checked.
+
+::
+
+    OUT/front.csv      one row per solution, sorted by triangles; the columns are FRONT_COLUMNS
+    OUT/meshes/        007_412.ply is solution 7, of 412 triangles; see the column ``mesh``
+    OUT/chosen.ply     the solution that was asked for, if one was
+    OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
+                       the columns REFIT_COLUMNS too
+    OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
+    OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
+    OUT/run.json       settings, seed, package versions, evaluations, seconds, hash of the model
+    OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
+    OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
+
+All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
+the same front. Floats are written
+with the fewest digits that read back to the same number. Everything is written to a hidden folder beside OUT,
+flushed to the disk and then renamed, so that OUT is either complete or absent.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import platform
+import struct
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError, reason_of
+from meshsimp_pymoo.files import (
+    new_folder,
+    partial_folder,
+    path_from,
+    read_npz,
+    stays_inside,
+    write_csv,
+    write_npz,
+)
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.refit import Refitted
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.integer[Any]]
+BoolArray = npt.NDArray[np.bool_]
+
+FRONT_COLUMNS = (
+    "solution",
+    "error",
+    "triangles",
+    "vertices",
+    "mean_error",
+    "rms_error",
+    "max_error",
+    "uncovered",
+    "mesh",
+)
+REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
+# The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
+SERIES_COLUMNS = ("series", "minimised", "triangles")
+INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
+MESH_FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
+# A LandXML file is called .xml everywhere; the name of the format is understood too.
+MESH_SUFFIXES = (*MESH_FORMATS, "xml")
+SINGLE_PRECISION_LOSS = 1e-6  # share of the model's diagonal; a larger shift of a vertex is worth a warning
+MOST_COUNTED = 2**53  # no mesh has so many triangles
+MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
+CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
+OWN_ENTRIES = (
+    "front.csv", "front.npz", "front.png", "run.json", "meshes",
+    "report.html", "tables", "figures", "times.csv", "refitted",
+    "nested.npz", "tiles", "series.csv",
+)  # fmt: skip
+CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
+PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
+
+# PLY has no 64-bit integers, no half floats and no booleans: such attributes are written in the next type
+# that holds them.
+PLY_TYPES = {
+    "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
+    "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
+}  # fmt: skip
+PLY_WIDER = {"b1": "u1", "f2": "f4", "i8": "f8", "u8": "f8"}
+PLY_COLORS = ("red", "green", "blue", "alpha")
+
+# glTF 2.0: the numbers of the types, of what a buffer is for, and of "triangles".
+GLTF_FLOAT, GLTF_UINT, GLTF_UBYTE = 5126, 5125, 5121
+GLTF_VERTICES, GLTF_INDICES, GLTF_TRIANGLES = 34962, 34963, 4
+LANDXML = "http://www.landxml.org/schema/LandXML-1.2"
+# LandXML demands a date and a time; one that never changes keeps equal meshes equal.
+LANDXML_DATE = {"date": "1980-01-01", "time": "00:00:00"}
+# What a CRS calls its unit, and LandXML's system of units and names for it; metres where nothing is known.
+LANDXML_UNITS = {
+    "metre": ("Metric", "meter"), "meter": ("Metric", "meter"), "m": ("Metric", "meter"),
+    "kilometre": ("Metric", "kilometer"), "foot": ("Imperial", "foot"), "ft": ("Imperial", "foot"),
+    "us survey foot": ("Imperial", "USSurveyFoot"), "ftus": ("Imperial", "USSurveyFoot"),
+}  # fmt: skip
+LANDXML_MEASURES = {
+    "Metric": {
+        "areaUnit": "squareMeter", "volumeUnit": "cubicMeter",
+        "temperatureUnit": "celsius", "pressureUnit": "milliBars",
+    },
+    "Imperial": {
+        "areaUnit": "squareFoot", "volumeUnit": "cubicFeet",
+        "temperatureUnit": "fahrenheit", "pressureUnit": "inchHG",
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFront:
+    """A front read back from its folder.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it was read.
+    quality : dict of str to (S,) array
+        The numbers of front.csv by column, sorted by triangles.
+    kept : (S, N) bool array
+        The chromosomes, in vector order.
+    source_index : (N,) int array
+        Row of each vertex in the model's file.
+    meshes : tuple of str
+        Path of each solution's mesh relative to the folder; empty where it was not written.
+    run : dict
+        The content of run.json.
+    refitted_error : (S,) float array, optional
+        The error with the best heights, NaN where it was not computed; None if heights were not fitted.
+    refitted_meshes : tuple of str
+        Path of each mesh with its best heights, relative to the folder; empty where there is none.
+    series : dict of str to (n, 2) float array
+        Other fronts to compare with: the error that was minimised [model units] and triangles, by name.
+    """
+
+    folder: Path
+    quality: dict[str, npt.NDArray[Any]]
+    kept: BoolArray
+    source_index: IntArray
+    meshes: tuple[str, ...]
+    run: dict[str, Any] = field(default_factory=dict)
+    refitted_error: FloatArray | None = None
+    refitted_meshes: tuple[str, ...] = ()
+    series: dict[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def F(self) -> FloatArray:
+        """The objectives, (S, 2): error [model units] and triangles."""
+        return np.column_stack([self.quality["error"], self.quality["triangles"]]).astype(np.float64)
+
+
+def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Check, before any work, that results can be written to this folder; nothing is left behind.
+
+    Parameters
+    ----------
+    folder : path
+        The folder to be made. Missing parents are made when the results are written.
+    overwrite : bool
+        Accept a folder that holds results of this package already; they are replaced when the new ones are
+        complete.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ResultError
+        If it exists (or, with ``overwrite``, holds anything that is not ours), or cannot be made.
+    """
+    folder = Path(folder)
+    target = folder.resolve()
+    if target.exists() and not target.is_dir():
+        raise ResultError(f"{folder}: is a file; name a new folder")
+    if target.exists():
+        if not overwrite:
+            raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
+        foreign = sorted(
+            e.name
+            for e in target.iterdir()
+            if e.name not in OWN_ENTRIES and e.stem not in CHOSEN and not _of_unfinished(e.name)
+        )
+        if foreign:
+            raise ResultError(
+                f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
+                "name another folder"
+            )
+    parent = target.parent
+    while not parent.exists():
+        parent = parent.parent
+    try:
+        partial_folder(parent / target.name).rmdir()
+    except OSError as problem:
+        raise ResultError(
+            f"{folder}: cannot be written in {parent} ({problem.strerror}); name another folder"
+        ) from None
+    return folder
+
+
+def is_unfinished(folder: str | os.PathLike[str]) -> bool:
+    """Tell whether a folder is there and holds nothing but what a search leaves that was killed."""
+    return Path(folder).is_dir() and all(_of_unfinished(entry.name) for entry in Path(folder).iterdir())
+
+
+def _of_unfinished(name: str) -> bool:
+    stem = Path(CHECKPOINT).stem
+    return name in (CHECKPOINT, ".lock") or (name.startswith(f".{stem}.") and ".partial" in name)
+
+
+def write_front(
+    folder: str | os.PathLike[str],
+    model: OpenModel,
+    quality: Sequence[Quality],
+    kept: BoolArray,
+    *,
+    faces: Callable[[int], IntArray] | None = None,
+    meshes: int | None = MESHES_BY_DEFAULT,
+    mesh_format: str = "ply",
+    chosen: int | None = None,
+    refit: Callable[[int], Refitted] | None = None,
+    series: Mapping[str, npt.ArrayLike] | None = None,
+    run: Mapping[str, Any] | None = None,
+    extra: Callable[[Path], None] | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write a front, its meshes and the record of its run to a new folder, all or nothing.
+
+    Parameters
+    ----------
+    folder : path
+        The folder to make; see :func:`claim_output`.
+    model : OpenModel
+        The original mesh.
+    quality : sequence of Quality, length S
+        The numbers of each solution, in any order; written sorted by triangles, then error.
+    kept : (S, N) bool array
+        The solutions in vector order.
+    faces : callable, optional
+        Triangles (M, 3) of the solution in this row of ``kept``, as indices in vector order. Needed for
+        meshes.
+    meshes : int or None
+        The most meshes to write; a longer front writes an even selection, its ends included. None writes all,
+        0 none.
+    mesh_format : str
+        One of MESH_FORMATS. PLY (binary, double precision) keeps every attribute; OBJ, OFF and LandXML keep full
+        precision; STL and GLB are single precision by definition, GLB from an origin that it states (see
+        :func:`write_mesh`).
+    chosen : int, optional
+        Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
+    refit : callable, optional
+        The best heights for the solution in this row of ``kept`` (see
+        :func:`~meshsimp_pymoo.surface.refit.refit_heights`). Each mesh that is written is then written with them
+        too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
+    series : mapping of str to (n, 2) array, optional
+        Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
+        written to ``series.csv``.
+    run : mapping, optional
+        What to record in run.json beside the package versions and the model.
+    extra : callable, optional
+        Called with the unfinished folder before it is put in place, to add files to it (a figure, say).
+    overwrite : bool
+        Replace results that exist.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ResultError
+        If the folder cannot be written.
+    ValueError
+        If the front is empty, holds a number that is not finite, or does not fit the model.
+    """
+    kept = np.asarray(kept, dtype=bool)
+    if len(quality) == 0:
+        raise ValueError("the front is empty; there is nothing to write")
+    if kept.shape != (len(quality), model.n_vertices):
+        raise ValueError(
+            f"kept has the shape {kept.shape}; {len(quality)} solutions of a model of {model.n_vertices} vertices "
+            f"need {(len(quality), model.n_vertices)}"
+        )
+    if mesh_format not in MESH_FORMATS:
+        raise ValueError(f"mesh_format is {mesh_format!r}; it must be one of {', '.join(MESH_FORMATS)}")
+    refuse_format(model, mesh_format)
+    suffix = mesh_suffix(mesh_format)
+    look = _written_frame(model, mesh_format)
+    F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
+    if not np.isfinite(F).all():
+        raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
+    order = np.lexsort((F[:, 0], F[:, 1]))
+    with_mesh = set(even_selection(len(order), meshes))
+    if (with_mesh or chosen is not None) and faces is None:
+        raise ValueError("meshes are asked for but no faces are given; pass faces= or meshes=0")
+
+    folder = claim_output(folder, overwrite=overwrite)
+    target = folder.resolve()
+    with new_folder(folder, replace=overwrite) as partial:
+        digits = max(3, len(str(len(order) - 1)))
+        rows, single = [], 0.0
+        if with_mesh:
+            (partial / "meshes").mkdir()
+            if refit is not None:
+                (partial / "refitted").mkdir()
+        for solution, row in enumerate(order):
+            path, fitted = "", ["", ""]
+            if faces is not None and (solution in with_mesh or row == chosen):
+                arrays = mesh_arrays(model, faces(int(row)))
+                single = max(single, single_precision_shift(arrays[0]))
+                if solution in with_mesh:
+                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{suffix}"
+                    write_mesh(partial / path, *arrays, **look)
+                if row == chosen:
+                    write_mesh(partial / f"chosen.{suffix}", *arrays, **look)
+                if refit is not None:
+                    better = refit(int(row))
+                    raised = (better.vertices(model), *arrays[1:])
+                    fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
+                    if solution in with_mesh:
+                        write_mesh(partial / fitted[1], *raised, **look)
+                    if row == chosen:
+                        write_mesh(partial / f"chosen_refitted.{suffix}", *raised, **look)
+            numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
+            rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
+        warn_of_shift(model.name, model.diagonal, mesh_format, single)
+        write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
+        if series:
+            write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
+        packed = np.packbits(kept[order], axis=1)
+        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
+        record = dict(run or {}) | {
+            "model": {
+                "name": model.name,
+                "file": path_from(target, model.name),
+                "hash": model.hash,
+                "vertices": model.n_vertices,
+                "triangles": len(model.faces),
+                "up": model.up,
+                **({"georeference": model.georeference} if model.georeference else {}),
+            },
+            **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
+            "solutions": len(order),
+            "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
+            "versions": package_versions(),
+        }
+        (partial / "run.json").write_text(
+            json.dumps(record, indent=2, default=_plain, allow_nan=False) + "\n", encoding="utf-8"
+        )
+        if extra is not None:
+            extra(partial)
+    return folder
+
+
+def read_front(folder: str | os.PathLike[str]) -> StoredFront:
+    """Read a front back and check that its files are whole and agree.
+
+    Parameters
+    ----------
+    folder : path
+        What :func:`write_front` wrote.
+
+    Raises
+    ------
+    ResultError
+        If a file is missing, damaged or contradicts another; the message names the file and what is wrong in
+        it.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ResultError(f"{folder}: no such folder")
+    quality, meshes, refitted_meshes = read_front_csv(folder / "front.csv")
+    refitted_error = quality.pop("refitted_error", None)
+    count = len(meshes)
+    F, packed, source_index = _read_npz(folder / "front.npz")
+    n = len(source_index)
+    if F.shape != (count, 2) or not (
+        np.array_equal(F[:, 0], quality["error"]) and np.array_equal(F[:, 1], quality["triangles"])
+    ):
+        raise ResultError(f"{folder / 'front.npz'}: its F is not that of front.csv; write the front again")
+    if packed.shape != (count, -(-n // 8)):
+        raise ResultError(
+            f"{folder / 'front.npz'}: kept has the shape {packed.shape}; {count} solutions of {n} vertices need "
+            f"{(count, -(-n // 8))}"
+        )
+    bits = np.unpackbits(packed, axis=1).astype(bool)
+    if bits[:, n:].any():
+        raise ResultError(f"{folder / 'front.npz'}: kept has bits set beyond the {n} vertices of the model")
+    kept = bits[:, :n]
+    too_few = np.flatnonzero(kept.sum(axis=1) < quality["vertices"])
+    if too_few.size:
+        raise ResultError(
+            f"{folder / 'front.npz'}: solution {too_few[0]} keeps {kept[too_few[0]].sum()} vertices, but "
+            f"front.csv says its mesh has {quality['vertices'][too_few[0]]}"
+        )
+    record = folder / "run.json"
+    try:
+        run = json.loads(record.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise ResultError(f"{record}: cannot be read ({reason_of(problem)})") from None
+    if not isinstance(run, dict) or run.get("solutions") != count:
+        raise ResultError(f"{record}: is not the record of this front of {count} solutions")
+    _check_record(run, count, record)
+    series = _read_series(folder / "series.csv")
+    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series)
+
+
+def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
+    """Refuse a record whose parts are not of the kind that others rely on."""
+    model, chosen = run.get("model") or {}, run.get("chosen")
+    wrong = [name for name in ("model", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    if not wrong:
+        wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
+    if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
+        wrong.append("chosen")
+    if wrong:
+        raise ResultError(f"{path}: {', '.join(wrong)} is not what a front's record holds; write the front again")
+
+
+def mesh_arrays(
+    model: OpenModel, faces: IntArray
+) -> tuple[FloatArray, npt.NDArray[np.int64], dict[str, npt.NDArray[Any]]]:
+    """Return a simplified mesh in the file's own frame.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh.
+    faces : (M, 3) int array
+        Triangles as indices of the model's vertices in vector order.
+
+    Returns
+    -------
+    vertices : (V, 3) float array
+        The vertices that the triangles use, with the very coordinates of the file.
+    faces : (M, 3) int array
+        The triangles as indices of those.
+    attributes : dict of str to (V, ...) array
+        Colours and whatever else the file says of those vertices.
+    """
+    used, compact = np.unique(np.asarray(faces, dtype=np.int64), return_inverse=True)
+    attributes = {name: values[used] for name, values in model.attributes.items()}
+    return model.file_points[used], compact.reshape(-1, 3), attributes
+
+
+def write_mesh(
+    path: str | os.PathLike[str],
+    vertices: FloatArray,
+    faces: IntArray,
+    attributes: Mapping[str, npt.NDArray[Any]] | None = None,
+    *,
+    origin: npt.ArrayLike | None = None,
+    georeference: Mapping[str, Any] | None = None,
+    name: str = "surface",
+) -> None:
+    """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
+
+    Parameters
+    ----------
+    path : path
+        Ends in one of MESH_SUFFIXES; ``.xml`` is LandXML, a surface for survey and GIS programs.
+    vertices : (V, 3) float array
+        Coordinates; written in double precision (STL and GLB, by definition: single). LandXML takes z for the height,
+        y for the northing and x for the easting.
+    faces : (M, 3) int array
+        Triangles.
+    attributes : mapping of str to (V,) or (V, k) array, optional
+        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, anything else to PLY only.
+    origin : (3,) floats, optional
+        Of GLB: what is subtracted from the coordinates before they lose their double precision. The file says it twice:
+        as the translation of its one node, which puts the mesh back where it was, and as ``extras.origin``. By default
+        it is 0 where that loses nothing, else the mesh's lower corner in whole units.
+    georeference : mapping, optional
+        What is known of the coordinates (see :class:`~meshsimp_pymoo.formats.load.SourceMesh`): PLY says the CRS in a
+        comment, GLB in ``extras``, LandXML as its coordinate system and unit.
+    name : str
+        What LandXML calls the surface.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is not known.
+    """
+    path = Path(path)
+    attributes = dict(attributes or {})
+    suffix = path.suffix.lower().lstrip(".")
+    facts = dict(georeference or {})
+    if suffix == "ply":
+        path.write_bytes(_ply_bytes(vertices, faces, attributes, facts))
+        return
+    if suffix == "glb":
+        start = local_origin(vertices) if origin is None else np.asarray(origin, dtype=np.float64)
+        path.write_bytes(_glb_bytes(vertices, faces, attributes.get("color"), start, facts))
+        return
+    if suffix in ("xml", "landxml"):
+        path.write_bytes(_landxml_bytes(vertices, faces, name, facts))
+        return
+    if suffix not in MESH_FORMATS:
+        raise ValueError(f"{path}: no such mesh format; write one of {', '.join(MESH_FORMATS)}")
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=attributes.get("color"), process=False)
+    options: dict[str, Any] = {}
+    if suffix in ("obj", "off"):
+        options["digits"] = 17  # significant digits that carry any double
+    if suffix == "obj":
+        options |= {"include_normals": False, "header": None}
+    written = mesh.export(file_type=suffix, **options)
+    path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))
+
+
+def mesh_suffix(mesh_format: str) -> str:
+    """Return the suffix of files of a mesh format, without the dot."""
+    return "xml" if mesh_format == "landxml" else mesh_format
+
+
+def local_origin(vertices: FloatArray) -> FloatArray:
+    """Return the origin (3,) from which single precision holds vertices (V, 3): 0 if that does, else whole units.
+
+    >>> local_origin(np.array([[0.0, 0.5, 1.0], [1.0, 1.0, 2.0]])).tolist()
+    [0.0, 0.0, 0.0]
+    >>> local_origin(np.array([[500000.1, 5400000.1, 7.5], [500001.1, 5400001.1, 8.5]])).tolist()
+    [500000.0, 5400000.0, 7.0]
+    """
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
+    if single_precision_shift(vertices) <= SINGLE_PRECISION_LOSS * diagonal:
+        return np.zeros(3)
+    return np.asarray(np.floor(vertices.min(axis=0)), dtype=np.float64)
+
+
+def refuse_format(model: OpenModel, mesh_format: str) -> None:
+    """Refuse LandXML for a model whose heights are not along the z of its file.
+
+    Raises
+    ------
+    ResultError
+        With the direction that they have.
+    """
+    if mesh_format not in ("landxml", "xml"):
+        return
+    a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    if model.up[2] <= 0 or (area < 0).any():
+        raise ResultError(
+            f"{model.name}: a LandXML surface has its heights along z, and this one has them along "
+            f"{model.up.round(6).tolist()}; write another format, such as ply"
+        )
+
+
+def _written_frame(model: OpenModel, mesh_format: str) -> dict[str, Any]:
+    """Return what `write_mesh` is to know of a model's frame; all meshes of a front have one origin."""
+    origin = local_origin(model.file_points) if mesh_format == "glb" else np.zeros(3)
+    return {"origin": origin, "georeference": model.georeference, "name": Path(model.name).stem}
+
+
+def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
+    """Write a mesh of a model, its triangles (M, 3) in vector order, in the format of the path's suffix.
+
+    Raises
+    ------
+    ResultError
+        If the format cannot hold this model.
+
+    Warns
+    -----
+    ModelWarning
+        If single precision moves vertices by more than rounding.
+    """
+    suffix = path.suffix.lower().lstrip(".")
+    refuse_format(model, suffix)
+    arrays = mesh_arrays(model, faces)
+    warn_of_shift(model.name, model.diagonal, suffix, single_precision_shift(arrays[0]))
+    write_mesh(path, *arrays, **_written_frame(model, suffix))
+
+
+def package_versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that decide the results; absent ones are left out."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return versions
+
+
+def warn_of_shift(name: str, diagonal: float, mesh_format: str, shift: float) -> None:
+    """Warn if the format's single precision moves vertices by more than a person would see in the numbers."""
+    if mesh_format == "stl" and shift > SINGLE_PRECISION_LOSS * diagonal:
+        warnings.warn(
+            f"{name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
+            "[file units]; ply, obj and off keep them exactly, glb states a local origin",
+            ModelWarning,
+            stacklevel=3,
+        )
+
+
+def even_selection(count: int, most: int | None) -> list[int]:
+    """Return at most ``most`` of the rows 0 .. count - 1, evenly spread, the ends included.
+
+    >>> even_selection(5, None), even_selection(5, 3), even_selection(5, 0)
+    ([0, 1, 2, 3, 4], [0, 2, 4], [])
+    """
+    if most is None or most >= count:
+        return list(range(count))
+    if most < 0:
+        raise ValueError(f"meshes is {most}; it must be 0 or more")
+    return [int(row) for row in np.unique(np.rint(np.linspace(0, count - 1, most)).astype(int))]
+
+
+def spelled_value(column: str, value: float) -> str:
+    """Return a number as it stands in a front's CSV file: whole numbers bare, others so that they read back equal."""
+    return str(int(value)) if column in INT_COLUMNS else repr(float(value))
+
+
+def _csv_rows(path: Path, *headers: tuple[str, ...]) -> tuple[tuple[str, ...], list[list[str]]]:
+    """Return the header, one of those expected, and all rows, the header's first."""
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file, strict=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
+    header = tuple(rows[0]) if rows else ()
+    if header not in headers:
+        raise ResultError(f"{path}: its first line must be {','.join(headers[0])}")
+    if len(rows) == 1:
+        raise ResultError(f"{path}: holds no solution")
+    for line, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            raise ResultError(f"{path}, line {line}: {len(row)} values instead of {len(header)}; the file is cut off")
+    return header, rows
+
+
+def _series_rows(series: Mapping[str, npt.ArrayLike]) -> Iterator[list[str]]:
+    for name, front in series.items():
+        F = np.asarray(front, dtype=np.float64)
+        if F.ndim != 2 or F.shape[1] != 2 or not len(F) or not np.isfinite(F).all():
+            raise ValueError(f"the series {name!r} is no front: (n, 2) finite numbers, error and triangles")
+        for error, triangles in F[np.lexsort((F[:, 0], F[:, 1]))]:
+            yield [name, spelled_value("minimised", error), spelled_value("triangles", triangles)]
+
+
+def _read_series(path: Path) -> dict[str, FloatArray]:
+    """Read other fronts back; none where there is no such file."""
+    if not path.exists():
+        return {}
+    series: dict[str, list[tuple[float, float]]] = {}
+    for line, (name, *numbers) in enumerate(_csv_rows(path, SERIES_COLUMNS)[1][1:], start=2):
+        try:
+            error, triangles = float(numbers[0]), int(numbers[1])
+        except ValueError:
+            raise ResultError(f"{path}, line {line}: {','.join(numbers)} is no error and number of triangles") from None
+        if not (0 <= error < np.inf and 0 <= triangles <= MOST_COUNTED):
+            raise ResultError(f"{path}, line {line}: {','.join(numbers)} is no error and number of triangles")
+        series.setdefault(name, []).append((error, triangles))
+    return {name: np.array(front, dtype=np.float64) for name, front in series.items()}
+
+
+def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
+    """Return the columns of a front's CSV file as arrays, the names of its meshes and of the refitted ones."""
+    header, rows = _csv_rows(path, FRONT_COLUMNS, FRONT_COLUMNS + REFIT_COLUMNS)
+    columns: dict[str, npt.NDArray[Any]] = {}
+    for at, column in enumerate(header):
+        if column in ("mesh", "refitted_mesh"):
+            continue
+        kind = int if column in INT_COLUMNS else float
+        values = []
+        for line, row in enumerate(rows[1:], start=2):
+            if column == "refitted_error" and not row[at]:
+                values.append(float("nan"))
+                continue
+            try:
+                value = kind(row[at])
+                if not 0 <= value < (MOST_COUNTED if kind is int else float("inf")):
+                    raise ValueError
+            except ValueError:
+                raise ResultError(f"{path}, line {line}: {column} is {row[at]!r}") from None
+            values.append(value)
+        columns[column] = np.array(values, dtype=np.int64 if kind is int else np.float64)
+    if not np.array_equal(columns["solution"], np.arange(len(rows) - 1)):
+        raise ResultError(f"{path}: solutions are not numbered 0 to {len(rows) - 2}; a line is missing or out of place")
+    if (np.diff(columns["triangles"]) < 0).any():
+        line = int(np.argmax(np.diff(columns["triangles"]) < 0)) + 3
+        raise ResultError(f"{path}, line {line}: not sorted by triangles")
+    at = header.index("mesh")
+    meshes = tuple(row[at] for row in rows[1:])
+    refitted = tuple(row[-1] for row in rows[1:]) if header[-1] == "refitted_mesh" else ()
+    for line, paths in enumerate(zip(meshes, refitted or meshes, strict=True), start=2):
+        for mesh in paths:
+            if mesh and not stays_inside(path.parent, mesh):
+                raise ResultError(f"{path}, line {line}: mesh {mesh!r} is not inside the folder")
+    return columns, meshes, refitted
+
+
+def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
+    try:
+        with path.open("rb") as stream:
+            arrays = read_npz(stream, path.name)
+        F, packed, source_index = arrays["F"], arrays["kept"], arrays["source_index"]
+    except KeyError as problem:
+        raise ResultError(f"{path}: holds no array {problem}; the file is not ours") from None
+    except (OSError, ModelError, MemoryError) as problem:
+        raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
+    for name, array, kind, ndim in (
+        ("F", F, "f", 2),
+        ("kept", packed, "u", 2),
+        ("source_index", source_index, "i", 1),
+    ):
+        if array.dtype.kind != kind or array.ndim != ndim:
+            raise ResultError(
+                f"{path}: {name} has the type {array.dtype} and {array.ndim} dimensions; the file is not ours"
+            )
+    if packed.dtype != np.uint8:
+        raise ResultError(f"{path}: kept has the type {packed.dtype} instead of packed bits (uint8)")
+    if len(np.unique(source_index)) != len(source_index) or source_index.min(initial=0) < 0:
+        raise ResultError(f"{path}: source_index is not a list of different rows")
+    return F, packed, source_index
+
+
+def _ply_bytes(
+    vertices: FloatArray, faces: IntArray, attributes: Mapping[str, npt.NDArray[Any]], georeference: Mapping[str, Any]
+) -> bytes:
+    """Return a binary PLY with double coordinates; trimesh's own writer stores single precision."""
+    vertices = np.asarray(vertices, dtype=np.float64)
+    columns: list[tuple[str, npt.NDArray[Any]]] = [(axis, vertices[:, k]) for k, axis in enumerate("xyz")]
+    for name, values in attributes.items():
+        kind = values.dtype.str[1:]
+        kind = PLY_WIDER.get(kind, kind)
+        if kind not in PLY_TYPES or values.ndim > 2 or len(values) != len(vertices):
+            raise ValueError(
+                f"attribute {name!r} of type {values.dtype} and shape {values.shape} does not fit into a PLY"
+            )
+        table = values.astype(kind).reshape(len(values), -1)
+        for k in range(table.shape[1]):
+            spelled = PLY_COLORS[k] if name == "color" else name if values.ndim == 1 else f"{name}_{k}"
+            columns.append((spelled, table[:, k]))
+    names = ["_".join(name.split()) for name, _ in columns]
+    record = np.empty(len(vertices), dtype=[(f"c{k}", f"<{c.dtype.str[1:]}") for k, (_, c) in enumerate(columns)])
+    for k, (_, column) in enumerate(columns):
+        record[f"c{k}"] = column
+    triangles = np.empty(len(faces), dtype=[("count", "u1"), ("index", "<i4", (3,))])
+    triangles["count"], triangles["index"] = 3, faces
+    properties = [f"property {PLY_TYPES[c.dtype.str[1:]]} {name}" for name, (_, c) in zip(names, columns, strict=True)]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *_crs_comments(georeference),
+        f"element vertex {len(vertices)}",
+        *properties,
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
+    return "\n".join(header).encode("utf-8") + record.tobytes() + triangles.tobytes()
+
+
+def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
+    """Return the line of a PLY header that says the coordinate reference system, if it is known."""
+    if georeference.get("epsg"):
+        return [f"comment crs EPSG:{georeference['epsg']}"]
+    wkt = " ".join(str(georeference.get("crs") or "").split())
+    return [f"comment crs {wkt}"] if wkt else []
+
+
+def _glb_bytes(
+    vertices: FloatArray,
+    faces: IntArray,
+    color: npt.NDArray[Any] | None,
+    origin: FloatArray,
+    georeference: Mapping[str, Any],
+) -> bytes:
+    """Return a GLB of one node with one mesh, whose coordinates are those from the origin."""
+    points = (np.asarray(vertices, dtype=np.float64) - origin).astype("<f4")
+    parts: list[tuple[npt.NDArray[Any], int, dict[str, Any]]] = [
+        (
+            points,
+            GLTF_VERTICES,
+            {
+                "componentType": GLTF_FLOAT,
+                "type": "VEC3",
+                "count": len(points),
+                "min": points.min(axis=0).tolist(),
+                "max": points.max(axis=0).tolist(),
+            },
+        ),
+        (
+            np.asarray(faces).astype("<u4").ravel(),
+            GLTF_INDICES,
+            {"componentType": GLTF_UINT, "type": "SCALAR", "count": 3 * len(faces)},
+        ),
+    ]
+    attributes = {"POSITION": 0}
+    if color is not None:
+        rgba = np.full((len(points), 4), 255, np.uint8)
+        rgba[:, : color.shape[1]] = color
+        form = {"componentType": GLTF_UBYTE, "type": "VEC4", "count": len(points), "normalized": True}
+        parts.append((rgba, GLTF_VERTICES, form))
+        attributes["COLOR_0"] = 2
+    binary, views = b"", []
+    for values, target, _ in parts:
+        content = values.tobytes()
+        views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(content), "target": target})
+        binary += content + b"\0" * (-len(content) % 4)
+    node: dict[str, Any] = {"mesh": 0}
+    if origin.any():
+        node |= {"translation": origin.tolist(), "extras": {"origin": origin.tolist()}}
+    crs = {key: georeference[key] for key in ("epsg", "crs") if georeference.get(key)}
+    if crs:
+        node["extras"] = node.get("extras", {}) | crs
+    tree = {
+        "asset": {"version": "2.0", "generator": "meshsimp_pymoo"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [node],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "mode": GLTF_TRIANGLES}]}],
+        "accessors": [{"bufferView": k} | form for k, (_, _, form) in enumerate(parts)],
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(binary)}],
+    }
+    text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    length = 12 + 8 + len(text) + 8 + len(binary)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, length) + chunks
+
+
+def _landxml_bytes(vertices: FloatArray, faces: IntArray, name: str, georeference: Mapping[str, Any]) -> bytes:
+    """Return a LandXML 1.2 surface: points as "northing easting elevation", faces counter-clockwise."""
+    from xml.sax.saxutils import quoteattr
+
+    system, unit = LANDXML_UNITS.get(str(georeference.get("unit") or "").lower(), LANDXML_UNITS["metre"])
+    measures = {"linearUnit": unit} | LANDXML_MEASURES[system]
+    crs = {"epsgCode": str(georeference.get("epsg") or ""), "ogcWktCode": str(georeference.get("crs") or "")}
+    z = vertices[:, 2]
+    points = [
+        f'<P id="{k}">{y!r} {x!r} {height!r}</P>' for k, (x, y, height) in enumerate(vertices.tolist(), start=1)
+    ]
+    triangles = [f"<F>{a} {b} {c}</F>" for a, b, c in (np.asarray(faces, dtype=np.int64) + 1).tolist()]
+
+    def spelled(attributes: Mapping[str, str]) -> str:
+        return "".join(f" {key}={quoteattr(_printable(value))}" for key, value in attributes.items() if value)
+
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        f'<LandXML xmlns="{LANDXML}" version="1.2" readOnly="false"{spelled(LANDXML_DATE)}>',
+        f"<Units><{system}{spelled(measures)}/></Units>",
+        *([f"<CoordinateSystem{spelled(crs)}/>"] if any(crs.values()) else []),
+        '<Application name="meshsimp_pymoo"/>',
+        f"<Surfaces><Surface{spelled({'name': name})}>",
+        f'<Definition surfType="TIN" elevMin="{float(z.min())!r}" elevMax="{float(z.max())!r}">',
+        "<Pnts>",
+        *points,
+        "</Pnts>",
+        "<Faces>",
+        *triangles,
+        "</Faces>",
+        "</Definition></Surface></Surfaces>",
+        "</LandXML>",
+    ]
+    return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _printable(text: str) -> str:
+    """Return a text without the characters that XML cannot hold."""
+    return "".join(character if character.isprintable() else "?" for character in text)
+
+
+def single_precision_shift(vertices: FloatArray) -> float:
+    """Return by how much single precision moves the vertices at most, along an axis [their units]."""
+    return float(np.abs(vertices - vertices.astype(np.float32)).max(initial=0.0))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise TypeError(f"a {type(value).__name__} cannot be recorded in run.json; pass numbers, texts, lists and mappings")

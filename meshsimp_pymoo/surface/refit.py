@@ -1,0 +1,249 @@
+"""The best heights for a mesh whose triangles are fixed: what is left to gain once the vertices are chosen.
+
+With the triangulation fixed in the plane, the surface at each original vertex is a fixed mean of the heights of two or
+three kept vertices. The error is then a convex function of those heights h,
+
+    E(h) = sum of w_p sqrt(g_p^2 + r_p^2),    r = A h - z,
+
+with g_p = 0 where a triangle covers p and the distance in the plane to the mesh where none does. For g = 0 this is a
+linear programme (least absolute deviations). It is solved by Newton's method on the primal and the dual together, as
+Chan, Golub and Mulet do for total variation [1]_: with s = sqrt(r^2 + g^2 + epsilon^2),
+
+    A' y = 0,    s y = w r,
+
+linearised in both h and y, which costs one factorisation of the sparse matrix A' D A a step (D diagonal); epsilon goes
+to 0 with the gap. The dual variables y stay balanced (A' y = 0) and within their bounds (|y| <= w) on the way, so that
+each step also proves how far the heights can be from the best at most:
+
+    E(h) >= -z . y + sum of g_p sqrt(w_p^2 - y_p^2)    for all h.
+
+References
+----------
+.. [1] T. F. Chan, G. H. Golub, P. Mulet, "A nonlinear primal-dual method for total variation-based image restoration",
+   SIAM J. Scientific Computing 20(6), 1999.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from meshsimp_pymoo.surface.evaluate import mesh_quality, mesh_samples, simplify
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.surface.model import OpenModel
+
+# The search ends where the error is proved to be within this share of the least possible; the true excess, measured
+# against linear programming, is then below 1e-4 (see tests/benchmarks/refit.py).
+TOLERANCE = 1e-3
+# Newton steps; 10 to 30 are usual.
+MAX_STEPS = 60
+# How close the dual variables come to their bounds in one step.
+TO_THE_BOUND = 0.99
+# Epsilon in relation to the gap that is left, both per vertex.
+SMOOTHING = 0.1
+# A kept vertex of weight 0 counts this share of the mean all the same, so that its height has a value.
+LEAST_WEIGHT = 1e-9
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """A simplified mesh whose vertices have moved up or down.
+
+    Attributes
+    ----------
+    faces : (M, 3) int32 array
+        Triangles as rows of ``model.points``; those of :func:`~meshsimp_pymoo.surface.evaluate.simplify`.
+    rows : (V,) int array
+        The rows that the triangles use, ascending.
+    heights : (V,) float array
+        Their new heights, in the frame of ``model.points`` [model units].
+    error : float
+        Error of the mesh with the new heights; never above ``before`` [model units].
+    before : float
+        Error with the original heights [model units].
+    bound : float
+        No heights have an error below this, up to rounding [model units].
+    """
+
+    faces: np.ndarray
+    rows: np.ndarray
+    heights: np.ndarray
+    error: float
+    before: float
+    bound: float
+
+    def vertices(self, model: OpenModel) -> np.ndarray:
+        """Return the vertices (V, 3) in the frame of the model's file; those that did not move are exactly its own."""
+        return _raised(model, self.rows, self.heights)
+
+
+def refit_heights(
+    model: OpenModel,
+    kept: np.ndarray,
+    *,
+    footprint: str = "model",
+    outside: str = "nearest",
+    tolerance: float = TOLERANCE,
+) -> Refitted:
+    """Move the kept vertices up or down so that the error of their mesh is least; (x, y) and triangles stay.
+
+    What is minimised is the package's error itself: the sum of w_p d_p over all original vertices, the uncovered ones
+    included (their distance in space to the nearest point of the outline depends on its height too), whatever other
+    measure a search minimised. Pinned vertices stay in place but may change their height, too. The result is no subset
+    of the original vertices any more.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    kept : (N,) bool array
+        The vertices that stay, in vector order.
+    footprint, outside : str
+        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
+    tolerance : float
+        The search ends where the error is at most this share above the proved bound.
+
+    Returns
+    -------
+    Refitted
+
+    Raises
+    ------
+    ValueError
+        If the subset spans no triangle, or the tolerance is not positive.
+
+    Examples
+    --------
+    Two triangles over a roof cannot have a ridge, but they can lie higher; three vertices on the ridge and six at the
+    eaves, at a height of 1 and 0, are then all the same as before:
+
+    >>> from meshsimp_pymoo.datasets import load
+    >>> from meshsimp_pymoo.surface.model import load_model
+    >>> roof = load_model(load("roof:3"))
+    >>> refit_heights(roof, np.isin(np.arange(9), roof.corners)).error
+    3.0
+    """
+    if not tolerance > 0:
+        raise ValueError(f"tolerance={tolerance} is not positive; give a small share of the error such as {TOLERANCE}")
+    mesh = simplify(model, kept, footprint=footprint, outside=outside)
+    rows, compact = np.unique(mesh.faces, return_inverse=True)
+    compact = compact.reshape(-1, 3)
+    before = mesh.quality.error
+    original = model.points[rows, 2]
+    if before == 0.0:
+        return Refitted(mesh.faces, rows, original, before, before, before)
+    samples = mesh_samples(model, model.points[rows], compact, outside=outside, frame="local")
+    weights = np.ones(model.n_vertices) if model.weights is None else model.weights.copy()
+    if not weights.all():
+        weights[rows] = np.maximum(weights[rows], LEAST_WEIGHT * weights.mean())
+    counts = np.flatnonzero((weights > 0) & samples.shares.any(axis=1))
+    n = len(counts)
+    A = sparse.csr_matrix(
+        (samples.shares[counts].ravel(), samples.sites[counts].ravel(), np.arange(0, 3 * n + 1, 3)),
+        shape=(n, len(rows)),
+    )
+    A.sum_duplicates()
+    heights, bound = least_error(
+        A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance
+    )
+    error = mesh_quality(model, _raised(model, rows, heights), compact, outside=outside).error
+    if error >= before:
+        heights, error = original, before
+    return Refitted(mesh.faces, rows, heights, error, before, min(bound, error))
+
+
+def least_error(
+    A: sparse.csr_matrix,
+    z: np.ndarray,
+    w: np.ndarray,
+    gap: np.ndarray,
+    start: np.ndarray,
+    *,
+    tolerance: float = TOLERANCE,
+) -> tuple[np.ndarray, float]:
+    """Minimise the sum of w sqrt(gap^2 + (A h - z)^2) over h; see the module's docstring.
+
+    Parameters
+    ----------
+    A : (n, V) sparse matrix of full column rank
+        Shares of the heights at each sample; its rows add up to 1.
+    z, w, gap : (n,) float arrays
+        Height of each sample, its positive weight and its distance in the plane.
+    start : (V,) float array
+        Where to begin.
+    tolerance : float
+        As in :func:`refit_heights`.
+
+    Returns
+    -------
+    heights : (V,) float array
+        The best that was found, no worse than ``start``.
+    bound : float
+        A proved lower bound of the sum.
+    """
+    # Heights count from their middle, in units of the deviation at the start, so that numbers are of the order of 1.
+    level = float(np.median(z))
+    r = A @ start - z
+    unit = float((w * np.hypot(gap, r)).sum() / w.sum())
+    if unit == 0.0:
+        return start, 0.0
+    r, g, z = r / unit, gap / unit, (z - level) / unit
+    h = (start - level) / unit
+    At = A.T.tocsr()
+    y = np.zeros(len(z))
+    least, best = float(w.sum()), h
+    bound = 0.0
+    epsilon = 1.0
+    for _ in range(MAX_STEPS):
+        s = np.sqrt(r * r + g * g + epsilon * epsilon)
+        slope = w * r / s
+        D = (w - y * r / s) / s
+        try:
+            factors = splu(
+                (At @ sparse.diags(D) @ A).tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError:  # singular in double precision: as good as it gets
+            break
+        step = -factors.solve(At @ slope)
+        change = A @ step
+        if not np.isfinite(change).all():
+            break
+        # The dual step, balanced by construction, up to the first bound.
+        turn = slope - y + D * change
+        room = np.where(turn > 0, w - y, w + y)
+        limits = room[turn != 0] / np.abs(turn[turn != 0])
+        y = y + min(1.0, TO_THE_BOUND * limits.min(initial=np.inf)) * turn
+        # The primal step, halved until the smoothed sum falls (Armijo).
+        now, descent, length = float((w * s).sum()), float(slope @ change), 1.0
+        while length > 1e-4 and smoothed(r + length * change, g, w, epsilon) > now + 1e-4 * length * descent:
+            length /= 2.0
+        h, r = h + length * step, r + length * change
+        value = smoothed(r, g, w, 0.0)
+        if value < least:
+            least, best = value, h
+        proved = float(g @ np.sqrt(np.maximum(w * w - y * y, 0.0)) - y @ z)
+        bound = max(bound, proved)
+        if least - bound <= tolerance * least:
+            break
+        epsilon = min(epsilon, max(SMOOTHING * (value - proved) / float(w.sum()), 1e-12))
+    return best * unit + level, bound * unit
+
+
+def smoothed(r: np.ndarray, g: np.ndarray, w: np.ndarray, epsilon: float) -> float:
+    """Return the sum of w sqrt(r^2 + g^2 + epsilon^2)."""
+    return float((w * np.sqrt(r * r + g * g + epsilon * epsilon)).sum())
+
+
+def _raised(model: OpenModel, rows: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Move vertices along the model's upward direction, in the frame of its file."""
+    rise = heights - model.points[rows, 2]
+    vertices: np.ndarray = model.file_points[rows] + rise[:, None] * model.rotation[2]
+    return vertices

@@ -1,0 +1,393 @@
+"""What a configuration may say, and the one line that answers everything else."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshsimp_pymoo.comparison.config import PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.search.operators import OAX, OPERATORS, SubsetUniformCrossover
+from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.storage import write_mesh
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+
+GOOD = {
+    "problem": "{footprint: hull, outside: ignore}",
+    "problems": '[{name: A, model: "pyramid:9"}, {name: B, model: "roof:5", up: z}]',
+    "algorithms": "[{name: N, preset: nsga2_v1, parameters: {pop_size: 10}}]",
+    "seeds": "[1, 2]",
+    "budgets": "[{generations: 2}]",
+}
+
+
+def write(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "study.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def changed(tmp_path: Path, **parts: str | None) -> Path:
+    """Write the good configuration with some keys replaced (None: left out)."""
+    merged = {key: value for key, value in (GOOD | parts).items() if value is not None}
+    return write(tmp_path, "\n".join(f"{key}: {value}" for key, value in merged.items()) + "\n")
+
+
+def message(path: Path, **kwargs: object) -> str:
+    with pytest.raises(ConfigError) as caught:
+        read_experiment_file(path, **kwargs)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert str(path) in line or "folder" in line
+    return line
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.name)
+def test_every_configuration_that_comes_along_can_be_run(path, tmp_path):
+    for name in ("m1_laurana", "m2_demosthenes", "m3_nefertiti", "m4_skull", "m5_celticskull", "m6_igea"):
+        source = load("pyramid:9")
+        write_mesh(tmp_path / f"{name}.ply", source.points, source.faces)
+    experiment = read_experiment_file(path, folder=tmp_path)
+    assert {algorithm.preset for algorithm in experiment.algorithms} >= {"nsga2_v1", "nsga2_v2", "moead"}
+    assert {budget.kind for budget in experiment.budgets} == {"generations", "evaluations"}
+    assert len(experiment.problems) in (3, 6)
+    assert experiment.meshlab is not None
+
+
+def test_the_papers_configuration_has_the_papers_numbers():
+    experiment = read_experiment_file(CONFIGS / "paper.yaml")
+    assert [p.model.n_vertices for p in experiment.problems] == [922, 2622, 1420, 1055, 5196, 1777]
+    assert len(experiment.seeds) == 10
+    merged = [a.merged_values for a in experiment.algorithms if a.merged_parameter]
+    assert merged == [tuple(k / 10 for k in range(11))] * 2
+    for problem in experiment.problems:
+        assert problem.options == {"footprint": "hull", "outside": "ignore", "pin": "corners"}
+
+
+def test_the_quick_configuration_names_all_that_can_stand_there():
+    words = set(re.findall(r"\w+", (CONFIGS / "quick.yaml").read_text(encoding="utf-8")))
+    assert words >= {*PROBLEM_OPTIONS, *PRESETS, *OPERATORS, *(name for kind in OPERATORS.values() for name in kind)}
+    assert words >= {"generations", "evaluations", "seconds"}
+
+
+def test_shared_options_hold_for_all_problems_and_a_problem_overrides_them(tmp_path):
+    path = changed(tmp_path, problems='[{name: A, model: "pyramid:9", outside: nearest}, "roof:5"]')
+    first, second = read_experiment_file(path).problems
+    assert first.options == {"footprint": "hull", "outside": "nearest"}
+    assert second.options == {"footprint": "hull", "outside": "ignore"}
+    assert second.name == "roof:5"
+
+
+def test_an_algorithm_by_import_path_gets_the_papers_operators_and_those_that_are_named(tmp_path):
+    spelled = (
+        "[{class: pymoo.algorithms.moo.spea2.SPEA2, parameters: {pop_size: 8}, "
+        "operators: {crossover: {name: oax, arrays: L8}}}]"
+    )
+    (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    described = algorithm.description()["settings"]
+    assert algorithm.name == "SPEA2"
+    assert described["crossover"]["arrays"] == "L8"
+    assert described["mutation"]["class"].endswith("NeighbourShift")
+    assert described["duplicates"]["class"].endswith("PackedDuplicates")
+
+
+def test_reference_directions_are_given_as_a_number(tmp_path):
+    spelled = "[{name: N3, class: pymoo.algorithms.moo.nsga3.NSGA3, parameters: {ref_dirs: 5}}]"
+    (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    np.testing.assert_allclose(algorithm.build().ref_dirs[:, 0], [0, 0.25, 0.5, 0.75, 1])
+
+
+def test_an_algorithm_is_made_anew_each_time_down_to_its_default_operators(tmp_path):
+    spelled = "[{class: pymoo.algorithms.moo.spea2.SPEA2}]"
+    (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    assert algorithm.build().survival is not algorithm.build().survival
+
+
+def test_the_description_of_an_algorithm_tells_settings_apart():
+    assert settings(OAX()) != settings(OAX("L8"))
+    assert settings(SubsetUniformCrossover(0.8)) == settings(SubsetUniformCrossover())
+    assert settings(SubsetUniformCrossover(0.7)) != settings(SubsetUniformCrossover())
+
+
+def test_the_name_of_a_model_file_does_not_change_what_the_problem_is(tmp_path):
+    source = load("pyramid:9")
+    for name in ("one.ply", "other.ply"):
+        write_mesh(tmp_path / name, source.points, source.faces)
+    one, other = read_experiment_file(changed(tmp_path, problems="[one.ply, other.ply]")).problems
+    assert one.description() == other.description()
+    assert one.name == "one"
+
+
+def test_models_are_looked_for_beside_the_configuration_or_in_the_folder_it_names(tmp_path, monkeypatch):
+    source = load("pyramid:9")
+    (tmp_path / "scans").mkdir()
+    write_mesh(tmp_path / "scans" / "a.ply", source.points, source.faces)
+    monkeypatch.chdir(os.sep)
+    path = changed(tmp_path, folder="scans", problems="[a.ply]")
+    assert read_experiment_file(path).problems[0].model.n_vertices == 81
+    beside = changed(tmp_path, problems="[scans/a.ply]")
+    assert read_experiment_file(beside).problems[0].model.n_vertices == 81
+    elsewhere = changed(tmp_path, folder="nowhere", problems="[a.ply]")
+    assert read_experiment_file(elsewhere, folder=tmp_path / "scans").problems[0].model.n_vertices == 81
+
+
+def test_a_problem_may_minimise_another_measure_and_weigh_the_vertices(tmp_path):
+    source = load("pyramid:9")
+    write_mesh(tmp_path / "a.ply", source.points, source.faces, {"importance": np.arange(81.0)})
+    path = changed(tmp_path, problem="{objectives: [rms_error, triangles], weights: importance}", problems="[a.ply]")
+    (problem,) = read_experiment_file(path).problems
+    built = problem.build()
+    assert built.objectives == ("rms_error", "triangles")
+    assert built.model.total_weight == 81 * 40
+    plain = read_experiment_file(changed(tmp_path, problem=None, problems="[a.ply]")).problems[0]
+    assert problem.description() != plain.description()
+
+
+# (keys changed, what the message must say, in this order)
+MISTAKES = {
+    "unknown key": ({"sedes": "[1]"}, ["line 6", "sedes", "unknown key", "'seeds'"]),
+    "missing key": ({"seeds": None}, ["'seeds' is missing"]),
+    "key twice": ({"title": "a\ntitle: b"}, ["line 7", "title", "twice"]),
+    "not a mapping": ({"budgets": "[3]"}, ["line 5", "budgets[0]", "3", "mapping"]),
+    "not a list": ({"seeds": "1"}, ["line 4", "seeds", "1", "list"]),
+    "no seed": ({"seeds": "[]"}, ["seeds", "empty", "at least one seed"]),
+    "seed twice": ({"seeds": "[3, 1, 3]"}, ["seeds[2]", "3", "twice"]),
+    "seed negative": ({"seeds": "[-1]"}, ["seeds[0]", "-1", "at least 0"]),
+    "seed is text": ({"seeds": "[one]"}, ["seeds[0]", "'one'", "whole number"]),
+    "seed is no whole number": ({"seeds": "[1.5]"}, ["seeds[0]", "1.5", "whole number"]),
+    "seed is true": ({"seeds": "[true]"}, ["seeds[0]", "true", "whole number"]),
+    "seed is nothing": ({"seeds": "[null]"}, ["seeds[0]", "null", "whole number"]),
+    "no problem": ({"problems": "[]"}, ["problems", "at least one problem"]),
+    "problem name twice": (
+        {"problems": '[{name: A, model: "roof:5"}, {name: A, model: "pyramid:9"}]'},
+        ["problems[1]", "'A'", "twice"],
+    ),
+    "model missing": ({"problems": "[{name: A}]"}, ["problems[0]", "'model' is missing"]),
+    "model file missing": ({"problems": "[gone.ply]"}, ["problems[0]", "gone.ply", "no file"]),
+    "model folder missing": ({"folder": "gone", "problems": "[a.ply]"}, ["a.ply", "no folder", "--models"]),
+    "model name unknown": ({"problems": "[pyramide]"}, ["problems[0]", "pyramide", "'pyramid'"]),
+    "model parameter unknown": ({"problems": '["pyramid:sid=9"]'}, ["problems[0]", "'sid'", "'side'"]),
+    "option unknown": (
+        {"problems": "[{model: pyramid, fotprint: hull}]"},
+        ["problems[0].fotprint", "unknown key", "'footprint'"],
+    ),
+    "option value unknown": ({"problem": "{footprint: hul}"}, ["problem.footprint", "'hul'", "'hull'"]),
+    "option of wrong type": ({"problem": "{max_error: small}"}, ["problem.max_error", "'small'", "number"]),
+    "objective unknown": ({"problem": "{objectives: [errror, triangles]}"}, ["problem.objectives", "rms_error"]),
+    "three objectives": (
+        {"problem": "{objectives: [error, max_error, triangles]}"},
+        ["problem.objectives", "two objectives", "nsga3()"],
+    ),
+    "measure that an algorithm cannot lower": (
+        {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]"},
+        ["algorithms[0]", "'memetic' fails", "lower a sum"],
+    ),
+    "weights not in the file": ({"problem": "{weights: sharpness}"}, ["problems[0]", "'sharpness'", "it has: none"]),
+    "pin impossible": ({"problem": "{pin: [100000]}"}, ["problems[0]", "100000"]),
+    "up impossible": ({"problem": "{up: [0, 0, 0]}"}, ["problem.up", "not all 0"]),
+    "no algorithm": ({"algorithms": "[]"}, ["algorithms", "at least one algorithm"]),
+    "algorithm name twice": ({"algorithms": "[nsga2_v1, nsga2_v1]"}, ["algorithms[1]", "'nsga2_v1'", "twice"]),
+    "preset unknown": ({"algorithms": "[nsga2_v3]"}, ["algorithms[0]", "'nsga2_v3'", "did you mean 'nsga2_v"]),
+    "preset and class": (
+        {"algorithms": "[{preset: moead, class: pymoo.x}]"},
+        ["algorithms[0]", "either 'preset'", "or 'class'"],
+    ),
+    "parameter unknown": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_sise: 9}}]"},
+        ["algorithms[0].parameters.pop_sise", "no such parameter", "'pop_size'"],
+    ),
+    "parameter impossible": (
+        {"algorithms": "[{preset: moead, parameters: {pop_size: 1}}]"},
+        ["algorithms[0]", "'moead' cannot be made", "pop_size = 1"],
+    ),
+    "parameter of wrong type": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: many}}]"},
+        ["algorithms[0]", "'nsga2_v1'", "Error"],
+    ),
+    "parameter infinite": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: .inf}}]"},
+        ["algorithms[0].parameters.pop_size", "finite"],
+    ),
+    "parameter is a date": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: 2020-01-01}}]"},
+        ["algorithms[0].parameters.pop_size", "2020-01-01", "date is not understood"],
+    ),
+    "weight missing": ({"algorithms": "[weighted_ga_v1]"}, ["algorithms[0]", "'w'"]),
+    "weight impossible": (
+        {"algorithms": "[{preset: weighted_ga_v1, merged_over: {w: [0.5, 1.5]}}]"},
+        ["algorithms[0]", "w = 1.5"],
+    ),
+    "weight twice": (
+        {"algorithms": "[{preset: weighted_ga_v1, merged_over: {w: [0.5, 0.5]}}]"},
+        ["merged_over.w", "twice"],
+    ),
+    "weight is a text": (
+        {"algorithms": "[{preset: weighted_ga_v1, parameters: {w: 1e-3}}]"},
+        ["algorithms[0]", "'weighted_ga_v1'"],
+    ),
+    "operator in the wrong place": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {crossover: oax}}]"},
+        ["parameters.crossover", "'oax'", "under 'operators'"],
+    ),
+    "operator kind unknown": (
+        {"algorithms": "[{preset: nsga2_v1, operators: {crosover: oax}}]"},
+        ["operators.crosover", "unknown key", "'crossover'"],
+    ),
+    "operator unknown": (
+        {"algorithms": "[{preset: nsga2_v1, operators: {crossover: uniforn}}]"},
+        ["operators.crossover", "'uniforn'", "'uniform'"],
+    ),
+    "operator parameter unknown": (
+        {"algorithms": "[{preset: nsga2_v1, operators: {crossover: {name: oax, array: L4}}}]"},
+        ["operators.crossover.array", "'arrays'"],
+    ),
+    "operator parameter impossible": (
+        {"algorithms": "[{preset: nsga2_v1, operators: {crossover: {name: oax, arrays: L5}}}]"},
+        ["operators.crossover", "'L5'", "L4, L8, L16"],
+    ),
+    "operator that makes real numbers": (
+        {"algorithms": "[{preset: nsga2_v1, operators: {sampling: pymoo.operators.sampling.rnd.FloatRandomSampling}}]"},
+        ["algorithms[0]", "fails on", "bool"],
+    ),
+    "import path wrong": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.spea2.SPEA3}]"},
+        ["algorithms[0].class", "no 'SPEA3'", "'SPEA2'"],
+    ),
+    "import of nothing": ({"algorithms": "[{class: pymoo.nowhere.X}]"}, ["class", "cannot be imported"]),
+    "import of no algorithm": (
+        {"algorithms": "[{class: pathlib.Path}]"},
+        ["algorithms[0].class", "'pathlib.Path'", "no pymoo algorithm"],
+    ),
+    "single-objective algorithm": (
+        {"algorithms": "[{class: pymoo.algorithms.soo.nonconvex.ga.GA}]"},
+        ["algorithms[0]", "fails on"],
+    ),
+    "constraints for MOEA/D": (
+        {"problem": "{max_triangles: 50}", "algorithms": "[moead]"},
+        ["algorithms[0]", "problem 'A'", "no constraints"],
+    ),
+    "no budget": ({"budgets": "[]"}, ["budgets", "at least one budget"]),
+    "two kinds of budget": ({"budgets": "[{generations: 2, seconds: 3}]"}, ["budgets[0]", "one of"]),
+    "budget twice": ({"budgets": "[{generations: 2}, {generations: 2}]"}, ["budgets[1]", "'2 generations'"]),
+    "budget of nothing": ({"budgets": "[{evaluations: 0}]"}, ["budgets[0].evaluations", "0", "at least 1"]),
+    "budget of no time": ({"budgets": "[{seconds: 0}]"}, ["budgets[0].seconds", "more than 0"]),
+    "MeshLab method unknown": (
+        {"baselines": "{meshlab: {methods: [quadric_colapse]}}"},
+        ["baselines.meshlab.methods[0]", "'quadric_collapse'"],
+    ),
+    "baseline unknown": ({"baselines": "{meshlap: true}"}, ["baselines.meshlap", "'meshlab'"]),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_is_answered_with_place_value_and_what_was_expected(case, tmp_path):
+    parts, expected = MISTAKES[case]
+    line = message(changed(tmp_path, **parts))
+    rest = line
+    for word in expected:
+        assert word in rest, f"{word!r} is missing, or out of order, in: {line}"
+        rest = rest[rest.index(word) :]
+
+
+def test_the_configuration_of_the_mistakes_is_good_without_them(tmp_path):
+    assert len(read_experiment_file(changed(tmp_path)).problems) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("", "is empty"),
+        ("problems: [", "line 1"),
+        ("a: 1\n b: 2\n", "is no YAML"),
+        ("problems: !!python/object/apply:os.system [echo]\n", "unknown|missing|expected|understood"),
+        ("[" * 100_000, "nested too deeply"),
+        ("&a [*a]", "contains itself"),
+        ("a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+            f"{chr(98 + k)}: &{chr(98 + k)} [{', '.join(['*' + chr(97 + k)] * 10)}]\n" for k in range(8)
+        ), "once aliases are replaced"),
+        ("seeds: [" + "1, " * 400_000 + "]", "bytes"),
+        ("title: \x00", "is no YAML"),
+    ],
+    ids=["empty", "open list", "indentation", "tag", "depth", "cycle", "aliases", "size", "control"],
+)  # fmt: skip
+def test_what_is_no_configuration_is_refused_without_harm(text, expected, tmp_path):
+    path = write(tmp_path, text)
+    with pytest.raises(ConfigError, match=expected):
+        read_experiment_file(path)
+
+
+def test_a_binary_file_and_a_missing_one_are_named(tmp_path):
+    (tmp_path / "x.yaml").write_bytes(b"\xff\xfe\x00\x80")
+    assert "UTF-8" in message(tmp_path / "x.yaml")
+    assert "no such file" in message(tmp_path / "y.yaml")
+    assert "no such folder" in message(changed(tmp_path), folder=tmp_path / "gone")
+
+
+def test_a_tag_cannot_make_python_objects(tmp_path):
+    line = message(changed(tmp_path, title="!!python/object/apply:os.getcwd []"))
+    assert "title" in line
+    line = message(changed(tmp_path, seeds='[!!python/name:os.system ""]'))
+    assert "seeds[0]" in line
+
+
+@pytest.mark.parametrize(
+    "model", ["../secret.ply", "/etc/secret.ply", "a/../../secret.ply", "C:\\\\a.ply", "a\\\\..\\\\..\\\\b.ply"]
+)
+def test_a_configuration_names_no_model_outside_the_folder_of_models(tmp_path, model):
+    (tmp_path / "in").mkdir()
+    line = message(changed(tmp_path / "in", problems=f'["{model}"]'))
+    assert "leads out of the folder of models" in line
+    line = message(changed(tmp_path / "in", folder=f'"{model}"', problems='["a.ply"]'))
+    assert "leads out of the folder of the configuration; name the folder of the models by --models" in line
+
+
+@pytest.mark.parametrize(
+    ("algorithms", "said"),
+    [
+        ("[{class: os.system}]", "is a part of Python, which is not imported"),
+        ("[{class: antigravity.X}]", "is a part of Python"),
+        ("[{preset: nsga2_v1, operators: {crossover: {name: subprocess.Popen, args: [touch, hurt]}}}]",
+         "is a part of Python"),
+        ("[{preset: nsga2_v1, operators: {crossover: {name: numpy.fromfile, file: hurt}}}]", "is no pymoo crossover"),
+        ("[{preset: nsga2_v1, operators: {mutation: pymoo.operators.sampling.rnd.FloatRandomSampling}}]",
+         "is no pymoo mutation operator"),
+    ],
+)  # fmt: skip
+def test_nothing_but_pymoos_own_kinds_is_called(tmp_path, algorithms, said, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert said in message(changed(tmp_path, algorithms=algorithms))
+    assert not (tmp_path / "hurt").exists()
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: 1000000000}}]"}, "expected at most 5,000"),
+        ({"algorithms": "[{class: pymoo.algorithms.moo.nsga3.NSGA3, parameters: {ref_dirs: 100000000}}]"},
+         "at most 5,000"),
+        ({"seeds": f"[{'9' * 400}]"}, "at most 2\\*\\*53"),
+        ({"budgets": f"[{{generations: {'9' * 400}}}]"}, "at most 2\\*\\*53"),
+        ({"budgets": f"[{{seconds: {'9' * 400}}}]"}, "below 1e\\+300"),
+        ({"problems": f"['{'x' * 300}.ply']"}, "too long"),
+    ],
+)  # fmt: skip
+def test_numbers_and_names_that_nobody_means_are_refused_at_once(tmp_path, parts, said):
+    path = changed(tmp_path, **parts)
+    with pytest.raises(ConfigError, match=said):
+        read_experiment_file(path)
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, "{" * 100_000, "- " * 100_000, "- a\n" * 60_000, "#\n" * 100_000,
+                                  "a:" * 100_000, '"' + "\\n" * 100_000])  # fmt: skip
+def test_the_reader_takes_no_longer_than_seconds_whatever_it_is_given(tmp_path, text):
+    path = write(tmp_path, text)
+    start = time.perf_counter()
+    with pytest.raises(ConfigError):
+        read_experiment_file(path)
+    assert time.perf_counter() - start < 5

@@ -1,0 +1,596 @@
+"""Finished runs are never lost, never done twice, and never depend on how they came about."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymoo.optimize import minimize
+
+from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.comparison import analysis, meshlab, runner
+from meshsimp_pymoo.comparison.config import read_experiment_file
+from meshsimp_pymoo.comparison.figures import meshes_figure
+from meshsimp_pymoo.comparison.meshlab import meshlab_available
+from meshsimp_pymoo.comparison.report import write_tables
+from meshsimp_pymoo.comparison.runner import plan, run_experiment
+from meshsimp_pymoo.comparison.store import ExperimentWarning, RunStore, read_run
+from meshsimp_pymoo.comparison.study import Study
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.storage import write_mesh
+from meshsimp_pymoo.workers import DaskEngine
+
+CONFIGS = Path(__file__).resolve().parents[2] / "configs"
+
+CONFIG = """
+title: tiny
+problem: {footprint: hull, outside: ignore}
+problems: [{name: Face, model: "face:90"}, {name: Peaks, model: "peaks:9"}]
+algorithms:
+  - {name: N1, preset: nsga2_v1, parameters: {pop_size: 12}}
+  - {name: N2, preset: nsga2_v2, parameters: {pop_size: 12}}
+  - {name: G1, preset: weighted_ga_v1, parameters: {pop_size: 12}, merged_over: {w: [0.0, 0.5, 1.0]}}
+seeds: [1, 2, 3]
+budgets: [{generations: 6}, {evaluations: 60}]
+"""
+RUNS = 2 * (1 + 1 + 3) * 3 * 2
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "tiny.yaml"
+    path.write_text(CONFIG, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="session")
+def reference(tmp_path_factory):
+    """An experiment that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("reference")
+    (folder / "tiny.yaml").write_text(CONFIG, encoding="utf-8")
+    run_experiment(folder / "tiny.yaml", folder / "out")
+    write_tables(folder / "out")
+    return folder / "out"
+
+
+@pytest.fixture
+def stored(reference, tmp_path):
+    """A copy of it to spoil."""
+    import shutil
+
+    shutil.copytree(reference, tmp_path / "out")
+    return tmp_path / "out"
+
+
+def results(out: Path) -> dict[str, bytes]:
+    """Return everything that must be the same bytes for the same runs."""
+    paths = [path for path in sorted(out.rglob("*")) if path.is_file() and path.suffix != ".png"]
+    own = [path for path in paths if path.relative_to(out).parts[0] in ("tables", "findings.md")]
+    return {path.relative_to(out).as_posix(): path.read_bytes() for path in own}
+
+
+def record_of(out: Path, **wanted: object) -> Path:
+    for path in sorted((out / "runs").glob("*.json")):
+        record = json.loads(path.read_text())
+        if all(record[key] == value for key, value in wanted.items()):
+            return path
+    raise AssertionError(f"no run with {wanted}")
+
+
+def test_every_run_is_stored_and_none_is_done_again(config, stored, monkeypatch):
+    assert len(list((stored / "runs").glob("*.json"))) == RUNS
+
+    def never(*_):
+        raise AssertionError("a finished run was done again")
+
+    monkeypatch.setattr(runner, "perform", never)
+    done = run_experiment(config, stored)
+    assert (done.finished, done.reused) == (0, RUNS)
+
+
+def test_a_stored_run_is_what_pymoo_finds_in_one_go(reference, config):
+    experiment = read_experiment_file(config)
+    (algorithm,) = [a for a in experiment.algorithms if a.name == "N1"]
+    problem = MeshProblem("face:90", footprint="hull", outside="ignore")
+    result = minimize(problem, algorithm.build(), ("n_gen", 6), seed=2)
+    run = read_run(record_of(reference, problem="Face", algorithm="N1", seed=2, budget="6 generations"))
+    np.testing.assert_array_equal(run.arrays["F"], non_dominated(result.F))
+    assert run.record["evaluations"] == result.algorithm.evaluator.n_eval == 72
+    kept = np.unpackbits(run.arrays["kept"], axis=1)[:, : problem.n_var].astype(bool)
+    for row, q in enumerate(map(problem.quality, kept)):
+        assert (q.error, q.triangles) == tuple(run.arrays["F"][row])
+        assert q.max_error == run.arrays["max_error"][row]
+        assert q.uncovered == run.arrays["uncovered"][row]
+    charged = MeshProblem(problem.model, footprint="hull", outside="nearest")
+    np.testing.assert_array_equal(run.arrays["error_nearest"], [charged.quality(row).error for row in kept])
+
+
+def test_a_budget_ends_with_the_generation_that_reaches_it(reference):
+    run = read_run(record_of(reference, problem="Peaks", algorithm="N2", seed=1, budget="60 evaluations"))
+    assert run.record["evaluations"] >= 60
+    assert run.record["generations"] < 6
+    assert (
+        read_run(record_of(reference, problem="Peaks", algorithm="N1", budget="60 evaluations")).record["evaluations"]
+        == 60
+    )
+
+
+def test_runs_are_the_same_however_budgets_and_processes_are_shared_out(config, reference, tmp_path):
+    alone = CONFIG.replace("{generations: 6}, ", "").replace("seeds: [1, 2, 3]", "seeds: [2]")
+    config.write_text(alone, encoding="utf-8")
+    run_experiment(config, tmp_path / "out", jobs=2)
+    made = sorted((tmp_path / "out" / "runs").glob("*.npz"))
+    assert len(made) == RUNS // 6
+    for path in made:
+        assert path.read_bytes() == (reference / "runs" / path.name).read_bytes()
+
+
+def test_an_algorithm_by_import_path_has_a_search_for_each_budget(config):
+    spelled = CONFIG.replace("preset: nsga2_v1", "class: pymoo.algorithms.moo.spea2.SPEA2")
+    config.write_text(spelled, encoding="utf-8")
+    tasks = plan(read_experiment_file(config))
+    assert {len(task.budgets) for task in tasks if task.algorithm.name == "N1"} == {1}
+    assert {len(task.budgets) for task in tasks if task.algorithm.name == "N2"} == {2}
+    keys = [key for task in tasks for key in task.keys]
+    assert len(set(keys)) == len(keys) == RUNS
+
+
+def test_an_algorithm_with_a_memory_in_its_defaults_repeats(config, tmp_path):
+    # pymoo's SPEA2 keeps the bounds of earlier runs in an object that all instances share
+    text = CONFIG.replace("preset: nsga2_v1", "class: pymoo.algorithms.moo.spea2.SPEA2").replace(
+        "seeds: [1, 2, 3]", "seeds: [2]"
+    )
+    config.write_text(text, encoding="utf-8")
+    run_experiment(config, tmp_path / "one")
+    config.write_text(text.replace("seeds: [2]", "seeds: [1, 2]"), encoding="utf-8")
+    run_experiment(config, tmp_path / "two")
+    for path in (tmp_path / "one" / "runs").glob("*.npz"):
+        assert path.read_bytes() == (tmp_path / "two" / "runs" / path.name).read_bytes()
+
+
+def test_a_budget_in_seconds_ends(config, tmp_path):
+    config.write_text(
+        CONFIG.replace("{evaluations: 60}", "{seconds: 0.05}").replace("[1, 2, 3]", "[1]"), encoding="utf-8"
+    )
+    run_experiment(config, tmp_path / "out")
+    run = read_run(record_of(tmp_path / "out", algorithm="N1", budget="0.05 seconds"))
+    assert run.record["seconds"] >= 0.05
+    assert len(run.arrays["F"])
+
+
+def test_a_changed_configuration_does_what_is_new_and_names_what_is_stale(config, stored):
+    first = read_run(record_of(stored, algorithm="N1", problem="Face"))
+    config.write_text(
+        CONFIG.replace("seeds: [1, 2, 3]", "seeds: [2, 3, 4]").replace("name: N1", "name: Other"), encoding="utf-8"
+    )
+    with pytest.warns(ExperimentWarning, match=r"not asked for .* not used"):
+        done = run_experiment(config, stored)
+    assert done.finished == RUNS // 3  # the new seed; a new name is no new run
+    assert done.reused == 2 * RUNS // 3
+    assert first.path.exists()
+    study = write_tables(stored)
+    assert study.methods == ["Other", "N2", "G1"]
+    for case in study.cases.values():
+        assert set(case.runs["Other"]) == {2, 3, 4}
+
+
+def test_another_setting_is_another_run(config, stored):
+    config.write_text(CONFIG.replace("N1, preset: nsga2_v1, parameters: {pop_size: 12}",
+        "N1, preset: nsga2_v1, parameters: {pop_size: 12}, operators: {mutation: {name: neighbour_shift, along: mesh}}"
+    ), encoding="utf-8")  # fmt: skip
+    with pytest.warns(ExperimentWarning, match=r"and 11 more: not asked for"):
+        assert run_experiment(config, stored).finished == 12
+
+
+def spoil_truncated(path: Path) -> Path:
+    npz = path.with_suffix(".npz")
+    npz.write_bytes(npz.read_bytes()[:-20])
+    return npz
+
+
+def spoil_record(path: Path) -> Path:
+    path.write_text(path.read_text().replace('"seed": 2', '"seed": 3'))
+    return path
+
+
+def spoil_number(path: Path) -> Path:
+    content = json.loads(path.read_text())
+    content["evaluations"] += 1
+    path.write_text(json.dumps(content))
+    return path
+
+
+def spoil_arrays(path: Path) -> Path:
+    npz = path.with_suffix(".npz")
+    content = bytearray(npz.read_bytes())
+    content[len(content) // 2] ^= 1
+    npz.write_bytes(bytes(content))
+    return npz
+
+
+def spoil_rewritten(path: Path) -> Path:
+    """Change a number in a file that is whole otherwise."""
+    npz = path.with_suffix(".npz")
+    arrays = dict(np.load(npz))
+    arrays["F"][0, 0] /= 2
+    np.savez_compressed(npz, **arrays)
+    return npz
+
+
+def spoil_missing(path: Path) -> Path:
+    npz = path.with_suffix(".npz")
+    npz.unlink()
+    return npz
+
+
+def spoil_empty(path: Path) -> Path:
+    path.write_text("")
+    return path
+
+
+def spoil_swapped(path: Path) -> Path:
+    """Put another whole run's files in place of this one's."""
+    other = next(p for p in sorted(path.parent.glob("*.json")) if p != path)
+    for suffix in (".json", ".npz"):
+        path.with_suffix(suffix).write_bytes(other.with_suffix(suffix).read_bytes())
+    return path
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        spoil_truncated, spoil_record, spoil_number, spoil_arrays, spoil_rewritten, spoil_missing, spoil_empty,
+        spoil_swapped,
+    ],
+)  # fmt: skip
+def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored, reference):
+    record = record_of(stored, problem="Face", algorithm="N2", seed=2, budget="6 generations")
+    damaged = spoil(record)
+    with pytest.warns(ExperimentWarning, match="left out of the report") as caught:
+        study = write_tables(stored)
+    assert any(damaged.name in line for line in study.damaged)
+    assert any("Face / N2 / seed 2" in str(w.message) for w in caught)
+    assert 2 not in study.cases["Face", "6 generations", "searched"].runs["N2"]
+    assert 2 in study.cases["Face", "60 evaluations", "searched"].runs["N2"]
+    with pytest.warns(ExperimentWarning, match=f"{damaged.name}.*computed again"):
+        done = run_experiment(config, stored)
+    assert done.finished == 1
+    write_tables(stored)
+    assert results(stored) == results(reference)
+
+
+def test_a_merged_front_that_lacks_a_run_is_left_out(stored):
+    path = record_of(stored, problem="Face", algorithm="G1", seed=1, budget="6 generations")
+    path.unlink()
+    with pytest.warns(ExperimentWarning, match="missing: Face / G1"):
+        study = write_tables(stored)
+    assert set(study.cases["Face", "6 generations", "searched"].runs["G1"]) == {2, 3}
+    assert set(study.cases["Face", "6 generations", "searched"].runs["N1"]) == {1, 2, 3}
+
+
+def test_runs_of_several_weights_make_one_front(reference):
+    case = Study(reference).cases["Face", "6 generations", "searched"]
+    for seed in (1, 2, 3):
+        single = [run.arrays["F"] for run in case.sources["G1"][seed]]
+        assert [len(F) for F in single] == [1, 1, 1]
+        np.testing.assert_array_equal(case.runs["G1"][seed], analysis.merged_front(dict(enumerate(single))))
+
+
+def test_ctrl_c_leaves_the_finished_runs(config, tmp_path, reference):
+    out = tmp_path / "out"
+
+    def interrupt(done: float, total: float, text: str) -> None:
+        if "Peaks" in text:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_experiment(config, out, progress=interrupt)
+    finished = len(list((out / "runs").glob("*.json")))
+    assert RUNS // 2 <= finished < RUNS
+    assert run_experiment(config, out).reused == finished
+    write_tables(out)
+    assert results(out) == results(reference)
+
+
+# --------------------------------------------------------------------------------------------------- killed
+
+
+def in_a_child(config: str, out: str, begun: str) -> None:
+    """Do the whole experiment; what is killed, after it has said that it begins.
+
+    Nothing is damaged by being killed, so that nothing has to be named.
+    """
+    warnings.simplefilter("error", ExperimentWarning)
+    experiment = read_experiment_file(config)
+    Path(begun).touch()
+    run_experiment(experiment, out)
+    write_tables(out)
+
+
+@pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a fork server")
+def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(config, tmp_path, reference):
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["meshsimp_pymoo.comparison.runner", "meshsimp_pymoo.comparison.report"])
+    rng = random.Random(5)
+    wanted = results(reference)
+    kills, rounds, moments = 0, 0, set()
+    begun = tmp_path / "begun"
+    while kills < 12:
+        rounds += 1
+        out = tmp_path / f"out{rounds}"
+        longest = 0.6
+        while True:
+            begun.unlink(missing_ok=True)
+            child = context.Process(target=in_a_child, args=(str(config), str(out), str(begun)))
+            child.start()
+            while not begun.exists() and child.is_alive():
+                time.sleep(0.002)
+            child.join(rng.uniform(0.0, longest))
+            longest += 0.1  # on a busy machine the end takes longer than this
+            if child.exitcode is None:
+                os.kill(child.pid, signal.SIGKILL)
+                child.join()
+            if child.exitcode == 0:
+                break
+            assert child.exitcode == -signal.SIGKILL
+            kills += 1
+            moments.add(len(list((out / "runs").glob("*.json"))))
+        assert results(out) == wanted
+        assert len(list((out / "runs").glob("*.json"))) == RUNS
+        assert not list(out.glob("**/.*.partial"))
+    assert len(moments) > 3  # not always in the same place
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a POSIX signal")
+def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(config, tmp_path, reference):
+    out = tmp_path / "out"
+    call = [sys.executable, "-m", "meshsimp_pymoo.cli", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
+    config.write_text(CONFIG.replace("seeds: [1, 2, 3]", f"seeds: {list(range(1, 60))}"), encoding="utf-8")
+    parent = subprocess.Popen(call, start_new_session=True)
+    deadline = time.monotonic() + 60
+    while len(list((out / "runs").glob("*.json"))) < 8:
+        assert parent.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    parent.kill()
+    parent.wait()
+    while True:  # the processes of its session
+        members = subprocess.run(["ps", "-o", "pid=", "-s", str(parent.pid)], capture_output=True, text=True)
+        if not members.stdout.split():
+            break
+        assert time.monotonic() < deadline, "its processes live on"
+        time.sleep(0.1)
+    config.write_text(CONFIG, encoding="utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExperimentWarning)  # runs of the seeds that are not asked for any more
+        assert run_experiment(config, out).reused > 0
+    write_tables(out)
+    assert results(out) == results(reference)
+
+
+def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        DaskEngine(cluster.scheduler_address) as engine,
+    ):
+        run_experiment(config, tmp_path / "out", engine=engine)
+    write_tables(tmp_path / "out")
+    assert results(tmp_path / "out") == results(reference)
+
+
+def test_a_process_that_dies_is_answered_in_one_line(config, tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "_work_on", die)
+    with pytest.raises(ResultError, match=r"a process ended unexpectedly .* the same command does the rest"):
+        run_experiment(config, tmp_path / "out", jobs=2)
+
+
+def die(task: object, shared: object) -> None:
+    os._exit(9)
+
+
+# ------------------------------------------------------------------------------------------------ classic methods
+
+
+def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_skipped(
+    config, tmp_path, monkeypatch, reference
+):
+    def unavailable() -> None:
+        raise meshlab.MeshLabUnavailable("it needs the packages libgl1 and libopengl0")
+
+    monkeypatch.setattr(meshlab, "_pymeshlab", unavailable)
+    config.write_text(CONFIG + "baselines: {meshlab: true}\n", encoding="utf-8")
+    out = tmp_path / "out"
+    with pytest.warns(ExperimentWarning, match=r"skipped: Face / quadric_collapse.*Peaks / .*libgl1 and libopengl0"):
+        done = run_experiment(config, out)
+    assert done.finished == RUNS
+    assert "libopengl0" in done.skipped[0]
+    write_tables(out)
+    assert "libopengl0" in (out / "findings.md").read_text()
+    same = {name: content for name, content in results(out).items() if "findings" not in name}
+    assert same == {name: content for name, content in results(reference).items() if "findings" not in name}
+
+
+def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolutionary_one(config, tmp_path):
+    if not meshlab_available():
+        pytest.skip("pymeshlab cannot be loaded here: it needs the packages libgl1 and libopengl0")
+    config.write_text(
+        CONFIG.replace("seeds: [1, 2, 3]", "seeds: [1]")
+        + "baselines: {meshlab: {methods: [quadric_collapse, vertex_clustering], steps: 3}}\n",
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    run_experiment(config, out)
+    study = write_tables(out)
+    problem = study.problems[0]
+    run = study.classic_runs["Face", "quadric_collapse"]
+    smallest = min(r.arrays["F"][:, 1].min() for r in study.all_runs if r.record["problem"] == "Face")
+    assert run.arrays["asked"].tolist() == list(meshlab.reductions(problem.triangles, down_to=int(smallest), steps=3))
+    assert run.arrays["paper"].sum() == 10
+    model = study.model(problem)
+    from meshsimp_pymoo.comparison.store import classic_mesh
+    from meshsimp_pymoo.surface.evaluate import mesh_quality
+
+    for row in range(len(run.arrays["asked"])):
+        vertices, faces = classic_mesh(run, row)
+        assert len(faces) == run.arrays["F"][row, 1]
+        for outside, error in (("ignore", run.arrays["F"][row, 0]), ("nearest", run.arrays["error_nearest"][row])):
+            assert mesh_quality(model, vertices, faces, outside=outside).error == pytest.approx(error, rel=1e-12)
+    # under the paper's reading only its own series is compared, else all of it
+    searched = study.cases["Face", "6 generations", "searched"].runs["MeshLab quadric"][0]
+    nearest = study.cases["Face", "6 generations", "nearest"].runs["MeshLab quadric"][0]
+    assert searched[:, 1].min() >= problem.triangles * 0.49
+    assert nearest[:, 1].min() < problem.triangles * 0.49
+    # nothing is done again
+    before = results(out)
+    assert run_experiment(config, out).finished == 0
+    write_tables(out)
+    assert results(out) == before
+
+
+def test_pictures_say_of_every_mesh_how_much_of_the_model_it_abandons(reference):
+    study = Study(reference)
+    case = study.cases["Face", "6 generations", "searched"]
+    titles = {axes.get_title() for axes in meshes_figure(study, case).axes}
+    chosen = analysis.selected_solutions(case.runs, random_state=np.random.default_rng(1), optimal=case.optimal)
+    for method in ("N1", "N2", "G1"):
+        (solution,) = (s for s in chosen[method] if s.kind == "trade_off")
+        found = case.find(method, solution.error, solution.triangles)
+        size, mean = f"{solution.triangles:,.0f} triangles", f"mean {found.number('mean_error'):.3g}"
+        assert f"{method}\n{size}, {mean}\n{found.number('uncovered'):.0f} vertices uncovered" in titles
+
+
+# ------------------------------------------------------------------------------------------------ folders and shell
+
+
+def test_a_folder_with_other_things_in_it_is_refused(config, tmp_path):
+    (tmp_path / "thesis.txt").write_text("precious")
+    with pytest.raises(ResultError, match=r"thesis\.txt|tiny\.yaml"):
+        run_experiment(config, tmp_path)
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_folder_that_a_killed_process_had_only_begun_is_continued(config, tmp_path, reference):
+    import shutil
+
+    out = tmp_path / "out"
+    (out / "runs").mkdir(parents=True)
+    shutil.copytree(reference / "models", out / "models")
+    (out / "models" / ".half.npz.00000000.partial").write_text("half")
+    assert run_experiment(config, out).finished == RUNS
+    (tmp_path / "other" / "models").mkdir(parents=True)
+    (tmp_path / "other" / "models" / "face.ply").write_text("precious")
+    with pytest.raises(ResultError, match=r"models.face\.ply"):
+        run_experiment(config, tmp_path / "other")
+
+
+def test_two_calls_do_not_work_in_one_folder(config, stored):
+    with locked(stored), pytest.raises(ResultError, match="another process"):
+        run_experiment(config, stored)
+
+
+def test_nothing_is_written_for_a_configuration_that_is_wrong_anywhere(config, tmp_path, capsys):
+    config.write_text(CONFIG.replace("peaks:9", "peak:9"), encoding="utf-8")
+    assert main(["run", str(config), "-o", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1
+    assert "problems[1].model" in said.err
+    assert "'peaks'" in said.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_shell_runs_the_quick_configuration_shortened_and_reports_it_again(tmp_path, capsys, monkeypatch):
+    text = (CONFIGS / "quick.yaml").read_text(encoding="utf-8")
+    for long, short in (
+        ("seeds: [1, 2, 3, 4, 5, 6, 7, 8]", "seeds: [1, 2]"),
+        ("{generations: 25}", "{generations: 3}"),
+        ("  - {evaluations: 1000}\n", ""),
+        ("[0.0, 0.25, 0.5, 0.75, 1.0]", "[0.0, 1.0]"),
+        ('  - {name: Terrain, model: "jacksboro:vertices=400"}\n', ""),
+        ('  - {name: Horseshoe, model: "horseshoe:350"}\n', ""),
+    ):
+        assert long in text
+        text = text.replace(long, short)
+    (tmp_path / "quick.yaml").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "quick.yaml", "--jobs", "1"]) == 0
+    out = tmp_path / "quick_results"
+    said = capsys.readouterr()
+    assert "runs done" in said.out
+    if meshlab_available():
+        assert said.err == ""
+    for scoring in ("searched", "nearest"):
+        figures = {path.name for path in (out / "figures" / "3-generations" / scoring).iterdir()}
+        assert figures == {"hvr.png", "cardinality.png", "selected.png", "fronts_Face.png", "meshes_Face.png"}
+        assert (out / "tables" / "3-generations" / scoring / "scores.tex").stat().st_size > 500
+    before = results(out)
+    assert (out / "times.csv").read_text().startswith("model,method,")
+    for name in ("tables", "figures"):
+        import shutil
+
+        shutil.rmtree(out / name)
+    (out / "findings.md").unlink()
+    assert main(["report", str(out)]) == 0
+    assert results(out) == before
+    assert "missing" not in capsys.readouterr().out
+
+
+def test_a_report_of_nothing_is_refused(tmp_path, capsys):
+    assert main(["report", str(tmp_path)]) == 2
+    assert "no experiment is stored there" in capsys.readouterr().err
+
+
+def test_a_leftover_of_a_killed_process_is_removed(config, stored):
+    leftover = stored / "runs" / ".x.json.00000000.partial"
+    leftover.write_text("half")
+    run_experiment(config, stored)
+    assert not leftover.exists()
+
+
+def test_no_result_holds_a_pickle(reference):
+    for path in (reference / "runs").glob("*.npz"):
+        with np.load(path, allow_pickle=False) as file:
+            assert all(file[name].dtype.kind in "fiub" for name in file.files)
+    assert RunStore(reference).paths
+
+
+def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findings_say_so(tmp_path):
+    face = load("face:90")
+    write_mesh(tmp_path / "face.ply", face.points, face.faces, {"importance": np.linspace(0, 1, 90)})
+    (tmp_path / "study.yaml").write_text(
+        "problem: {objectives: [rms_error, triangles], weights: importance, outside: ignore}\n"
+        "problems: [face.ply]\nalgorithms: [{preset: nsga2_v1, parameters: {pop_size: 12}}]\n"
+        "seeds: [1]\nbudgets: [{generations: 3}]\n",
+        encoding="utf-8",
+    )
+    assert run_experiment(tmp_path / "study.yaml", tmp_path / "out", jobs=1).finished == 1
+    again = run_experiment(tmp_path / "study.yaml", tmp_path / "out", jobs=1)
+    assert (again.finished, again.reused) == (0, 1)
+    (path,) = RunStore(tmp_path / "out").paths.values()
+    arrays = read_run(path).arrays
+    rules = {"objectives": ("rms_error", "triangles"), "weights": "importance"}
+    by_ignoring, by_nearest = (MeshProblem(tmp_path / "face.ply", outside=o, **rules) for o in ("ignore", "nearest"))
+    kept = np.unpackbits(arrays["kept"], axis=1)[:, :90].astype(bool)
+    np.testing.assert_array_equal(by_ignoring.evaluate(kept), arrays["F"])
+    np.testing.assert_array_equal(by_nearest.evaluate(kept)[:, 0], arrays["error_nearest"])
+    np.testing.assert_array_equal(arrays["rms_error"], arrays["F"][:, 0])
+    study = Study(tmp_path / "out")
+    assert study.model(study.problems[0]).total_weight == pytest.approx(45.0)
+    write_tables(tmp_path / "out")
+    said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
+    assert "On face the *error* is the root mean square of the deviations" in said
+    assert "attribute *importance*" in said

@@ -1,0 +1,24 @@
+"""What tests of the geometry are tried on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.surface.model import OpenModel
+
+
+def holey_grid() -> SourceMesh:
+    """Return a height grid with a bay and a hole: lattice ties, borders on every side."""
+    rng = np.random.default_rng(4)
+    elevation = rng.integers(0, 50, (9, 11)).astype(float)
+    elevation[3:6, 4:7] = np.nan
+    elevation[:4, 8:] = np.nan
+    return grid_source(elevation, 2.0, 3.0, name="holey")
+
+
+def subset(model: OpenModel, share: float, seed: int = 0) -> np.ndarray:
+    """Return a random subset that holds the corners, (N,) bool."""
+    kept = np.random.default_rng(seed).random(model.n_vertices) < share
+    kept[model.corners] = True
+    return kept

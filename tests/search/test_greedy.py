@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.load import SourceMesh
+from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, mesh_deviation, simplify
+from meshsimp_pymoo.surface.model import build_model, load_model
+
+METHODS = {
+    "thinning": thinning,
+    "worst point": greedy_insertion,
+    "worst triangle": lambda model, *a, **k: greedy_insertion(model, *a, choose="triangle", **k),
+}
+
+
+def corners_of(model):
+    return np.isin(np.arange(model.n_vertices), model.corners)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", ["jacksboro:30", "face:200", "horseshoe:150", "pyramid:9"])
+def test_every_subset_has_the_error_and_the_triangles_that_are_said(method, name):
+    model = load_model(load(name))
+    front = METHODS[method](model)
+    rows = np.unique(np.linspace(0, len(front) - 1, 25).astype(int))
+    table = evaluate_subsets(model, np.array([front.kept(k) for k in rows]))
+    np.testing.assert_array_equal(table[:, 1], front.triangles[rows])
+    np.testing.assert_allclose(table[:, 0], front.error[rows], rtol=1e-9, atol=1e-9 * model.diagonal)
+    assert front.kept(0)[model.corners].all()
+    for k in rows[1:]:
+        assert (front.kept(k) & ~front.kept(k - 1)).sum() == 1
+
+
+def test_thinning_equals_its_slow_twin():
+    """Remove, by full evaluation of every candidate, the vertex that adds least; ties by the lower index."""
+    model = load_model(load("face:60"))
+    pinned = corners_of(model)
+    kept = np.ones(model.n_vertices, bool)
+    order = []
+    while (kept & ~pinned).any():
+        rows = np.flatnonzero(kept & ~pinned)
+        X = np.tile(kept, (len(rows), 1))
+        X[np.arange(len(rows)), rows] = False
+        now = evaluate_subsets(model, kept)[0, 0]
+        added = np.round(evaluate_subsets(model, X)[:, 0] - now, 9)
+        best = rows[np.argmin(added)]
+        kept[best] = False
+        order.append(best)
+    assert thinning(model).order[::-1].tolist() == order
+
+
+def test_worst_point_insertion_equals_its_slow_twin():
+    model = load_model(load("face:60"))
+    kept = corners_of(model)
+    order = []
+    while len(order) < 40:
+        deviation = simplify(model, kept).deviation.copy()
+        deviation[kept] = -1
+        best = int(np.argmax(deviation))
+        kept[best] = True
+        order.append(best)
+    assert greedy_insertion(model, most=40).order.tolist() == order
+
+
+def test_thinning_beats_insertion_on_a_terrain():
+    model = load_model(load("jacksboro:20"))
+    thin, grow = thinning(model), greedy_insertion(model)
+    for triangles in (50, 100, 200):
+        assert thin.error[thin.triangles <= triangles].min() < grow.error[grow.triangles <= triangles].min()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_pinned_vertices_are_in_every_subset(method):
+    model = load_model(load("face:150"))
+    pinned = corners_of(model)
+    pinned[[3, 70, 99]] = True
+    front = METHODS[method](model, pinned)
+    assert front.kept(0)[pinned].all()
+    np.testing.assert_array_equal(front.base, np.flatnonzero(pinned))
+
+
+def test_insertion_stops_where_the_error_is_zero():
+    roof = load_model(load("roof:9"))
+    front = greedy_insertion(roof)
+    assert front.error[-1] == 0
+    assert front.triangles[-1] <= 8
+    assert len(greedy_insertion(roof, most=1)) == 2
+
+
+def test_other_starts_and_wrong_arguments():
+    model = load_model(load("face:150"))
+    some = np.random.default_rng(0).random(150) < 0.5
+    front = thinning(model, kept=some)
+    np.testing.assert_array_equal(front.kept(len(front) - 1), some | corners_of(model))
+    with pytest.raises(ValueError, match="choose='line' is unknown"):
+        greedy_insertion(model, choose="line")
+    with pytest.raises(ValueError, match="the subsets 0 to"):
+        front.kept(len(front))
+    deviation, _, _ = mesh_deviation(model, model.file_points, simplify(model, front.kept(5)).faces)
+    assert front.error[5] == pytest.approx(deviation.sum())
+
+
+def test_insertion_leaves_out_vertices_whose_position_is_taken():
+    points = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 0], [2, 2, 9.0], [2, 2, 5]]
+    source = SourceMesh(np.array(points), np.array([[0, 1, 4], [1, 2, 5], [2, 3, 4], [3, 0, 6]]), {}, "step")
+    model = build_model(source, up="z")
+    for method in METHODS.values():
+        front = method(model)
+        table = evaluate_subsets(model, np.array([front.kept(k) for k in range(len(front))]))
+        np.testing.assert_allclose(table[:, 0], front.error)
+        np.testing.assert_array_equal(table[:, 1], front.triangles)
+
+
+def test_pins_and_counts_that_are_none_are_refused():
+    model = load_model(load("face:150"))
+    with pytest.raises(ValueError, match=r"pinned is a bool array of shape \(150,\)"):
+        thinning(model, np.arange(4))
+    with pytest.raises(ValueError, match="most=-1"):
+        greedy_insertion(model, most=-1)

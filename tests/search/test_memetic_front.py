@@ -1,0 +1,87 @@
+"""The memetic search finds the whole true front where that is known."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from enumerable_models import GENERATIONS, MOST_FREE, nondominated, random_problem, same_front, true_front
+from pymoo.optimize import minimize
+
+from meshsimp_pymoo import MeshProblem, PackedDuplicates, memetic, thinning
+from meshsimp_pymoo.search.local_search import MoveShares
+from meshsimp_pymoo.search.memetic import IDLE, DownTheLadder, SizeLadder
+
+MODELS = range(20)
+
+
+@pytest.mark.parametrize("seed", MODELS)
+def test_memetic_finds_the_whole_front_of_a_model_that_can_be_enumerated(seed):
+    problem = random_problem(seed)
+    known = true_front(problem)
+    # A problem of its own, so that nothing which the enumeration left behind can help.
+    result = minimize(MeshProblem(problem.model), memetic(), ("n_gen", GENERATIONS), seed=seed)
+    np.testing.assert_allclose(nondominated(result.F), known, rtol=1e-12)
+    np.testing.assert_array_equal(problem.evaluate(result.X), result.F)
+
+
+def test_the_enumerated_front_agrees_with_its_definition():
+    problem = random_problem(0)
+    free = np.flatnonzero(~problem.pinned)
+    rows = []
+    for taken in itertools.chain.from_iterable(itertools.combinations(free, k) for k in range(len(free) + 1)):
+        kept = problem.pinned.copy()
+        kept[list(taken)] = True
+        quality = problem.quality(kept)
+        rows.append((quality.error, quality.triangles))
+    assert len(rows) == 2 ** len(free)
+    front = {(e, t) for e, t in rows if not any(a <= e and b <= t and (a, b) != (e, t) for a, b in rows)}
+    assert {tuple(row) for row in true_front(problem).tolist()} == front
+
+
+def test_the_models_differ_in_size_and_thinning_alone_misses_most_fronts():
+    """So the search has something to find."""
+    problems = [random_problem(seed) for seed in MODELS]
+    assert {int((~problem.pinned).sum()) for problem in problems} == set(range(3, MOST_FREE + 1))
+    missed = 0
+    for problem in problems:
+        nested = thinning(problem.model)
+        missed += not same_front(np.c_[nested.error, nested.triangles], true_front(problem), tolerance=1e-9)
+    assert missed > len(problems) / 2
+
+
+def test_the_search_ends_when_there_is_nothing_left_to_find():
+    """However many evaluations it may still use."""
+    problem = random_problem(2)
+    result = minimize(MeshProblem(problem.model), memetic(), ("n_eval", 10**9), seed=1)
+    assert result.algorithm.idle >= IDLE
+    np.testing.assert_allclose(nondominated(result.F), true_front(problem), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "options", [{"inherit": False}, {"heat": 0.0}, {"shares": MoveShares(near=1.0, fill=0.0, drop=0.0)}], ids=str
+)
+def test_the_ways_of_making_children_can_be_chosen_and_none_is_worse_than_thinning(options):
+    problem = MeshProblem("peaks:15")
+    ladder = SizeLadder()
+    mating = DownTheLadder(ladder, eliminate_duplicates=PackedDuplicates(), **options)
+    result = minimize(problem, memetic(30, survival=ladder, mating=mating), ("n_gen", 6), seed=1)
+    usual = minimize(problem, memetic(30), ("n_gen", 6), seed=1)
+    thinned = thinning(problem.model)
+    assert not np.array_equal(result.F, usual.F)
+    for error, triangles in result.F:
+        fitting = thinned.triangles <= triangles
+        # the mesh may be one of thinning's own, whose error was added up in another order
+        assert error <= thinned.error[fitting].min() * (1 + 1e-9) or triangles not in ladder.rungs
+
+
+def test_where_all_vertices_are_not_the_best_mesh_the_front_still_ends_with_the_best_of_thinning(shared_data):
+    """Where a scan's outline is not covered, the whole mesh's error is not the least."""
+    problem = MeshProblem(shared_data / "m4_skull.ply")
+    thinned = thinning(problem.model)
+    whole = problem.evaluate(np.ones(problem.n_var, bool))
+    assert thinned.error.min() < whole[0]
+    result = minimize(problem, memetic(20, moves_per_vertex=0), ("n_gen", 2), seed=1)
+    assert result.F[:, 0].min() <= thinned.error.min() * (1 + 1e-9)
+    assert result.F[:, 0].min() < result.algorithm.pop.get("F")[:, 0].min()  # the last rungs have none of it

@@ -1,0 +1,234 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
+from meshsimp_pymoo.surface.evaluate import FOOTPRINTS, OUTSIDES, evaluate_subsets, measured, simplify
+from meshsimp_pymoo.surface.live import LiveTriangulation
+from meshsimp_pymoo.surface.model import build_model
+
+
+def holey():
+    rng = np.random.default_rng(4)
+    elevation = rng.integers(0, 50, (9, 11)).astype(float)
+    elevation[3:6, 4:7] = np.nan
+    elevation[:4, 8:] = np.nan
+    return grid_source(elevation, 2.0, 3.0, name="holey")
+
+
+def turned_grid():
+    """A grid turned by 10 degrees: its hull is full of slivers that must be peeled."""
+    grid = grid_source(np.random.default_rng(0).random((6, 9)), 1.0, 1.0)
+    c, s = np.cos(np.pi / 18), np.sin(np.pi / 18)
+    return SourceMesh(grid.points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), grid.faces, {}, "turned")
+
+
+def cliff():
+    """Two vertices at one position, over a fan."""
+    points = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 5.0], [1, 1, 9.0], [0.5, 1, 2], [1.5, 1, 3]]
+    faces = [[0, 1, 4], [1, 7, 5], [7, 2, 5], [1, 2, 7], [2, 3, 5], [3, 6, 4], [6, 0, 4], [3, 0, 6]]
+    return SourceMesh(np.array(points, float), np.array(faces), {}, "cliff")
+
+
+SOURCES = {
+    "grid": lambda: load("roof:9"),
+    "terrain": lambda: load("jacksboro:30"),
+    "holey": holey,
+    "turned": turned_grid,
+    "face": lambda: load("face:150"),
+    "horseshoe": lambda: load("horseshoe:120"),
+    "cliff": cliff,
+}
+MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()}
+
+
+def assert_as_from_scratch(live, footprint, outside, measure="error"):
+    scratch = simplify(live.model, live.kept, footprint=footprint, outside=outside)
+    np.testing.assert_array_equal(live.faces, scratch.faces)
+    assert live.triangles == scratch.quality.triangles
+    scale = live.model.n_vertices * live.model.diagonal
+    expected = getattr(scratch.quality, measure)
+    # The root of a sum of squares is less exact near 0, by the root.
+    tolerance = 1e-12 * scale if measure == "error" else 1e-7 * live.model.diagonal
+    assert live.error == pytest.approx(expected, rel=1e-9, abs=tolerance)
+
+
+class LiveMachine(RuleBasedStateMachine):
+    """Any sequence of operations ends where the from-scratch evaluation of the same subset is."""
+
+    @initialize(
+        name=st.sampled_from(sorted(MODELS)),
+        footprint=st.sampled_from(FOOTPRINTS),
+        outside=st.sampled_from(OUTSIDES),
+        share=st.floats(0, 1),
+        seed=st.integers(0, 1000),
+    )
+    def start(self, name, footprint, outside, share, seed):
+        self.model = MODELS[name]
+        self.rules = footprint, outside
+        kept = np.random.default_rng(seed).random(self.model.n_vertices) < share
+        kept[self.model.corners] = True
+        self.live = LiveTriangulation(self.model, kept, footprint=footprint, outside=outside)
+
+    def pick(self, choice, kept):
+        rows = np.flatnonzero(self.live.kept == kept)
+        rows = np.setdiff1d(rows, self.model.corners) if kept else rows
+        return int(rows[choice % len(rows)]) if len(rows) else None
+
+    def apply(self, tried, act):
+        error, triangles = self.live.error, self.live.triangles
+        expected = tried()
+        scale = self.model.n_vertices * self.model.diagonal
+        assert self.live.triangles == triangles
+        act()
+        if np.isfinite(error) and np.isfinite(self.live.error):
+            assert expected[0] == pytest.approx(self.live.error - error, rel=1e-9, abs=1e-11 * scale)
+            assert expected[1] == self.live.triangles - triangles
+
+    @rule(choice=st.integers(0, 10**6))
+    def insert(self, choice):
+        v = self.pick(choice, kept=False)
+        if v is not None:
+            self.apply(lambda: self.live.try_insert(v), lambda: self.live.insert(v))
+
+    @rule(choice=st.integers(0, 10**6))
+    def remove(self, choice):
+        v = self.pick(choice, kept=True)
+        if v is not None:
+            self.apply(lambda: self.live.try_remove(v), lambda: self.live.remove(v))
+
+    @rule(one=st.integers(0, 10**6), other=st.integers(0, 10**6))
+    def move(self, one, other):
+        v, w = self.pick(one, kept=True), self.pick(other, kept=False)
+        if v is not None and w is not None:
+            self.apply(lambda: self.live.try_move(v, w), lambda: self.live.move(v, w))
+
+    @precondition(lambda self: hasattr(self, "live"))
+    @invariant()
+    def equals_scratch(self):
+        if self.live.triangles:
+            assert_as_from_scratch(self.live, *self.rules)
+
+
+LiveMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+TestLive = LiveMachine.TestCase
+
+
+@pytest.mark.parametrize("name", ["terrain", "turned", "holey", "face"])
+def test_a_thousand_random_operations_do_not_drift(name):
+    model = MODELS[name]
+    rng = np.random.default_rng(1)
+    kept = rng.random(model.n_vertices) < 0.3
+    kept[model.corners] = True
+    live = LiveTriangulation(model, kept)
+    free = np.setdiff1d(np.arange(model.n_vertices), model.corners)
+    for _ in range(1000):
+        v = int(rng.choice(free))
+        (live.remove if live.kept[v] else live.insert)(v)
+    assert_as_from_scratch(live, "model", "nearest")
+
+
+@pytest.mark.parametrize("measure", ["error", "rms_error"])
+@pytest.mark.parametrize("name", ["terrain", "holey", "face", "cliff"])
+def test_weights_and_squares_count_in_every_operation_tried_or_done(name, measure):
+    rng = np.random.default_rng(2)
+    n = MODELS[name].n_vertices
+    model = MODELS[name].with_weights(rng.uniform(0, 3, MODELS[name].source_index.max() + 1) * 2.0)
+    kept = rng.random(n) < 0.3
+    kept[model.corners] = True
+    live = LiveTriangulation(model, kept, measure=measure)
+    assert_as_from_scratch(live, "model", "nearest", measure)
+    free = np.setdiff1d(np.arange(n), model.corners)
+    scale = (model.total_weight if measure == "error" else 1.0) * model.diagonal
+    for _ in range(80):
+        v = int(rng.choice(free))
+        before = live.error, live.triangles
+        tried = (live.try_remove if live.kept[v] else live.try_insert)(v)
+        done = (live.remove if live.kept[v] else live.insert)(v)
+        assert tried[0] == pytest.approx(done, rel=1e-6, abs=1e-9 * scale)
+        assert before[0] + done == pytest.approx(live.error, abs=1e-9 * scale)
+        assert tried[1] == live.triangles - before[1]
+        movable, places = free[live.kept[free]], free[~live.kept[free]]
+        if len(movable) and len(places):
+            v, w = int(rng.choice(movable)), int(rng.choice(places))
+            assert live.try_move(v, w)[0] == pytest.approx(live.move(v, w), rel=1e-6, abs=1e-9 * scale)
+    assert_as_from_scratch(live, "model", "nearest", measure)
+
+
+@pytest.mark.parametrize("measure", ["error", "rms_error"])
+@pytest.mark.parametrize("method", [thinning, greedy_insertion])
+def test_the_classic_fronts_follow_the_measure_and_the_weights(method, measure):
+    plain = MODELS["face"]
+    model = plain.with_weights(np.linspace(0, 1, plain.source_index.max() + 1) ** 4)
+    front = method(model, measure=measure)
+    table = evaluate_subsets(model, np.array([front.kept(k) for k in range(0, len(front), 10)]))
+    expected = measured(table, measure, model.total_weight)
+    np.testing.assert_allclose(front.error[::10], expected, rtol=1e-9, atol=1e-6 * model.diagonal)
+    # At most sizes it beats, in its own measure, the front that looked at another one.
+    other = method(plain)
+    k = np.arange(5, min(len(front), len(other)), 5)
+    rival = measured(evaluate_subsets(model, np.array([other.kept(j) for j in k])), measure, model.total_weight)
+    assert (front.error[k] < rival).mean() > 0.6
+
+
+def test_a_maximum_is_no_sum_and_is_refused():
+    for call in (thinning, greedy_insertion):
+        with pytest.raises(ValueError, match="no sum over the vertices"):
+            call(MODELS["grid"], measure="max_error")
+    with pytest.raises(ValueError, match="measure='l2' is unknown"):
+        LiveTriangulation(MODELS["grid"], np.ones(81, bool), measure="l2")
+
+
+def test_removing_everything_but_the_corners_and_putting_it_back_restores_the_mesh():
+    model = MODELS["grid"]
+    live = LiveTriangulation(model, np.ones(model.n_vertices, bool))
+    before = live.faces
+    free = np.setdiff1d(np.arange(model.n_vertices), model.corners)
+    for v in free:
+        live.remove(int(v))
+    assert live.triangles == 2
+    for v in np.random.default_rng(0).permutation(free):
+        live.insert(int(v))
+    np.testing.assert_array_equal(live.faces, before)
+    assert live.error == pytest.approx(0, abs=1e-9)
+
+
+def test_wrong_operations_are_refused_and_change_nothing():
+    model = MODELS["grid"]
+    live = LiveTriangulation(model, np.isin(np.arange(model.n_vertices), model.corners))
+    kept, dropped = int(model.corners[0]), int(np.setdiff1d(np.arange(81), model.corners)[0])
+    with pytest.raises(ValueError, match="kept already"):
+        live.insert(kept)
+    with pytest.raises(ValueError, match="is not kept"):
+        live.remove(dropped)
+    with pytest.raises(ValueError, match="vertex 81 is none of the 81"):
+        live.try_insert(81)
+    live.remove(kept)
+    with pytest.raises(ValueError, match="span no triangle"):
+        live.remove(int(model.corners[1]))
+    assert live.triangles == 1
+    with pytest.raises(ValueError, match="bool array"):
+        LiveTriangulation(model, np.ones(80, bool))
+    with pytest.raises(ValueError, match="span no triangle"):
+        LiveTriangulation(model, np.zeros(81, bool))
+
+
+def test_a_site_without_which_all_lie_on_a_line_cannot_go():
+    model = MODELS["grid"]
+    on_a_line = np.flatnonzero(model.points[:, 1] == 0)[:3]
+    apex = int(np.flatnonzero(model.points[:, 1] > 0)[0])
+    kept = np.zeros(model.n_vertices, bool)
+    kept[on_a_line] = kept[apex] = True
+    live = LiveTriangulation(model, kept, footprint="hull")
+    before = live.triangles, live.error, live.faces
+    assert live.try_remove(apex) == (np.inf, 0)
+    with pytest.raises(ValueError, match="span no triangle"):
+        live.remove(apex)
+    assert (live.triangles, live.error) == before[:2]
+    np.testing.assert_array_equal(live.faces, before[2])

@@ -1,0 +1,144 @@
+"""Engines: the same results wherever the work is done, and after deaths."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from meshsimp_pymoo.workers import DaskEngine, EngineError, Processes, Serial, open_engine
+
+
+def square(task, shared):
+    return task**2 + shared
+
+
+def late_square(task, shared):
+    """Finish in another order than begun."""
+    time.sleep(0.05 * (task % 3))
+    return task**2 + shared
+
+
+def die_once(task, shared):
+    marker, victim = shared
+    if task == victim and not os.path.exists(marker):  # noqa: PTH110
+        open(marker, "w").close()  # noqa: PTH123
+        os._exit(9)
+    return task
+
+
+def die(task, shared):
+    if task == 3:
+        os._exit(9)
+    return task
+
+
+def refuse(task, shared):
+    raise ValueError(f"no task {task}")
+
+
+@pytest.fixture(scope="module")
+def processes():
+    with Processes(2) as engine:
+        yield engine
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A Dask cluster of two worker processes."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        dashboard_address=None,
+        silence_logs=50,
+        env={"PYTHONPATH": os.pathsep.join(sys.path)},
+    ) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def dask(cluster):
+    with DaskEngine(cluster.scheduler_address) as engine:
+        yield engine
+
+
+@pytest.mark.parametrize("work", [square, late_square])
+@pytest.mark.parametrize("name", ["processes", "dask"])
+def test_every_task_has_its_result_whatever_the_engine_and_the_order(name, work, request):
+    expected = dict(Serial().each(square, range(11), 5))
+    assert expected == {k: k**2 + 5 for k in range(11)}
+    assert dict(request.getfixturevalue(name).each(work, range(11), 5)) == expected
+
+
+@pytest.mark.parametrize("name", ["processes", "dask"])
+def test_the_tasks_of_a_worker_that_dies_are_done_again(name, request, tmp_path):
+    marker = str(tmp_path / "died")
+    assert dict(request.getfixturevalue(name).each(die_once, range(8), (marker, 2))) == {k: k for k in range(8)}
+    assert (tmp_path / "died").exists()
+
+
+def test_a_task_that_kills_every_worker_is_named(processes):
+    found = []
+    with pytest.raises(EngineError, match=r"ended unexpectedly 3 times while task 3 .*--jobs"):
+        found += list(processes.each(die, range(5)))
+
+
+def test_what_the_work_raises_is_raised(processes, dask):
+    for engine in (Serial(), processes, dask):
+        with pytest.raises(ValueError, match="no task 0"):
+            list(engine.each(refuse, [0]))
+
+
+@pytest.mark.parametrize("engine", [Serial(), Processes(2)])
+def test_tasks_are_made_as_workers_become_free_and_never_all_at_once(engine):
+    made = []
+
+    def tasks():
+        for k in range(40):
+            made.append(k)
+            yield k
+
+    with engine:
+        for n_done, _ in enumerate(engine.each(square, tasks(), 0)):
+            assert len(made) <= n_done + 1 + 4
+
+
+def test_giving_up_ends_the_processes():
+    engine = Processes(2)
+    results = engine.each(late_square, range(100), 0)
+    next(results)
+    pids = list(engine._pool._processes)
+    results.close()
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+
+
+def test_no_scheduler_and_no_dask_are_answered_in_one_line(monkeypatch):
+    monkeypatch.setattr("meshsimp_pymoo.workers.CONNECT_SECONDS", 0.3)
+    with pytest.raises(EngineError, match=r"tcp://127.0.0.1:9: no Dask scheduler answers .*--jobs"):
+        DaskEngine("tcp://127.0.0.1:9")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(EngineError, match=r"pip install 'meshsimp-pymoo\[dask\]'"):
+        DaskEngine("tcp://127.0.0.1:9")
+
+
+def test_one_job_needs_no_process():
+    assert isinstance(open_engine(1), Serial)
+    assert open_engine(3).jobs == 3
+    with pytest.raises(ValueError, match="jobs is 0"):
+        Processes(0)
+
+
+def test_a_script_without_the_main_guard_is_told_so(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from meshsimp_pymoo.workers import Processes\n"
+        "def work(task, shared):\n    return task\n"
+        "print(list(Processes(1).each(work, [1])))\n"
+    )
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60)
+    assert ended.returncode != 0
+    assert 'if __name__ == "__main__":' in ended.stderr.splitlines()[-1]
