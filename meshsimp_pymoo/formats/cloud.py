@@ -16,10 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.errors import ModelError, reason_of, warn_of
+from meshsimp_pymoo.files import DEFLATE_LIMIT, UNPACKED_LIMIT
 from meshsimp_pymoo.formats.load import (
-    DEFLATE_LIMIT,
     TEXT_CLOUD_SUFFIXES,
-    UNPACKED_LIMIT,
     SourceMesh,
     build_source,
     check_points,

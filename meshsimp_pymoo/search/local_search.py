@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.search.greedy import thin_live
-from meshsimp_pymoo.search.operators.requirements import summed_measure
+from meshsimp_pymoo.search.requirements import summed_measure
 from meshsimp_pymoo.surface.live import (
     N_EMITTED,
     N_SITES,

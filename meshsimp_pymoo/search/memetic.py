@@ -28,8 +28,8 @@ from pymoo.util.optimum import filter_optimum
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
-from meshsimp_pymoo.search.operators.requirements import summed_measure
 from meshsimp_pymoo.search.operators.sampling import nested_front
+from meshsimp_pymoo.search.requirements import summed_measure
 from meshsimp_pymoo.workers import thread_pool
 
 # Rungs that get a child in the same generation.

@@ -50,7 +50,7 @@ from meshsimp_pymoo.search.operators import (
     RandomSubset,
     SubsetUniformCrossover,
 )
-from meshsimp_pymoo.search.operators.requirements import require_probability
+from meshsimp_pymoo.search.requirements import require_probability
 
 # The paper's settings.
 POP_SIZE = 100

@@ -15,12 +15,7 @@ from pymoo.core.variable import get
 from pymoo.util import default_random_state
 
 from meshsimp_pymoo.search.local_search import relocate_all
-from meshsimp_pymoo.search.operators.requirements import (
-    pinned_vertices,
-    plane_coordinates,
-    require_bool,
-    require_probability,
-)
+from meshsimp_pymoo.search.requirements import pinned_vertices, plane_coordinates, require_bool, require_probability
 
 # Orthogonal arrays by name and the number of two-level factors (segments) they hold.
 ORTHOGONAL_ARRAYS = {"L4": 3, "L8": 7, "L16": 15}

@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 
 from meshsimp_pymoo.search.local_search import relocate_all
-from meshsimp_pymoo.search.operators.requirements import (
-    mesh_neighbours,
-    pinned_vertices,
-    require_bool,
-    require_probability,
-)
+from meshsimp_pymoo.search.requirements import mesh_neighbours, pinned_vertices, require_bool, require_probability
 
 # Rows are mutated in blocks of about this many genes, so that even high rates need little memory beside X.
 GENES_PER_BLOCK = 1 << 24

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.repair import Repair
 
-from meshsimp_pymoo.search.operators.requirements import pinned_vertices, require_bool
+from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool
 
 
 class PinnedCorners(Repair):

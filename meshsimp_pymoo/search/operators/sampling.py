@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 from pymoo.core.sampling import Sampling
 
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
-from meshsimp_pymoo.search.operators.requirements import (
-    mesh_neighbours,
-    pinned_vertices,
-    require_probability,
-    summed_measure,
-)
+from meshsimp_pymoo.search.requirements import mesh_neighbours, pinned_vertices, require_probability, summed_measure
 
 
 class RandomSubset(Sampling):

@@ -1,0 +1,167 @@
+"""What is said of a simplified mesh: one row for each measure, from which everything else knows it.
+
+A measure is a field of `Quality`; its row (`Measure`) says how it comes from the numbers that evaluation adds up, what
+it is called, and what it can be used for. The columns of ``front.csv``, the attributes of a front's solutions, the
+wishes of the shell command, the objectives of a problem and the rows of the page follow from the table. A new measure
+is a new field here and, if evaluation does not add up what it needs, a new column there.
+
+Nothing heavy is imported here: the shell command's ``--help`` is made of the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+# Columns of the table that evaluation fills, one row a subset.
+ERROR, TRIANGLES, VERTICES, SQUARES, MAXIMUM, UNCOVERED = range(6)
+# Columns from this one on, where asked for: the error by region, equal runs of the vector, which are patches in space.
+REGIONS = 6
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A row of the table.
+
+    Attributes
+    ----------
+    of : callable
+        Its value for rows (..., 6) of the table that evaluation fills and the total weight of the vertices.
+    label : str
+        What people call it.
+    meaning : str
+        What it is, in a few words.
+    unit : str
+        Its unit; empty for a number of things.
+    minimised : str
+        What ``--measure`` calls it, if it can be an objective.
+    is_sum : bool
+        Whether its order is that of a sum over the vertices, so that thinning and moves of vertices can lower it.
+    squared : bool
+        Of a sum: whether each vertex adds the square of its deviation.
+    wish : str
+        What ``--NAME`` asks for, if a mesh can be chosen by it.
+    """
+
+    of: Callable[[Any, float], Any]
+    label: str
+    meaning: str
+    unit: str = ""
+    minimised: str = ""
+    is_sum: bool = False
+    squared: bool = False
+    wish: str = ""
+
+
+def _measure(of: Callable[[Any, float], Any], **facts: Any) -> Any:
+    return field(metadata={"measure": Measure(of, **facts)})
+
+
+def _root(values: Any) -> Any:
+    import numpy as np
+
+    return np.sqrt(values)
+
+
+LENGTH = "model units"
+
+
+@dataclass(frozen=True)
+class Quality:
+    """What is said of a simplified mesh.
+
+    Attributes
+    ----------
+    error : float
+        Sum of w_p d_p over all N original vertices; all w_p are 1 unless the model has weights [model units].
+    triangles : int
+        Number of triangles of the mesh.
+    vertices : int
+        Number of vertices its triangles use.
+    mean_error, rms_error : float
+        Mean and root mean square of d_p over all N original vertices, weighted by w [model units].
+    max_error : float
+        Maximum of d_p over the original vertices whose weight is not 0 [model units].
+    uncovered : int
+        Number of original vertices that no triangle covers.
+    """
+
+    error: float = _measure(
+        lambda table, weight: table[..., ERROR],
+        label="error",
+        meaning="sum over all original vertices",
+        unit=LENGTH,
+        minimised="l1",
+        is_sum=True,
+    )
+    triangles: int = _measure(
+        lambda table, weight: table[..., TRIANGLES],
+        label="triangles",
+        meaning="",
+        wish="the most accurate of at most N triangles",
+    )
+    vertices: int = _measure(lambda table, weight: table[..., VERTICES], label="vertices", meaning="")
+    mean_error: float = _measure(
+        lambda table, weight: table[..., ERROR] / weight,
+        label="mean error",
+        meaning="mean over all original vertices",
+        unit=LENGTH,
+        wish="the smallest with a mean deviation of at most E [model units]",
+    )
+    rms_error: float = _measure(
+        lambda table, weight: _root(table[..., SQUARES] / weight),
+        label="RMS error",
+        meaning="root mean square",
+        unit=LENGTH,
+        minimised="rms",
+        is_sum=True,
+        squared=True,
+    )
+    max_error: float = _measure(
+        lambda table, weight: table[..., MAXIMUM],
+        label="max error",
+        meaning="the largest at any original vertex",
+        unit=LENGTH,
+        minimised="max",
+        wish="the smallest that deviates nowhere by more than E [model units]",
+    )
+    uncovered: int = _measure(
+        lambda table, weight: table[..., UNCOVERED],
+        label="uncovered",
+        meaning="original vertices that no triangle covers",
+    )
+
+
+MEASURES: dict[str, Measure] = {item.name: item.metadata["measure"] for item in fields(Quality)}
+# Those that can be minimised beside the triangles.
+OBJECTIVES: dict[str, Measure] = {name: measure for name, measure in MEASURES.items() if measure.minimised}
+COUNTED = tuple(item.name for item in fields(Quality) if item.type == "int")
+
+
+def as_quality(row: Any, total_weight: float) -> Quality:
+    """Name the columns of one row (6,) that evaluation filled; ``total_weight`` is that of the model, N without any."""
+    values = {name: measure.of(row, total_weight) for name, measure in MEASURES.items()}
+    return Quality(**{name: int(value) if name in COUNTED else float(value) for name, value in values.items()})
+
+
+def measured(table: Any, measure: str, total_weight: float) -> Any:
+    """Return an objective's measure for each row (..., 6) that evaluation filled; the numbers of :func:`as_quality`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> measured(np.array([[6.0, 2, 4, 20, 4, 0]]), "rms_error", 5.0)
+    array([2.])
+    """
+    require_measure(measure)
+    return MEASURES[measure].of(table, total_weight)
+
+
+def require_measure(measure: str, *, summed_for: str = "") -> None:
+    """Raise a ValueError if this is no objective's measure or, for somebody who adds up, none that is a sum."""
+    if measure not in OBJECTIVES:
+        raise ValueError(f"measure={measure!r} is unknown; choose one of {', '.join(map(repr, OBJECTIVES))}")
+    if summed_for and not OBJECTIVES[measure].is_sum:
+        sums = " or ".join(repr(name) for name, known in OBJECTIVES.items() if known.is_sum)
+        raise ValueError(f"{summed_for} lower a sum over the vertices, and {measure!r} is none; use {sums}")

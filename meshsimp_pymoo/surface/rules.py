@@ -1,0 +1,79 @@
+"""What counts: the frozen settings of a surface that decide numbers, in one record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from meshsimp_pymoo.settings import Choice, Pins, Text, setting
+from meshsimp_pymoo.surface.measures import OBJECTIVES, require_measure
+
+FOOTPRINTS = ("model", "hull")
+OUTSIDES = ("nearest", "ignore")
+PINS = ("corners", "hull")
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What counts. Made once, passed whole, stored whole; the fields are arguments of ``MeshProblem``, options of the
+    shell and keys of YAML files (``measure`` is the first of the ``objectives`` there).
+
+    Raises
+    ------
+    ValueError
+        If a word is none of those known.
+    """  # noqa: D205
+
+    footprint: str = setting(
+        "model",
+        kind=Choice(FOOTPRINTS),
+        accepts='{"model", "hull"}',
+        doc="Emit only the triangles whose centroid lies inside the original mesh's projection, or all of them (the "
+        "paper).",
+        help="model: bays and holes stay open; hull: all of the convex hull is covered (default: %(default)s)",
+    )
+    outside: str = setting(
+        "nearest",
+        kind=Choice(OUTSIDES),
+        accepts='{"nearest", "ignore"}',
+        doc="What a vertex costs that no triangle covers: its distance to the nearest point of the mesh, or nothing "
+        "(the paper).",
+        help="what a vertex that no triangle covers costs: its distance to the mesh, or nothing (default: %(default)s)",
+    )
+    pin: Any = setting(
+        None,
+        kind=Pins(PINS),
+        accepts='"corners", "hull", file rows, positions, or a list of these',
+        doc='Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole '
+        "numbers for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's "
+        "frame.",
+        help="vertices that every mesh keeps beside the corners: the convex hull, or rows of the file, from 0",
+        metavar="hull|I,J,...",
+    )
+    weights: Any = setting(
+        None,
+        kind=Text(),
+        accepts="str or array, optional",
+        doc="How much each vertex counts in the error: one number for each row of the file, or the name of one of its "
+        "per-vertex attributes; see :meth:`~meshsimp_pymoo.surface.model.OpenModel.with_weights`. 1 by default.",
+        help="per-vertex attribute of the file that says how much each vertex counts in the error (default: all alike)",
+        metavar="NAME",
+    )
+    measure: str = setting(
+        "error",
+        kind=Choice(tuple(OBJECTIVES)),
+        accepts=f"{{{', '.join(OBJECTIVES)}}}",
+        doc="What thinning, insertion and moves of vertices lower.",
+        help="error that is made small beside the triangles",
+        derived=True,
+    )
+
+    def __post_init__(self) -> None:
+        for name, known in (("footprint", FOOTPRINTS), ("outside", OUTSIDES)):
+            if getattr(self, name) not in known:
+                choices = ", ".join(map(repr, known))
+                raise ValueError(f"{name}={getattr(self, name)!r} is unknown; choose one of {choices}")
+        require_measure(self.measure)
+
+
+DEFAULT = Rules()
