@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.search.display import FrontOutput
     from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
     from meshsimp_pymoo.search.memetic import memetic
+    from meshsimp_pymoo.search.moead import moead
+    from meshsimp_pymoo.search.nsga import nsga2_v1, nsga2_v2, nsga3
     from meshsimp_pymoo.search.operators import (
         OAX,
         HalfPlaneCrossover,
@@ -50,7 +52,7 @@ if TYPE_CHECKING:
         SizeStep,
         SubsetUniformCrossover,
     )
-    from meshsimp_pymoo.search.presets import moead, nsga2_v1, nsga2_v2, nsga3, weighted_ga_v1, weighted_ga_v2
+    from meshsimp_pymoo.search.weighted import weighted_ga_v1, weighted_ga_v2
     from meshsimp_pymoo.storage import read_front, write_front
     from meshsimp_pymoo.surface.evaluate import Quality
     from meshsimp_pymoo.surface.live import LiveTriangulation
@@ -62,7 +64,9 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "search.memetic": ("memetic",),
-    "search.presets": ("moead", "nsga2_v1", "nsga2_v2", "nsga3", "weighted_ga_v1", "weighted_ga_v2"),
+    "search.nsga": ("nsga2_v1", "nsga2_v2", "nsga3"),
+    "search.moead": ("moead",),
+    "search.weighted": ("weighted_ga_v1", "weighted_ga_v2"),
     "surface.evaluate": ("Quality",),
     "errors": ("ModelError", "ModelWarning", "ResultError"),
     "surface.model": ("OpenModel",),

@@ -29,7 +29,7 @@ from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.search.operators.sampling import NestedSubsets, nested_front
+from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets, nested_front
 from meshsimp_pymoo.storage import (
     MESH_SUFFIXES,
     MESHES_BY_DEFAULT,

@@ -15,16 +15,15 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from meshsimp_pymoo.errors import UsageError
+from meshsimp_pymoo.search.presets import DEFAULT, PRESETS
 
-__all__ = ["ALGORITHMS", "DEFAULT_GENERATIONS", "FORMATS", "SHELLS", "make_parser"]
+__all__ = ["DEFAULT_GENERATIONS", "FORMATS", "SHELLS", "make_parser"]
 
 # Four times the paper's budget: its 50 generations take a second at its sizes and leave much to gain.
 DEFAULT_GENERATIONS = 200
 # What --measure calls the errors that can be an objective.
 MEASURES = {"l1": "error", "rms": "rms_error", "max": "max_error"}
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}
-# Presets that return a front; the weighted-sum ones return one solution.
-ALGORITHMS = ("memetic", "nsga2_v1", "nsga2_v2", "moead")
 FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
 SHELLS = ("bash", "zsh", "tcsh")
 
@@ -195,7 +194,8 @@ def _add_simplify(commands: Any) -> None:
     budget.add_argument("--generations", type=_whole(1), metavar="N")
 
     search = simplify.add_argument_group("how to search")
-    search.add_argument("--algorithm", choices=ALGORITHMS, default="memetic", help="preset (default: %(default)s)")
+    offered = tuple(name for name, preset in PRESETS.items() if preset.whole_front)
+    search.add_argument("--algorithm", choices=offered, default=DEFAULT, help="preset (default: %(default)s)")
     search.add_argument("--population", type=_whole(2), default=100, metavar="N", help="(default: %(default)s)")
     search.add_argument(
         "--seed",

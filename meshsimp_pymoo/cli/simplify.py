@@ -146,7 +146,7 @@ def _search_and_write(args: argparse.Namespace, folder: Path, problem: MeshProbl
 
 
 def _mesh_problem(args: argparse.Namespace) -> MeshProblem:
-    if args.algorithm == "memetic" and args.objectives[0] == "max_error":
+    if PRESETS[args.algorithm].sums_only and args.objectives[0] == "max_error":
         raise UsageError(
             "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
             "use --algorithm nsga2_v1 with it, or --measure rms"
@@ -172,7 +172,8 @@ def _generations(args: argparse.Namespace) -> int:
     """Return the generations to run where neither time nor evaluations are given."""
     from meshsimp_pymoo.search.memetic import sweep_generations
 
-    default = sweep_generations(args.population) if args.algorithm == "memetic" else DEFAULT_GENERATIONS
+    sweeps = PRESETS[args.algorithm].sweeps
+    default = sweep_generations(args.population) if sweeps else DEFAULT_GENERATIONS
     return int(args.generations or default)
 
 
@@ -184,7 +185,7 @@ def _set_up(args: argparse.Namespace, problem: MeshProblem) -> Any:
         termination = MaximumFunctionCallTermination(args.evaluations)
     else:
         termination = MaximumGenerationTermination(_generations(args))
-    algorithm = PRESETS[args.algorithm](pop_size=args.population)
+    algorithm = PRESETS[args.algorithm].function(pop_size=args.population)
     return algorithm.setup(problem, termination=termination, seed=args.seed)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
 from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.search.presets import DEFAULT
 from meshsimp_pymoo.storage import claim_output, mesh_suffix, refuse_format
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
 from meshsimp_pymoo.tiles.grid import HeightGrid, count_samples, open_grid
@@ -36,7 +37,7 @@ UNKNOWN: dict[str, Any] = {
     "time": None,
     "evaluations": None,
     "generations": None,
-    "algorithm": "memetic",
+    "algorithm": DEFAULT,
     "pin": None,
     "max_edge": None,
     "patch": None,

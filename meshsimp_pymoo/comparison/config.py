@@ -9,7 +9,7 @@
       - {name: M1, model: face:922, up: z}
     algorithms:                           # at least one; a bare text is a preset
       - name: NSGA-II v1
-        preset: nsga2_v1                  # a key of algorithms.PRESETS, or instead
+        preset: nsga2_v1                  # a key of presets.PRESETS, or instead
         class: pymoo.algorithms.moo.spea2.SPEA2      # any pymoo algorithm by import path
         parameters: {pop_size: 100}       # its arguments
         operators: {crossover: {name: oax, arrays: L4}}    # keys of operators.OPERATORS, or import paths
@@ -193,7 +193,7 @@ class AlgorithmConfig:
             arguments[self.merged_parameter] = merged_value
         for kind, operator in self.operators.items():
             arguments[ARGUMENT_OF_KIND[kind]] = _class_of(kind, operator.name)(**operator.parameters)
-        target = PRESETS[self.preset] if self.preset else _imported(self.path)
+        target = PRESETS[self.preset].function if self.preset else _imported(self.path)
         return copy.deepcopy(target(**arguments))
 
     def description(self, merged_value: Any = None) -> dict[str, Any]:
@@ -346,7 +346,7 @@ def _algorithm(entry: Entry) -> AlgorithmConfig:
         entry.fail("give either 'preset' (one of " + ", ".join(PRESETS) + ") or 'class' (an import path)")
     preset = keys["preset"].choice(PRESETS, "preset") if "preset" in keys else ""
     path = keys["class"].text() if "class" in keys else ""
-    target = PRESETS[preset] if preset else _algorithm_class(keys["class"])
+    target = PRESETS[preset].function if preset else _algorithm_class(keys["class"])
     known = _parameters(target)
     name = keys["name"].name() if "name" in keys else preset or path.rpartition(".")[2]
 

@@ -65,6 +65,7 @@ from meshsimp_pymoo.search.checkpoint import (
     read_checkpoint,
     restore,
 )
+from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.storage import package_versions
 from meshsimp_pymoo.surface.evaluate import TRIANGLES, Quality, evaluate_subsets, measured, mesh_quality
 from meshsimp_pymoo.surface.model import OpenModel
@@ -464,8 +465,9 @@ def _work(problem: ProblemConfig, algorithm: AlgorithmConfig, budgets: Sequence[
         if budget.kind == "seconds":
             return WORK_PER_SECOND * budget.amount
         one = budget.amount * population if budget.kind == "generations" else budget.amount
-        costly = budget.kind == "generations" and "v2" in algorithm.preset
-        evaluations = max(evaluations, one * (2.1 if costly else 1.0))
+        if budget.kind == "generations" and algorithm.preset:
+            one *= PRESETS[algorithm.preset].evaluations
+        evaluations = max(evaluations, one)
     return evaluations * (problem.model.n_vertices + OVERHEAD_VERTICES)
 
 

@@ -28,7 +28,7 @@ from pymoo.util.optimum import filter_optimum
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
-from meshsimp_pymoo.search.operators.sampling import nested_front
+from meshsimp_pymoo.search.operators.nested_subsets import nested_front
 from meshsimp_pymoo.search.requirements import summed_measure
 from meshsimp_pymoo.workers import thread_pool
 

@@ -1,4 +1,4 @@
-"""Mutations: kept vertices move to other positions, become more or fewer."""
+"""The paper's mutation: kept vertices move to neighbouring positions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 
-from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.requirements import mesh_neighbours, pinned_vertices, require_bool, require_probability
 
 # Rows are mutated in blocks of about this many genes, so that even high rates need little memory beside X.
@@ -71,110 +70,6 @@ class NeighbourShift(Mutation):
         for start in range(0, len(X), rows):
             shift_kept(shifted[start : start + rows], pinned, rate, neighbours, random_state)
         return shifted
-
-
-class Relocation(Mutation):
-    """Move kept vertices to better places by annealing on the live triangulation; the size stays.
-
-    A local search with a bounded effort whose result is inherited (Lamarckian): the child never has a larger
-    error than it came with. See :func:`~meshsimp_pymoo.search.local_search.relocate` for a single move.
-
-    Parameters
-    ----------
-    moves_per_vertex : float
-        Moves to try for each kept vertex that is not pinned.
-    max_moves : int
-        Moves of all rows together; where there would be more, all rows get fewer. A move takes some
-        microseconds.
-    temperature : float
-        Initial temperature, in units of the error per kept vertex; 0 accepts improvements only.
-    prob : float
-        The probability of an individual to keep the result.
-
-    Raises
-    ------
-    ValueError
-        If one of the numbers is negative or ``prob`` not in [0, 1], and when the problem minimises the maximum.
-    TypeError
-        When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
-    """
-
-    def __init__(
-        self,
-        moves_per_vertex: float = 30.0,
-        *,
-        max_moves: int = 300_000,
-        temperature: float = 0.2,
-        prob: float = 1.0,
-    ) -> None:
-        super().__init__(prob=require_probability("prob", prob))
-        given = {"moves_per_vertex": moves_per_vertex, "max_moves": max_moves, "temperature": temperature}
-        for name, value in given.items():
-            if not value >= 0:
-                raise ValueError(f"{name} = {value} is no number of at least 0")
-        self.moves_per_vertex = moves_per_vertex
-        self.max_moves = max_moves
-        self.temperature = temperature
-
-    def _do(
-        self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
-    ) -> NDArray[np.bool_]:
-        pinned = _require_mesh(problem, X, self)
-        moves = self.moves_per_vertex * (X & ~pinned).sum(axis=1)
-        total = moves.sum()
-        if total > self.max_moves:
-            moves = moves * (self.max_moves / total)
-        return relocate_all(problem, X, moves.astype(int), random_state, temperature=self.temperature)
-
-
-class SizeStep(Mutation):
-    """Change the number of kept vertices by a controlled step: good insertions, or cheap removals.
-
-    The wanted size is the old one times a factor drawn uniformly on the logarithm from 1 / (1 + step) to 1 + step.
-    Vertices are then added or removed one at a time until it is reached, each the best of some drawn by the exact
-    change of the error: candidates for insertion come from triangles with large errors.
-
-    Parameters
-    ----------
-    step : float
-        Largest relative change of the size; at least one vertex.
-    prob : float
-        The probability of an individual to keep the result.
-
-    Raises
-    ------
-    ValueError
-        If ``step`` is negative or ``prob`` not in [0, 1], and when the problem minimises the maximum.
-    TypeError
-        When applied to chromosomes that are not bool, or for a problem that is no ``MeshProblem``.
-    """
-
-    def __init__(self, step: float = 0.1, *, prob: float = 1.0) -> None:
-        super().__init__(prob=require_probability("prob", prob))
-        if not step >= 0:
-            raise ValueError(f"step = {step} is no number of at least 0")
-        self.step = step
-
-    def _do(
-        self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
-    ) -> NDArray[np.bool_]:
-        pinned = _require_mesh(problem, X, self)
-        if self.step == 0:
-            return X.copy()
-        free = (X & ~pinned).sum(axis=1)
-        draw = random_state.uniform(-1.0, 1.0, size=len(X))
-        wanted = np.round(free * (1.0 + self.step) ** draw).astype(int)
-        wanted = np.where(wanted == free, free + np.where(draw < 0.0, -1, 1), wanted)
-        sizes = pinned.sum() + np.clip(wanted, 0, int((~pinned).sum()))
-        return relocate_all(problem, X, np.zeros(len(X), int), random_state, sizes=sizes)
-
-
-def _require_mesh(problem: Any, X: NDArray[np.bool_], operator: object) -> NDArray[np.bool_]:
-    """Return the pinned vertices (N,) of a mesh problem; refuse other problems, and chromosomes that are not bool."""
-    pinned = pinned_vertices(problem, operator)
-    mesh_neighbours(problem, operator)
-    require_bool(X, operator)
-    return pinned
 
 
 def shift_kept(

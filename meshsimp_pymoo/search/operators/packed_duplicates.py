@@ -1,4 +1,4 @@
-"""Duplicate elimination in linear time."""
+"""Exact duplicates out, by hashing: in linear time."""
 
 from __future__ import annotations
 

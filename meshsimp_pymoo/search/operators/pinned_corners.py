@@ -1,4 +1,4 @@
-"""Repairs: what every solution must satisfy before it is evaluated."""
+"""The repair: pinned vertices are kept in every solution."""
 
 from __future__ import annotations
 
