@@ -47,31 +47,21 @@ from meshsimp_pymoo.files import (
     write_csv,
     write_npz,
 )
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
+from meshsimp_pymoo.surface.surface import Refitted, Surface
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.evaluate import Quality
     from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.refit import Refitted
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.integer[Any]]
 BoolArray = npt.NDArray[np.bool_]
 
-FRONT_COLUMNS = (
-    "solution",
-    "error",
-    "triangles",
-    "vertices",
-    "mean_error",
-    "rms_error",
-    "max_error",
-    "uncovered",
-    "mesh",
-)
+FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
-INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
+INT_COLUMNS = ("solution", *COUNTED)
 MESH_FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
 # A LandXML file is called .xml everywhere; the name of the format is understood too.
 MESH_SUFFIXES = (*MESH_FORMATS, "xml")
@@ -224,7 +214,7 @@ def _of_unfinished(name: str) -> bool:
 
 def write_front(
     folder: str | os.PathLike[str],
-    model: OpenModel,
+    surface: Surface,
     quality: Sequence[Quality],
     kept: BoolArray,
     *,
@@ -244,8 +234,8 @@ def write_front(
     ----------
     folder : path
         The folder to make; see :func:`claim_output`.
-    model : OpenModel
-        The original mesh.
+    surface : Surface
+        The original mesh and its rules.
     quality : sequence of Quality, length S
         The numbers of each solution, in any order; written sorted by triangles, then error.
     kept : (S, N) bool array
@@ -264,7 +254,7 @@ def write_front(
         Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
     refit : callable, optional
         The best heights for the solution in this row of ``kept`` (see
-        :func:`~meshsimp_pymoo.surface.refit.refit_heights`). Each mesh that is written is then written with them
+        :func:`~meshsimp_pymoo.surface.height.refit_heights`). Each mesh that is written is then written with them
         too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
@@ -288,6 +278,7 @@ def write_front(
     ValueError
         If the front is empty, holds a number that is not finite, or does not fit the model.
     """
+    model = surface.model
     kept = np.asarray(kept, dtype=bool)
     if len(quality) == 0:
         raise ValueError("the front is empty; there is nothing to write")
@@ -330,7 +321,7 @@ def write_front(
                     write_mesh(partial / f"chosen.{suffix}", *arrays, **look)
                 if refit is not None:
                     better = refit(int(row))
-                    raised = (better.vertices(model), *arrays[1:])
+                    raised = (better.vertices, *arrays[1:])
                     fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                     if solution in with_mesh:
                         write_mesh(partial / fitted[1], *raised, **look)
@@ -338,12 +329,12 @@ def write_front(
                         write_mesh(partial / f"chosen_refitted.{suffix}", *raised, **look)
             numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
-        warn_of_shift(model.name, model.diagonal, mesh_format, single)
+        warn_of_shift(model.name, surface.diagonal, mesh_format, single)
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
+        write_npz(partial / "front.npz", F=F[order], kept=packed, **surface.stored_arrays())
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
@@ -351,7 +342,7 @@ def write_front(
                 "hash": model.hash,
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
-                "up": model.up,
+                "up": surface.view.rotation[2],
                 **({"georeference": model.georeference} if model.georeference else {}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
@@ -423,7 +414,8 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
 def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
     """Refuse a record whose parts are not of the kind that others rely on."""
     model, chosen = run.get("model") or {}, run.get("chosen")
-    wrong = [name for name in ("model", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    parts = ("model", "options", "rules", "settings", "versions")
+    wrong = [name for name in parts if not isinstance(run.get(name) or {}, dict)]
     if not wrong:
         wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
