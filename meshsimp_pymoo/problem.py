@@ -16,9 +16,10 @@ import numpy.typing as npt
 import trimesh
 from pymoo.core.problem import ElementwiseProblem, Problem
 
-from meshsimp_pymoo.datasets import find_source
 from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.formats.load import SourceMesh, Window
+from meshsimp_pymoo.formats.options import Options, Window
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.surface.evaluate import (
     FOOTPRINTS,
     MEASURES,
@@ -31,7 +32,7 @@ from meshsimp_pymoo.surface.evaluate import (
     evaluate_subsets,
     simplify,
 )
-from meshsimp_pymoo.surface.model import OpenModel, load_model
+from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.orient import Up
 
 BoolArray = npt.NDArray[np.bool_]
@@ -204,9 +205,8 @@ class MeshProblem(ElementwiseProblem):
             "objectives": self.objectives,
             "weights": weights,
         }
-        self.model = open_model(
-            model, up=up, patch=patch, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge
-        )
+        options = Options(up=up, patch=patch, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
+        self.model = open_model(model, options)
         if weights is not None:
             self.model = self.model.with_weights(weights)
         self.footprint = footprint
@@ -362,22 +362,6 @@ def _checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
             "once, and 'triangles' last, as in ('error', 'triangles')"
         )
     return names
-
-
-def open_model(
-    model: str | Path | trimesh.Trimesh | SourceMesh | OpenModel,
-    *,
-    up: Up = "auto",
-    patch: str | None = None,
-    spacing: tuple[float, float] | None = None,
-    nodata: float | None = None,
-    window: Window | None = None,
-    max_edge: float | None = None,
-) -> OpenModel:
-    """Read a mesh from a file, a built-in name or memory; see :func:`meshsimp_pymoo.surface.model.load_model`."""
-    if isinstance(model, (str, Path)):
-        model = find_source(model, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
-    return load_model(model, up=up, patch=patch)
 
 
 def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | npt.NDArray[Any] | None = None) -> BoolArray:

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 FOOTPRINTS = ("model", "hull")
 OUTSIDES = ("nearest", "ignore")
 
-# A hull triangle lower than this, in diagonals of the model's bounding box in the plane, is an artefact of rounding.
-SLIVER_HEIGHT = 1e-9
 # A vertex counts as covered up to this far outside a triangle, in barycentric coordinates: rounding of rotated borders.
 COVER_TOLERANCE = 1e-9
 
@@ -559,8 +557,8 @@ def simplify(model: OpenModel, kept: np.ndarray, *, footprint: str = "model", ou
     Examples
     --------
     >>> from meshsimp_pymoo.datasets import load
-    >>> from meshsimp_pymoo.surface.model import load_model
-    >>> roof = load_model(load("roof:3"))
+    >>> from meshsimp_pymoo.surface.model import build_model
+    >>> roof = build_model(load("roof:3"))
     >>> corners = np.isin(np.arange(roof.n_vertices), roof.corners)
     >>> simplify(roof, corners).quality.error        # the ridge of 3 vertices falls from height 1 to the ground
     3.0

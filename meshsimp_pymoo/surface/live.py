@@ -1193,8 +1193,8 @@ class LiveTriangulation:
     Examples
     --------
     >>> from meshsimp_pymoo.datasets import load
-    >>> from meshsimp_pymoo.surface.model import load_model
-    >>> roof = load_model(load("roof:3"))
+    >>> from meshsimp_pymoo.surface.model import build_model
+    >>> roof = build_model(load("roof:3"))
     >>> live = LiveTriangulation(roof, np.isin(np.arange(9), roof.corners))
     >>> live.error, live.triangles
     (3.0, 2)

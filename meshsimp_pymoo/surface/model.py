@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,16 +15,13 @@ import numpy.typing as npt
 from numba import njit
 from scipy.spatial import ConvexHull, QhullError
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import SourceMesh, Window, from_trimesh, read_source
+from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
-from meshsimp_pymoo.plane.hilbert import hilbert_keys
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.surface.evaluate import SLIVER_HEIGHT
-from meshsimp_pymoo.surface.orient import Up, check_open_surface, front_patch, up_direction, upright_rotation
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from meshsimp_pymoo.plane.square import SLIVER_HEIGHT, find_corners, unit_square, vector_order
+from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
 
 # Lazy attributes of a model that do not depend on its weights.
 GEOMETRY_ONLY = ("neighbours", "footprint", "hull")
@@ -75,7 +71,7 @@ class OpenModel:
         How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says (see
-        :class:`~meshsimp_pymoo.formats.load.SourceMesh`).
+        :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
     """
 
     name: str
@@ -189,7 +185,7 @@ class OpenModel:
         Examples
         --------
         >>> from meshsimp_pymoo.datasets import load
-        >>> roof = load_model(load("roof:3"))
+        >>> roof = build_model(load("roof:3"))
         >>> roof.with_weights(np.full(9, 2.0)).total_weight
         18.0
         """
@@ -242,64 +238,6 @@ class OpenModel:
         return {name: value for name, value in self.__dict__.items() if name not in lazy}
 
 
-def load_model(
-    model: str | Path | SourceMesh | OpenModel | Any,
-    *,
-    up: Up = "auto",
-    patch: str | None = None,
-    spacing: tuple[float, float] | None = None,
-    nodata: float | None = None,
-    window: Window | None = None,
-    max_edge: float | None = None,
-) -> OpenModel:
-    """Read, check and orient a mesh.
-
-    Parameters
-    ----------
-    model : path, SourceMesh, trimesh.Trimesh or OpenModel
-        The mesh; an :class:`OpenModel` is returned as it is.
-    up : "auto", an axis such as "z" or "-x", or a vector
-        Direction of the height; "auto" is the one that the most projected area agrees with.
-    patch : "front", optional
-        Cut out the largest connected patch that faces ``up`` and does not overlap itself.
-    spacing : (dx, dy), optional
-        Sample distances of a height grid [units].
-    nodata : float, optional
-        Height that means "no sample" in a height grid.
-    window : (column, row, columns, rows), optional
-        The part of a height grid to take.
-    max_edge : float, optional
-        Longest edge in the plane of a triangle of a point cloud [units].
-
-    Returns
-    -------
-    OpenModel
-
-    Raises
-    ------
-    ModelError
-        If it cannot be read or is no open height field; the message names the cause and the way out.
-    """
-    if isinstance(model, OpenModel):
-        return model
-    if isinstance(model, SourceMesh):
-        source = model
-    elif isinstance(model, (str, Path)):
-        source = read_source(model, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
-    elif hasattr(model, "vertices") and hasattr(model, "faces"):
-        source = from_trimesh(model)
-    else:
-        raise TypeError(
-            "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
-            f"not {type(model).__name__}"
-        )
-    if patch not in (None, "front"):
-        raise ModelError(f'patch={patch!r} is unknown; use patch="front" or leave it out')
-    if patch == "front":
-        source = front_patch(source, up)
-    return build_model(source, up=up)
-
-
 def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
     """Turn a source mesh upright, check that it is an open height field and put it in vector order."""
     used = np.zeros(len(source.points), bool)
@@ -347,77 +285,6 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
 
 def _take(attributes: Mapping[str, npt.NDArray[Any]], rows: IntArray) -> dict[str, npt.NDArray[Any]]:
     return {name: values[rows] for name, values in attributes.items()}
-
-
-def unit_square(points: FloatArray) -> tuple[float, FloatArray]:
-    """Scale by a power of two into the unit square and round to multiples of 2**-52, so that differences are exact."""
-    extent = float(np.ptp(points[:, :2], axis=0).max())
-    unit = float(2.0 ** np.ceil(np.log2(extent)))
-    xy = points[:, :2] / unit
-    return unit, (xy + 1.0) - 1.0
-
-
-def vector_order(xy: FloatArray, z: FloatArray) -> IntArray:
-    """Return the order of vertices along a Hilbert curve, ties by x, y, z: a function of the positions alone.
-
-    Parameters
-    ----------
-    xy : (N, 2) float array
-        Coordinates in the unit square.
-    z : (N,) float array
-        Heights; decide between vertices at one (x, y).
-
-    Returns
-    -------
-    (N,) int array
-        Rows in vector order.
-
-    References
-    ----------
-    D. Hilbert, "Ueber die stetige Abbildung einer Linie auf ein Flaechenstueck", Mathematische Annalen 38, 1891.
-    """
-    key = hilbert_keys(np.ascontiguousarray(xy, float))
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    tied = np.zeros(len(key), bool)
-    same = key[1:] == key[:-1]
-    tied[1:] |= same
-    tied[:-1] |= same
-    if tied.any():
-        rows = order[tied]
-        order[tied] = rows[np.lexsort((z[rows], xy[rows, 1], xy[rows, 0], key[tied]))]
-    return order
-
-
-def find_corners(xy: FloatArray) -> IntArray:
-    """Return the vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending.
-
-    Of equally extreme vertices the one furthest clockwise counts, so that the four corners of a diamond are found too.
-    If they all lie on one line, the vertex farthest from that line joins them: corners always span a triangle.
-
-    Examples
-    --------
-    >>> find_corners(np.array([[0.0, 0], [0, 1], [0.5, 0.5], [1, 0], [1, 1]]))
-    array([0, 1, 3, 4])
-    """
-    low = xy.min(axis=0)
-    span = np.ptp(xy, axis=0)
-    square = (xy - low) / np.where(span > 0, span, 1.0)
-    x, y = square[:, 0], square[:, 1]
-    chosen: set[int] = set()
-    for sx, sy, second in ((1, 1, x), (-1, 1, y), (-1, -1, -x), (1, -1, -y)):
-        score = sx * x + sy * y
-        best = np.flatnonzero(score == score.max())
-        best = best[second[best] == second[best].max()]
-        chosen.add(int(best[0]))
-    corners = np.array(sorted(chosen))
-    base = xy[corners[0]]
-    ends = xy[corners] - base
-    far = ends[np.argmax((ends**2).sum(axis=1))]
-    if np.all(far[0] * ends[:, 1] == far[1] * ends[:, 0]):
-        away = np.abs(far[0] * (xy[:, 1] - base[1]) - far[1] * (xy[:, 0] - base[0]))
-        corners = np.unique(np.append(corners, int(np.argmax(away))))
-    return corners.astype(np.int64)
 
 
 def _on_hull(xy: FloatArray) -> IntArray:

@@ -123,8 +123,8 @@ def refit_heights(
     eaves, at a height of 1 and 0, are then all the same as before:
 
     >>> from meshsimp_pymoo.datasets import load
-    >>> from meshsimp_pymoo.surface.model import load_model
-    >>> roof = load_model(load("roof:3"))
+    >>> from meshsimp_pymoo.surface.model import build_model
+    >>> roof = build_model(load("roof:3"))
     >>> refit_heights(roof, np.isin(np.arange(9), roof.corners)).error
     3.0
     """

@@ -22,13 +22,13 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.plane.square import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.greedy import thin_live
 from meshsimp_pymoo.surface.live import END, build, lent_live, make_ground
-from meshsimp_pymoo.surface.model import OpenModel, vector_order
+from meshsimp_pymoo.surface.model import OpenModel
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 # Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
@@ -275,10 +275,7 @@ def _fix_foreign(
             reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
             reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
             known = (
-                sx - reach_x >= box[0]
-                and sx + reach_x <= box[1]
-                and sy - reach_y >= box[2]
-                and sy + reach_y <= box[3]
+                sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
             )
         if not known:
             fixed[a] = True

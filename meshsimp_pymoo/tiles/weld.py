@@ -15,13 +15,11 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.plane.square import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate
 from meshsimp_pymoo.surface.evaluate import Quality
-from meshsimp_pymoo.surface.model import vector_order
 from meshsimp_pymoo.tiles.grid import HeightGrid
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

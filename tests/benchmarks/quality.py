@@ -61,7 +61,7 @@ from meshsimp_pymoo import (
 )
 from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, quadric_collapse
 from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.problem import open_model
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import DownTheLadder, SizeLadder
 from meshsimp_pymoo.surface.evaluate import Quality, mesh_quality

@@ -29,9 +29,9 @@ from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.storage import write_mesh
 from meshsimp_pymoo.workers import DaskEngine
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
