@@ -54,10 +54,11 @@ if TYPE_CHECKING:
     )
     from meshsimp_pymoo.search.weighted import weighted_ga_v1, weighted_ga_v2
     from meshsimp_pymoo.storage import read_front, write_front
-    from meshsimp_pymoo.surface.evaluate import Quality
-    from meshsimp_pymoo.surface.live import LiveTriangulation
+    from meshsimp_pymoo.surface.height import refit_heights
+    from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+    from meshsimp_pymoo.surface.measures import Quality
     from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.refit import Refitted, refit_heights
+    from meshsimp_pymoo.surface.surface import Refitted
     from meshsimp_pymoo.tiles.front import tiled_front
     from meshsimp_pymoo.tiles.grid import open_grid
     from meshsimp_pymoo.workers import DaskEngine, Processes

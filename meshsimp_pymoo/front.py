@@ -29,13 +29,13 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray
 from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
-    MESH_SUFFIXES,
     MESHES_BY_DEFAULT,
     even_selection,
     read_front,
@@ -120,7 +120,7 @@ class FrontSolution:
         return self.front.problem.mesh(self.kept)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.storage.write_mesh`.
+        """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
         A mesh that the front's folder holds in this format is copied.
 
@@ -129,7 +129,7 @@ class FrontSolution:
         ResultError
             If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
         """
-        path = claim_file(path, MESH_SUFFIXES, overwrite=overwrite)
+        path = claim_file(path, written_suffixes(), overwrite=overwrite)
         suffix = path.suffix.lower()
         stored = self.front.stored_mesh(self.solution)
         with new_file(path) as unfinished:
@@ -488,12 +488,12 @@ class Front(Sequence[FrontSolution]):
         meshes : int or None
             The most meshes to write, an even selection of a longer front; None writes all, 0 none.
         mesh_format : str
-            "ply", "obj", "stl", "off", "glb" or "landxml".
+            A name out of :func:`~meshsimp_pymoo.formats.table.written_formats`, such as "ply" or "landxml".
         chosen : int or FrontSolution, optional
             The solution to write as ``chosen.<mesh_format>`` too.
         refit : bool
             Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
-            :func:`~meshsimp_pymoo.surface.refit.refit_heights`.
+            :func:`~meshsimp_pymoo.surface.height.refit_heights`.
         page : bool
             Write ``report.html``, the page on which to look at the solutions and choose one.
         run : mapping, optional

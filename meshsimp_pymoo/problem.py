@@ -17,8 +17,8 @@ import trimesh
 from pymoo.core.problem import ElementwiseProblem, Problem
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray
-from meshsimp_pymoo.formats.load import SourceMesh
 from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.settings import documentation, settings_of, taken
 from meshsimp_pymoo.surface.height import HeightSurface

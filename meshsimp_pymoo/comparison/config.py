@@ -48,7 +48,7 @@ from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.presets import PRESETS
-from meshsimp_pymoo.surface.evaluate import MEASURES
+from meshsimp_pymoo.surface.measures import OBJECTIVES as MEASURES
 from meshsimp_pymoo.surface.model import OpenModel
 
 if TYPE_CHECKING:

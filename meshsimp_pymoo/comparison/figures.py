@@ -19,7 +19,8 @@ from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.comparison.tables import WEIGHTS_SEED
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plot_error, plot_mesh, relief_exaggeration
-from meshsimp_pymoo.surface.evaluate import mesh_deviation, simplify
+from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.score import mesh_deviation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.measures import Quality
     from meshsimp_pymoo.surface.model import OpenModel
 
 __all__ = [
@@ -335,7 +335,7 @@ def meshlab_front(
     ValueError
         If a method is unknown or a number of triangles impossible; nothing is computed then.
     """
-    from meshsimp_pymoo.surface.evaluate import mesh_quality
+    from meshsimp_pymoo.surface.score import mesh_quality
 
     numbers = [int(number) for number in triangles]
     for name in methods:

@@ -67,8 +67,10 @@ from meshsimp_pymoo.search.checkpoint import (
 )
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.storage import package_versions
-from meshsimp_pymoo.surface.evaluate import TRIANGLES, Quality, evaluate_subsets, measured, mesh_quality
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets
+from meshsimp_pymoo.surface.measures import TRIANGLES, Quality, measured
 from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.score import mesh_quality
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
 
 __all__ = ["Done", "Task", "perform", "plan", "run_experiment"]

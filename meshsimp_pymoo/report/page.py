@@ -27,8 +27,8 @@ from meshsimp_pymoo.surface.measures import MEASURES, Measure
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
-    from meshsimp_pymoo.surface.evaluate import Simplified
     from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.surface import Simplified
 
 __all__ = ["PAGE_BYTES", "simplification_page", "write_page"]
 

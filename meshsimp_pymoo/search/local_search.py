@@ -193,7 +193,7 @@ def _anneal(
 def _fit(
     ground: Any, books: Any, n: int, fixed: np.ndarray, by_triangles: bool, wanted: int, state: np.ndarray
 ) -> None:
-    """Drop or add vertices, each the best of a few drawn, down or up to ``wanted`` triangles or sites, or just below."""
+    """Drop or add vertices, each the best of a few drawn, to ``wanted`` triangles or sites, or just below."""
     g = borrowed(ground)
     live = borrowed(books)
     failures = 0

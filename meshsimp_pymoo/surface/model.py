@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,12 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import SourceMesh, Window, from_trimesh, read_source
+from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
-from meshsimp_pymoo.surface.orient import Up, check_open_surface, front_patch, up_direction, upright_rotation
+from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
 
 # Lazy attributes of a model that do not depend on its weights.
 GEOMETRY_ONLY = ("neighbours", "border", "footprint", "hull")
@@ -71,7 +70,7 @@ class OpenModel:
         How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says (see
-        :class:`~meshsimp_pymoo.formats.load.SourceMesh`).
+        :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
     """
 
     name: str
@@ -159,7 +158,7 @@ class OpenModel:
         Examples
         --------
         >>> from meshsimp_pymoo.datasets import load
-        >>> roof = load_model(load("roof:3"))
+        >>> roof = build_model(load("roof:3"))
         >>> roof.with_weights(np.full(9, 2.0)).total_weight
         18.0
         """
@@ -210,64 +209,6 @@ class OpenModel:
     def __getstate__(self) -> dict[str, Any]:
         lazy = (*GEOMETRY_ONLY, "hash")
         return {name: value for name, value in self.__dict__.items() if name not in lazy}
-
-
-def load_model(
-    model: str | Path | SourceMesh | OpenModel | Any,
-    *,
-    up: Up = "auto",
-    patch: str | None = None,
-    spacing: tuple[float, float] | None = None,
-    nodata: float | None = None,
-    window: Window | None = None,
-    max_edge: float | None = None,
-) -> OpenModel:
-    """Read, check and orient a mesh.
-
-    Parameters
-    ----------
-    model : path, SourceMesh, trimesh.Trimesh or OpenModel
-        The mesh; an :class:`OpenModel` is returned as it is.
-    up : "auto", an axis such as "z" or "-x", or a vector
-        Direction of the height; "auto" is the one that the most projected area agrees with.
-    patch : "front", optional
-        Cut out the largest connected patch that faces ``up`` and does not overlap itself.
-    spacing : (dx, dy), optional
-        Sample distances of a height grid [units].
-    nodata : float, optional
-        Height that means "no sample" in a height grid.
-    window : (column, row, columns, rows), optional
-        The part of a height grid to take.
-    max_edge : float, optional
-        Longest edge in the plane of a triangle of a point cloud [units].
-
-    Returns
-    -------
-    OpenModel
-
-    Raises
-    ------
-    ModelError
-        If it cannot be read or is no open height field; the message names the cause and the way out.
-    """
-    if isinstance(model, OpenModel):
-        return model
-    if isinstance(model, SourceMesh):
-        source = model
-    elif isinstance(model, (str, Path)):
-        source = read_source(model, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
-    elif hasattr(model, "vertices") and hasattr(model, "faces"):
-        source = from_trimesh(model)
-    else:
-        raise TypeError(
-            "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
-            f"not {type(model).__name__}"
-        )
-    if patch not in (None, "front"):
-        raise ModelError(f'patch={patch!r} is unknown; use patch="front" or leave it out')
-    if patch == "front":
-        source = front_patch(source, up)
-    return build_model(source, up=up)
 
 
 def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:

@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import new_file
 from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
@@ -42,9 +43,6 @@ from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.thin import Tile, thin_tile
 from meshsimp_pymoo.tiles.weld import measure, weld
 from meshsimp_pymoo.workers import Engine, Serial
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: Samples along one side of a tile.
 TILE = 512
@@ -457,9 +455,7 @@ def cut_axis(n: int, tile: int, shift: float, stride: int = 1) -> IntArray:
 class _Work:
     """One call's work on a grid."""
 
-    def __init__(
-        self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | Memory, progress: Progress
-    ) -> None:
+    def __init__(self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | Memory, progress: Progress) -> None:
         self.grid = grid
         self.tile = tile
         self.engine = engine
@@ -474,11 +470,7 @@ class _Work:
     def boxes(self, shift: float, stride: int) -> list[tuple[int, int, int, int]]:
         """Return first and last row, first and last column of each tile."""
         rows, columns = (cut_axis(n, self.tile, shift, stride).tolist() for n in self.grid.shape)
-        return [
-            (top, bottom, left, right)
-            for top, bottom in pairwise(rows)
-            for left, right in pairwise(columns)
-        ]
+        return [(top, bottom, left, right) for top, bottom in pairwise(rows) for left, right in pairwise(columns)]
 
     def task(self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None) -> Tile:
         """Return what a tile's task needs to know."""
@@ -596,9 +588,7 @@ class _Work:
             return moved
         coarse = CoarseGrid(self.grid)
         missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
-        tasks = (
-            coarse.task(solutions[k], int(_weight(self.grid, solutions[k]).sum()) - 2) for k in missing
-        )
+        tasks = (coarse.task(solutions[k], int(_weight(self.grid, solutions[k]).sum()) - 2) for k in missing)
         for place, rows in self.engine.each(_move, tasks):
             self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
