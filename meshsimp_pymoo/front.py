@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.formats.options import Options
@@ -105,7 +105,7 @@ class FrontSolution:
         return self.front.problem.surface.view.points
 
     @property
-    def faces(self) -> npt.NDArray[np.int32]:
+    def faces(self) -> IntArray:
         """The triangles (M, 3) as rows of the model's vertices."""
         return self.simplified.faces
 

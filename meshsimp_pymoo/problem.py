@@ -9,7 +9,7 @@ import os
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -167,7 +167,7 @@ class MeshProblem(ElementwiseProblem):
                     f"a {type(model).__name__} is a model that was read, with its rules; make another one, or give the "
                     "model and leave the surface out"
                 )
-            self.surface: Surface = model
+            self.surface: Surface = cast("Surface", model)
             names = objectives if objectives is not None else (self.surface.rules.measure, "triangles")
             self.objectives = _checked_objectives(names)
             if self.objectives[0] != self.surface.rules.measure:
@@ -342,7 +342,7 @@ def _signature() -> inspect.Signature:
     return inspect.Signature([own[0], *by_name, *own[1:]])
 
 
-MeshProblem.__signature__ = _signature()  # type: ignore[attr-defined]
+MeshProblem.__signature__ = _signature()
 
 
 def _refuse_unknown(kwargs: dict[str, Any]) -> None:

@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
     new_folder,
@@ -48,14 +49,11 @@ from meshsimp_pymoo.files import (
 from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
 from meshsimp_pymoo.formats.table import format_of_output, format_to_write, write_mesh
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
-from meshsimp_pymoo.surface.surface import Refitted, Surface
+from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.model import OpenModel
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.integer[Any]]
-BoolArray = npt.NDArray[np.bool_]
 
 FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
@@ -387,13 +385,13 @@ def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
 
 
 def mesh_arrays(
-    model: OpenModel, faces: IntArray
+    model: Original, faces: IntArray
 ) -> tuple[FloatArray, npt.NDArray[np.int64], dict[str, npt.NDArray[Any]]]:
     """Return a simplified mesh in the file's own frame.
 
     Parameters
     ----------
-    model : OpenModel
+    model : Original
         The original mesh.
     faces : (M, 3) int array
         Triangles as indices of the model's vertices in vector order.

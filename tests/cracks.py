@@ -31,7 +31,7 @@ def find_cracks(vertices: np.ndarray, faces: np.ndarray) -> int:
     3
     """
     table = edge_table(faces)
-    ends = vertices[table.ends[table.count == 1]][:, :, :2]
+    ends = vertices[table.ends[table.n_triangles == 1]][:, :, :2]
     low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
     on_side = ((ends == low).all(axis=1) | (ends == high).all(axis=1)).any(axis=1)
-    return int((table.count > 2).sum() + (~on_side).sum())
+    return int((table.n_triangles > 2).sum() + (~on_side).sum())

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 SORTS = {"mesh": "meshes", "grid": "height grids", "cloud": "point clouds"}
 
 
-class Upright(Protocol):
+class Held(Protocol):
     """What a format may want to know of a model before it writes meshes of it."""
 
     @property
@@ -51,10 +51,6 @@ class Upright(Protocol):
     @property
     def faces(self) -> IntArray:
         """Triangles (T, 3)."""
-
-    @property
-    def up(self) -> FloatArray:
-        """Direction of the height, (3,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +110,7 @@ class Format:
     further: Callable[[], Iterable[str]] | None = None
     single_precision: bool = False
     states_origin: bool = False
-    refuse: Callable[[Upright], None] | None = None
+    refuse: Callable[[Held], None] | None = None
     open_heights: Callable[[Path, str, Options], PlacedHeights] | None = None
     count_samples: Callable[[Path, str], int | None] | None = None
 
@@ -123,7 +119,7 @@ class Format:
         """The suffix of the files that are written, with the dot."""
         return self.suffixes[0]
 
-    def check(self, model: Upright) -> None:
+    def check(self, model: Held) -> None:
         """Raise a ResultError if meshes of this model cannot be written in it."""
         if self.refuse is not None:
             self.refuse(model)

@@ -31,7 +31,7 @@ class EdgeTable(NamedTuple):
     ----------
     ends : (E, 2) int64 array
         The vertices of each edge, ascending; edges sorted.
-    count : (E,) int array
+    n_triangles : (E,) int array
         How many triangles have it.
     order : (3 M,) int array
         The sides of all triangles (first all first sides, then all second ones, then all third ones) edge by edge.
@@ -40,7 +40,7 @@ class EdgeTable(NamedTuple):
     """
 
     ends: IntArray
-    count: IntArray
+    n_triangles: IntArray
     order: IntArray
     first: IntArray
 
@@ -51,7 +51,7 @@ def edge_table(faces: IntArray) -> EdgeTable:
     Examples
     --------
     >>> table = edge_table(np.array([[0, 1, 2], [0, 2, 3]]))
-    >>> table.ends[table.count == 2].tolist()
+    >>> table.ends[table.n_triangles == 2].tolist()
     [[0, 2]]
     """
     sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
@@ -66,7 +66,7 @@ def edge_table(faces: IntArray) -> EdgeTable:
 def border_vertices(faces: IntArray) -> IntArray:
     """Return the vertices at edges of one triangle only, ascending."""
     table = edge_table(faces)
-    return np.unique(table.ends[table.count == 1])
+    return np.unique(table.ends[table.n_triangles == 1])
 
 
 @njit(cache=True)

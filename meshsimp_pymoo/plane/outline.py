@@ -39,7 +39,7 @@ def outline_edges(xy: FloatArray, faces: IntArray) -> IntArray:
     up = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]) > 0
     table = edge_table(faces)
     facing = np.add.reduceat(np.tile(up, 3)[table.order].astype(np.int64), table.first)
-    bounding = (table.count == 1) | ((facing > 0) & (facing < table.count)) | (facing == 0)
+    bounding = (table.n_triangles == 1) | ((facing > 0) & (facing < table.n_triangles)) | (facing == 0)
     return table.ends[bounding]
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.surface.measures import MEASURES
 
 if TYPE_CHECKING:
@@ -38,8 +39,6 @@ __all__ = [
     "plot_mesh",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.integer[Any]]
 View = Literal["above", "side"] | tuple[float, float]
 
 VIEWS = {

@@ -15,8 +15,8 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.comparison.study import slug
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import new_file
@@ -27,12 +27,10 @@ from meshsimp_pymoo.surface.measures import MEASURES, Measure
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
-    from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.surface import Simplified
+    from meshsimp_pymoo.surface.surface import Original, Simplified
 
 __all__ = ["PAGE_BYTES", "simplification_page", "write_page"]
 
-IntArray = npt.NDArray[np.integer[Any]]
 
 SCRIPTS = (
     "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "simplification.js",
@@ -285,7 +283,7 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     return files
 
 
-def _what_is_thinned(model: OpenModel, held: _Embedded, missing: int) -> Iterator[str]:
+def _what_is_thinned(model: Original, held: _Embedded, missing: int) -> Iterator[str]:
     if missing:
         yield (
             f"To keep this page small, {len(held.solutions) - missing} of {len(held.solutions)} meshes are in it, an "

@@ -141,7 +141,8 @@ COUNTED = tuple(item.name for item in fields(Quality) if item.type == "int")
 
 def quality_of(values: Iterable[tuple[str, Any]]) -> Quality:
     """Return the quality with these (name, value) pairs, whole numbers as such."""
-    return Quality(**{name: int(value) if name in COUNTED else float(value) for name, value in values})
+    numbers: dict[str, Any] = {name: int(value) if name in COUNTED else float(value) for name, value in values}
+    return Quality(**numbers)
 
 
 def as_quality(row: Any, total_weight: float) -> Quality:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import Csr, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import border_vertices, one_rings
@@ -120,7 +120,7 @@ class OpenModel:
         return digest.hexdigest()
 
     @cached_property
-    def neighbours(self) -> tuple[IntArray, npt.NDArray[np.int32]]:
+    def neighbours(self) -> Csr:
         """Mesh one-rings in CSR form: those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``, ascending."""
         return one_rings(self.faces, self.n_vertices)
 

@@ -10,17 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.local_search import relocate
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.tiles.grid import HeightGrid
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: The most triangles of a mesh whose vertices are moved.
 SEARCHED = 300

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate
@@ -30,9 +31,6 @@ from meshsimp_pymoo.surface.measures import (
     as_quality,
 )
 from meshsimp_pymoo.tiles.grid import HeightGrid
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
