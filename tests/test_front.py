@@ -24,8 +24,10 @@ from meshsimp_pymoo import (
     MeshProblem,
     NeighbourShift,
     NestedSubsets,
+    Options,
     PinnedCorners,
     ResultError,
+    Rules,
     greedy_insertion,
     memetic,
     moead,
@@ -40,7 +42,6 @@ from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
-from meshsimp_pymoo.surface.evaluate import simplify
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +167,7 @@ def test_a_solution_that_is_not_there_is_an_error(front):
 
 def test_a_solution_has_its_numbers_and_its_mesh(front):
     solution = front[3]
-    found = simplify(front.model, solution.kept)
+    found = front.problem.surface.simplify(solution.kept)
     q = solution.quality
     assert found.quality == q
     assert (solution.error, solution.triangles, solution.vertices) == (q.error, q.triangles, q.vertices)
@@ -229,7 +230,7 @@ def test_what_is_saved_is_read_back(front, stored):
     }
     record = json.loads((stored / "run.json").read_text())
     assert (record["seed"], record["algorithm"], record["generations"], record["evaluations"]) == (1, "NSGA2", 6, 96)
-    assert record["settings"]["footprint"] == "model"
+    assert record["rules"]["footprint"] == "model"
 
 
 def test_a_front_that_was_read_can_be_saved_again_with_the_same_bytes(stored, tmp_path):
@@ -247,12 +248,12 @@ def test_a_search_that_starts_from_thinning_shows_what_it_gained(tmp_path):
     front = Front.from_result(minimize(problem, algorithm, ("n_gen", 3), seed=1))
     ((name, start),) = front.series.items()
     assert name == "adaptive thinning (start)"
-    thinned = thinning(problem.model).F
+    thinned = thinning(problem.surface).F
     assert {tuple(row) for row in start} <= {tuple(row) for row in thinned}
     assert start[0, 1] == thinned[thinned[:, 1] > 0, 1].min()
     assert (np.diff(start[:, 1]) > 0).all()
     assert (np.diff(start[:, 0]) < 0).all()
-    front.series["greedy"] = greedy_insertion(problem.model, most=20).F[1:]
+    front.series["greedy"] = greedy_insertion(problem.surface, most=20).F[1:]
     folder = front.save(tmp_path / "out", meshes=0)
     again = Front.load(folder)
     assert list(again.series) == [name, "greedy"]
@@ -273,7 +274,7 @@ def test_of_a_large_model_the_start_is_drawn_from_points_spread_over_the_sizes()
     problem = MeshProblem("peaks:40")
     (start,) = starting_front(problem, memetic()).values()
     assert 100 < len(start) <= 200
-    assert len(thinning(problem.model).F) > 1500
+    assert len(thinning(problem.surface).F) > 1500
     upper = start[start[:, 1] > 20, 1]
     assert (upper[1:] / upper[:-1]).max() < 1.2
     assert start[-1].tolist() == [0.0, 2 * 39**2]
@@ -362,7 +363,8 @@ def test_how_the_model_was_read_is_remembered(tmp_path):
     Front.from_subsets(problem, np.ones((1, 29), bool), ends=True).save(tmp_path / "out", meshes=0)
     front = Front.load(tmp_path / "out")
     assert np.ptp(front[-1].mesh.vertices[:, :2], axis=0).tolist() == [50, 80]
-    assert (front.problem.footprint, front.problem.outside) == ("hull", "ignore")
+    assert front.problem.surface.rules == Rules(footprint="hull", outside="ignore")
+    assert front.problem.options == problem.options == Options(spacing=(10, 20), nodata=-9999)
 
 
 def test_a_front_can_be_pickled(front):

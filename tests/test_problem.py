@@ -23,14 +23,19 @@ from meshsimp_pymoo import (
     PinnedCorners,
     RandomSubset,
     Relocation,
+    memetic,
+    moead,
+    nsga2_v1,
+    nsga2_v2,
+    nsga3,
 )
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.problem import ThreadRunner
-from meshsimp_pymoo.search.presets import memetic, moead, nsga2_v1, nsga2_v2, nsga3
-from meshsimp_pymoo.surface import evaluate as error
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +51,8 @@ def subsets(problem, n=20, seed=0):
 def test_objectives_are_error_and_triangles_of_the_kept_and_pinned_vertices(problem):
     X = subsets(problem)
     F = problem.evaluate(X)
-    table = error.evaluate_subsets(problem.model, X | problem.pinned)
-    np.testing.assert_array_equal(F, table[:, [error.ERROR, error.TRIANGLES]])
+    table = HeightSurface(problem.model).evaluate(X | problem.pinned)
+    np.testing.assert_array_equal(F, table[:, [ERROR, TRIANGLES]])
     np.testing.assert_array_equal(problem.evaluate(X[0]), F[0])
 
 

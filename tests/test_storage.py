@@ -15,38 +15,44 @@ import numpy as np
 import pytest
 import trimesh
 
-from meshsimp_pymoo import storage as results
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelWarning, ResultError
 from meshsimp_pymoo.formats.source import SourceMesh
-from meshsimp_pymoo.formats.table import read_source, write_mesh
+from meshsimp_pymoo.formats.table import read_source, write_mesh, written_formats
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.storage import FRONT_COLUMNS, claim_output, mesh_arrays, read_front, write_front
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 
-MESH_PROGRAM_FORMATS = [name for name in results.MESH_FORMATS if name != "landxml"]
+MESH_PROGRAM_FORMATS = [name for name in written_formats() if name != "landxml"]
 UTM = np.array([500_000.25, 5_400_000.5, 300.125])
 
 
 @pytest.fixture(scope="module")
-def model():
-    return open_model("face:200")
+def surface():
+    return HeightSurface(open_model("face:200"))
 
 
 @pytest.fixture(scope="module")
-def solutions(model):
+def model(surface):
+    return surface.model
+
+
+@pytest.fixture(scope="module")
+def solutions(surface):
     """Twelve random subsets of growing size, listed out of order, with their simplified meshes."""
     rng = np.random.default_rng(5)
-    kept = rng.random((12, model.n_vertices)) < np.linspace(0.1, 0.9, 12)[rng.permutation(12), None]
-    kept[:, model.corners] = True
-    return kept, [simplify(model, row) for row in kept]
+    kept = rng.random((12, surface.n_vertices)) < np.linspace(0.1, 0.9, 12)[rng.permutation(12), None]
+    kept[:, surface.model.corners] = True
+    return kept, [surface.simplify(row) for row in kept]
 
 
 def write(folder, model, solutions, **options):
+    """Write a front of a surface, or of a model with the usual rules."""
+    surface = model if isinstance(model, HeightSurface) else HeightSurface(model)
     kept, simplified = solutions
     options = {"faces": lambda row: simplified[row].faces, "run": {"seed": 3}} | options
-    return write_front(folder, model, [s.quality for s in simplified], kept, **options)
+    return write_front(folder, surface, [s.quality for s in simplified], kept, **options)
 
 
 def files(folder):
@@ -99,7 +105,7 @@ def test_meshes_stand_where_the_front_says_and_are_the_solutions(tmp_path, model
 
 def test_the_referee_agrees_with_the_written_front(tmp_path, model, solutions, oracle):
     everything = np.ones(model.n_vertices, dtype=bool)
-    assert simplify(model, everything).quality.error < 1e-9
+    assert HeightSurface(model).simplify(everything).quality.error < 1e-9
     write_mesh(tmp_path / "original.ply", model.file_points, model.faces)
     folder = write(tmp_path / "out", model, solutions)
     command = [sys.executable, oracle, tmp_path / "original.ply", "--front", folder / "front.csv"]
@@ -288,10 +294,11 @@ def test_landxml_is_a_tin_of_northing_easting_and_elevation_in_double_precision(
 
 def test_landxml_is_refused_where_the_height_is_not_z(tmp_path):
     roof = load("roof:5")
-    model = build_model(SourceMesh(roof.points[:, [2, 0, 1]], roof.faces, {}, "turned"), up="x")
-    kept = np.ones((1, model.n_vertices), dtype=bool)
+    surface = HeightSurface(build_model(SourceMesh(roof.points[:, [2, 0, 1]], roof.faces, {}, "turned"), up="x"))
+    kept = np.ones((1, surface.n_vertices), dtype=bool)
+    quality = [surface.simplify(kept[0]).quality]
     with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .* do not look up"):
-        write_front(tmp_path / "out", model, [simplify(model, kept[0]).quality], kept, meshes=0, mesh_format="landxml")
+        write_front(tmp_path / "out", surface, quality, kept, meshes=0, mesh_format="landxml")
 
 
 def test_the_reference_system_stands_in_the_record_and_in_the_ply(tmp_path, solutions):
@@ -409,22 +416,22 @@ def test_an_unwritable_parent_is_named(tmp_path, monkeypatch):
         claim_output(tmp_path / "out")
 
 
-def test_an_empty_or_unfinished_front_is_refused(tmp_path, model, solutions):
+def test_an_empty_or_unfinished_front_is_refused(tmp_path, surface, solutions):
     kept, simplified = solutions
     quality = [s.quality for s in simplified]
     with pytest.raises(ValueError, match="the front is empty"):
-        write_front(tmp_path / "out", model, [], kept[:0])
+        write_front(tmp_path / "out", surface, [], kept[:0])
     with pytest.raises(ValueError, match=r"kept has the shape \(11, 200\)"):
-        write_front(tmp_path / "out", model, quality, kept[:-1])
+        write_front(tmp_path / "out", surface, quality, kept[:-1])
     broken = [*quality[:-1], dataclasses.replace(quality[-1], error=float("nan"))]
     with pytest.raises(ValueError, match="solution 11 has an error that is not finite"):
-        write_front(tmp_path / "out", model, broken, kept, meshes=0)
+        write_front(tmp_path / "out", surface, broken, kept, meshes=0)
     with pytest.raises(ValueError, match="no faces are given"):
-        write_front(tmp_path / "out", model, quality, kept)
+        write_front(tmp_path / "out", surface, quality, kept)
     with pytest.raises(ValueError, match="mesh_format is 'xyz'"):
-        write(tmp_path / "out", model, solutions, mesh_format="xyz")
+        write(tmp_path / "out", surface, solutions, mesh_format="xyz")
     with pytest.raises(TypeError, match=r"a set cannot be recorded in run\.json"):
-        write(tmp_path / "out", model, solutions, run={"seed": {1}})
+        write(tmp_path / "out", surface, solutions, run={"seed": {1}})
     assert list(tmp_path.iterdir()) == []
 
 
@@ -573,10 +580,10 @@ def test_a_damaged_result_is_noticed_and_named(tmp_path, model, solutions, damag
 
 
 def test_a_bit_beyond_the_last_vertex_is_noticed(tmp_path):
-    model = open_model("roof:3")
+    surface = HeightSurface(open_model("roof:3"))
     kept = np.ones((1, 9), dtype=bool)
-    whole = simplify(model, kept[0])
-    folder = write_front(tmp_path / "out", model, [whole.quality], kept, meshes=0)
+    whole = surface.simplify(kept[0])
+    folder = write_front(tmp_path / "out", surface, [whole.quality], kept, meshes=0)
     spoil_npz(kept=lambda k: k | 1)(folder)
     with pytest.raises(ResultError, match="kept has bits set beyond the 9 vertices"):
         read_front(folder)
