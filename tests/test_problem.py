@@ -23,12 +23,16 @@ from meshsimp_pymoo import (
     PinnedCorners,
     RandomSubset,
     Relocation,
+    memetic,
+    moead,
+    nsga2_v1,
+    nsga2_v2,
+    nsga3,
 )
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.load import SourceMesh, grid_source
 from meshsimp_pymoo.problem import ThreadRunner
-from meshsimp_pymoo.search.presets import memetic, moead, nsga2_v1, nsga2_v2, nsga3
 from meshsimp_pymoo.surface import evaluate as error
 
 
