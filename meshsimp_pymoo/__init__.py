@@ -54,10 +54,11 @@ if TYPE_CHECKING:
     )
     from meshsimp_pymoo.search.weighted import weighted_ga_v1, weighted_ga_v2
     from meshsimp_pymoo.storage import read_front, write_front
-    from meshsimp_pymoo.surface.evaluate import Quality
-    from meshsimp_pymoo.surface.live import LiveTriangulation
+    from meshsimp_pymoo.surface.height import refit_heights
+    from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+    from meshsimp_pymoo.surface.measures import Quality
     from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.refit import Refitted, refit_heights
+    from meshsimp_pymoo.surface.surface import Refitted
     from meshsimp_pymoo.tiles.front import tiled_front
     from meshsimp_pymoo.tiles.grid import open_grid
     from meshsimp_pymoo.workers import DaskEngine, Processes
@@ -67,11 +68,14 @@ _HOMES = {
     "search.nsga": ("nsga2_v1", "nsga2_v2", "nsga3"),
     "search.moead": ("moead",),
     "search.weighted": ("weighted_ga_v1", "weighted_ga_v2"),
-    "surface.evaluate": ("Quality",),
+    "surface.measures": ("Quality",),
     "errors": ("ModelError", "ModelWarning", "ResultError"),
     "surface.model": ("OpenModel",),
-    "surface.live": ("LiveTriangulation",),
-    "surface.refit": ("Refitted", "refit_heights"),
+    "surface.live_triangulation": ("LiveTriangulation",),
+    "surface.height": ("HeightSurface", "refit_heights"),
+    "surface.rules": ("Rules",),
+    "surface.surface": ("Refitted",),
+    "formats.options": ("Options",),
     "search.greedy": ("greedy_insertion", "thinning"),
     "search.operators": (
         "OAX",

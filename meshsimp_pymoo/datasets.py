@@ -21,7 +21,6 @@ from __future__ import annotations
 import difflib
 import inspect
 import math
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -30,14 +29,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.files import is_there
-from meshsimp_pymoo.formats.load import SourceMesh, Window, grid_source, read_source
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 
-__all__ = ["describe", "find_source", "load", "names"]
+__all__ = ["describe", "load", "names"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 METRES_PER_DEGREE = 111_200.0  # of latitude, at the latitudes of both terrains (36 and 49 degrees north), to 0.05 %
 SPACING_STEP = (
@@ -132,41 +130,6 @@ def describe() -> dict[str, str]:
         summary = (make.__doc__ or "").strip().splitlines()[0]
         lines[name] = f"{name}:{spelled} - {summary.removeprefix('Return ').rstrip('.')}"
     return lines
-
-
-def find_source(
-    model: str | os.PathLike[str],
-    *,
-    spacing: float | tuple[float, float] | None = None,
-    nodata: float | None = None,
-    window: Window | None = None,
-    max_edge: float | None = None,
-) -> SourceMesh:
-    """Read the file of this name or, where there is none, make the built-in model of this name.
-
-    Parameters
-    ----------
-    model : str or path
-        A mesh, grid or cloud file, or the name of a built-in model. A file wins over a built-in model of the same
-        name.
-    spacing, nodata, window, max_edge : optional
-        Passed on to :func:`~meshsimp_pymoo.formats.load.read_source`; for files only.
-
-    Raises
-    ------
-    ModelError
-        If there is neither, or the file cannot be used.
-    """
-    text = os.fspath(model)
-    looks_like_file = bool(Path(text.partition(":")[0]).suffix) or os.sep in text or "/" in text
-    if is_there(Path(text)) or looks_like_file or isinstance(model, Path):
-        return read_source(Path(text), spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
-    source = load(text)
-    if not (spacing is None and nodata is None and window is None and max_edge is None):
-        raise ModelError(
-            f"{text}: spacing, nodata, window and max_edge are for files; a built-in model has its own samples"
-        )
-    return source
 
 
 # -------------------------------------------------------------------------------------------------------- real terrain

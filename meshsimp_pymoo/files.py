@@ -217,7 +217,7 @@ def claim_file(path: str | os.PathLike[str], suffixes: Sequence[str], *, overwri
     path : path
         The file to be written; upper case in its suffix is as good as lower case.
     suffixes : sequence of str
-        The suffixes that it may have, without the dot.
+        The suffixes that it may have, with the dot.
     overwrite : bool
         Whether a file that exists may be replaced.
 
@@ -227,8 +227,8 @@ def claim_file(path: str | os.PathLike[str], suffixes: Sequence[str], *, overwri
         If its suffix is another, it exists, or its folder does not.
     """
     path = Path(path)
-    if path.suffix.lower().lstrip(".") not in suffixes:
-        known = ", ".join(f".{suffix}" for suffix in suffixes)
+    if path.suffix.lower() not in suffixes:
+        known = ", ".join(suffixes)
         raise ResultError(f"{path}: the suffix {path.suffix!r} says no format that can be written; use one of {known}")
     if path.is_dir():
         raise ResultError(f"{path}: is a folder; name a file")

@@ -25,8 +25,6 @@ import csv
 import json
 import os
 import platform
-import struct
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -37,7 +35,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError, reason_of
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
     new_folder,
     partial_folder,
@@ -47,35 +46,20 @@ from meshsimp_pymoo.files import (
     write_csv,
     write_npz,
 )
+from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
+from meshsimp_pymoo.formats.table import format_of_output, format_to_write, write_mesh
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
+from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.evaluate import Quality
     from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.refit import Refitted
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.integer[Any]]
-BoolArray = npt.NDArray[np.bool_]
 
-FRONT_COLUMNS = (
-    "solution",
-    "error",
-    "triangles",
-    "vertices",
-    "mean_error",
-    "rms_error",
-    "max_error",
-    "uncovered",
-    "mesh",
-)
+FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
-INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
-MESH_FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
-# A LandXML file is called .xml everywhere; the name of the format is understood too.
-MESH_SUFFIXES = (*MESH_FORMATS, "xml")
-SINGLE_PRECISION_LOSS = 1e-6  # share of the model's diagonal; a larger shift of a vertex is worth a warning
+INT_COLUMNS = ("solution", *COUNTED)
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
@@ -86,38 +70,6 @@ OWN_ENTRIES = (
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
-
-# PLY has no 64-bit integers, no half floats and no booleans: such attributes are written in the next type
-# that holds them.
-PLY_TYPES = {
-    "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
-    "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
-}  # fmt: skip
-PLY_WIDER = {"b1": "u1", "f2": "f4", "i8": "f8", "u8": "f8"}
-PLY_COLORS = ("red", "green", "blue", "alpha")
-
-# glTF 2.0: the numbers of the types, of what a buffer is for, and of "triangles".
-GLTF_FLOAT, GLTF_UINT, GLTF_UBYTE = 5126, 5125, 5121
-GLTF_VERTICES, GLTF_INDICES, GLTF_TRIANGLES = 34962, 34963, 4
-LANDXML = "http://www.landxml.org/schema/LandXML-1.2"
-# LandXML demands a date and a time; one that never changes keeps equal meshes equal.
-LANDXML_DATE = {"date": "1980-01-01", "time": "00:00:00"}
-# What a CRS calls its unit, and LandXML's system of units and names for it; metres where nothing is known.
-LANDXML_UNITS = {
-    "metre": ("Metric", "meter"), "meter": ("Metric", "meter"), "m": ("Metric", "meter"),
-    "kilometre": ("Metric", "kilometer"), "foot": ("Imperial", "foot"), "ft": ("Imperial", "foot"),
-    "us survey foot": ("Imperial", "USSurveyFoot"), "ftus": ("Imperial", "USSurveyFoot"),
-}  # fmt: skip
-LANDXML_MEASURES = {
-    "Metric": {
-        "areaUnit": "squareMeter", "volumeUnit": "cubicMeter",
-        "temperatureUnit": "celsius", "pressureUnit": "milliBars",
-    },
-    "Imperial": {
-        "areaUnit": "squareFoot", "volumeUnit": "cubicFeet",
-        "temperatureUnit": "fahrenheit", "pressureUnit": "inchHG",
-    },
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +176,7 @@ def _of_unfinished(name: str) -> bool:
 
 def write_front(
     folder: str | os.PathLike[str],
-    model: OpenModel,
+    surface: Surface,
     quality: Sequence[Quality],
     kept: BoolArray,
     *,
@@ -244,8 +196,8 @@ def write_front(
     ----------
     folder : path
         The folder to make; see :func:`claim_output`.
-    model : OpenModel
-        The original mesh.
+    surface : Surface
+        The original mesh and its rules.
     quality : sequence of Quality, length S
         The numbers of each solution, in any order; written sorted by triangles, then error.
     kept : (S, N) bool array
@@ -257,14 +209,14 @@ def write_front(
         The most meshes to write; a longer front writes an even selection, its ends included. None writes all,
         0 none.
     mesh_format : str
-        One of MESH_FORMATS. PLY (binary, double precision) keeps every attribute; OBJ, OFF and LandXML keep full
-        precision; STL and GLB are single precision by definition, GLB from an origin that it states (see
-        :func:`write_mesh`).
+        A name out of :func:`~meshsimp_pymoo.formats.table.written_formats`. PLY (binary, double precision) keeps every
+        attribute; OBJ, OFF and LandXML keep full precision; STL and GLB are single precision by definition, GLB from an
+        origin that it states (see :func:`~meshsimp_pymoo.formats.table.write_mesh`).
     chosen : int, optional
         Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
     refit : callable, optional
         The best heights for the solution in this row of ``kept`` (see
-        :func:`~meshsimp_pymoo.surface.refit.refit_heights`). Each mesh that is written is then written with them
+        :func:`~meshsimp_pymoo.surface.height.refit_heights`). Each mesh that is written is then written with them
         too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
@@ -288,6 +240,7 @@ def write_front(
     ValueError
         If the front is empty, holds a number that is not finite, or does not fit the model.
     """
+    model = surface.model
     kept = np.asarray(kept, dtype=bool)
     if len(quality) == 0:
         raise ValueError("the front is empty; there is nothing to write")
@@ -296,11 +249,9 @@ def write_front(
             f"kept has the shape {kept.shape}; {len(quality)} solutions of a model of {model.n_vertices} vertices "
             f"need {(len(quality), model.n_vertices)}"
         )
-    if mesh_format not in MESH_FORMATS:
-        raise ValueError(f"mesh_format is {mesh_format!r}; it must be one of {', '.join(MESH_FORMATS)}")
-    refuse_format(model, mesh_format)
-    suffix = mesh_suffix(mesh_format)
-    look = _written_frame(model, mesh_format)
+    kind = format_to_write(mesh_format)
+    kind.check(model)
+    look = shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference)
     F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
     if not np.isfinite(F).all():
         raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
@@ -324,26 +275,26 @@ def write_front(
                 arrays = mesh_arrays(model, faces(int(row)))
                 single = max(single, single_precision_shift(arrays[0]))
                 if solution in with_mesh:
-                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}.{suffix}"
+                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                     write_mesh(partial / path, *arrays, **look)
                 if row == chosen:
-                    write_mesh(partial / f"chosen.{suffix}", *arrays, **look)
+                    write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
                 if refit is not None:
                     better = refit(int(row))
-                    raised = (better.vertices(model), *arrays[1:])
+                    raised = (better.vertices, *arrays[1:])
                     fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                     if solution in with_mesh:
                         write_mesh(partial / fitted[1], *raised, **look)
                     if row == chosen:
-                        write_mesh(partial / f"chosen_refitted.{suffix}", *raised, **look)
+                        write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **look)
             numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
-        warn_of_shift(model.name, model.diagonal, mesh_format, single)
+        warn_of_shift(kind, model.name, surface.diagonal, single)
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
+        write_npz(partial / "front.npz", F=F[order], kept=packed, **surface.stored_arrays())
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
@@ -351,7 +302,7 @@ def write_front(
                 "hash": model.hash,
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
-                "up": model.up,
+                "up": surface.view.rotation[2],
                 **({"georeference": model.georeference} if model.georeference else {}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
@@ -423,7 +374,8 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
 def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
     """Refuse a record whose parts are not of the kind that others rely on."""
     model, chosen = run.get("model") or {}, run.get("chosen")
-    wrong = [name for name in ("model", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    parts = ("model", "options", "rules", "settings", "versions")
+    wrong = [name for name in parts if not isinstance(run.get(name) or {}, dict)]
     if not wrong:
         wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
@@ -433,13 +385,13 @@ def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
 
 
 def mesh_arrays(
-    model: OpenModel, faces: IntArray
+    model: Original, faces: IntArray
 ) -> tuple[FloatArray, npt.NDArray[np.int64], dict[str, npt.NDArray[Any]]]:
     """Return a simplified mesh in the file's own frame.
 
     Parameters
     ----------
-    model : OpenModel
+    model : Original
         The original mesh.
     faces : (M, 3) int array
         Triangles as indices of the model's vertices in vector order.
@@ -458,116 +410,6 @@ def mesh_arrays(
     return model.file_points[used], compact.reshape(-1, 3), attributes
 
 
-def write_mesh(
-    path: str | os.PathLike[str],
-    vertices: FloatArray,
-    faces: IntArray,
-    attributes: Mapping[str, npt.NDArray[Any]] | None = None,
-    *,
-    origin: npt.ArrayLike | None = None,
-    georeference: Mapping[str, Any] | None = None,
-    name: str = "surface",
-) -> None:
-    """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
-
-    Parameters
-    ----------
-    path : path
-        Ends in one of MESH_SUFFIXES; ``.xml`` is LandXML, a surface for survey and GIS programs.
-    vertices : (V, 3) float array
-        Coordinates; written in double precision (STL and GLB, by definition: single). LandXML takes z for the height,
-        y for the northing and x for the easting.
-    faces : (M, 3) int array
-        Triangles.
-    attributes : mapping of str to (V,) or (V, k) array, optional
-        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, anything else to PLY only.
-    origin : (3,) floats, optional
-        Of GLB: what is subtracted from the coordinates before they lose their double precision. The file says it twice:
-        as the translation of its one node, which puts the mesh back where it was, and as ``extras.origin``. By default
-        it is 0 where that loses nothing, else the mesh's lower corner in whole units.
-    georeference : mapping, optional
-        What is known of the coordinates (see :class:`~meshsimp_pymoo.formats.load.SourceMesh`): PLY says the CRS in a
-        comment, GLB in ``extras``, LandXML as its coordinate system and unit.
-    name : str
-        What LandXML calls the surface.
-
-    Raises
-    ------
-    ValueError
-        If the suffix is not known.
-    """
-    path = Path(path)
-    attributes = dict(attributes or {})
-    suffix = path.suffix.lower().lstrip(".")
-    facts = dict(georeference or {})
-    if suffix == "ply":
-        path.write_bytes(_ply_bytes(vertices, faces, attributes, facts))
-        return
-    if suffix == "glb":
-        start = local_origin(vertices) if origin is None else np.asarray(origin, dtype=np.float64)
-        path.write_bytes(_glb_bytes(vertices, faces, attributes.get("color"), start, facts))
-        return
-    if suffix in ("xml", "landxml"):
-        path.write_bytes(_landxml_bytes(vertices, faces, name, facts))
-        return
-    if suffix not in MESH_FORMATS:
-        raise ValueError(f"{path}: no such mesh format; write one of {', '.join(MESH_FORMATS)}")
-    import trimesh
-
-    mesh = trimesh.Trimesh(vertices, faces, vertex_colors=attributes.get("color"), process=False)
-    options: dict[str, Any] = {}
-    if suffix in ("obj", "off"):
-        options["digits"] = 17  # significant digits that carry any double
-    if suffix == "obj":
-        options |= {"include_normals": False, "header": None}
-    written = mesh.export(file_type=suffix, **options)
-    path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))
-
-
-def mesh_suffix(mesh_format: str) -> str:
-    """Return the suffix of files of a mesh format, without the dot."""
-    return "xml" if mesh_format == "landxml" else mesh_format
-
-
-def local_origin(vertices: FloatArray) -> FloatArray:
-    """Return the origin (3,) from which single precision holds vertices (V, 3): 0 if that does, else whole units.
-
-    >>> local_origin(np.array([[0.0, 0.5, 1.0], [1.0, 1.0, 2.0]])).tolist()
-    [0.0, 0.0, 0.0]
-    >>> local_origin(np.array([[500000.1, 5400000.1, 7.5], [500001.1, 5400001.1, 8.5]])).tolist()
-    [500000.0, 5400000.0, 7.0]
-    """
-    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
-    if single_precision_shift(vertices) <= SINGLE_PRECISION_LOSS * diagonal:
-        return np.zeros(3)
-    return np.asarray(np.floor(vertices.min(axis=0)), dtype=np.float64)
-
-
-def refuse_format(model: OpenModel, mesh_format: str) -> None:
-    """Refuse LandXML for a model whose heights are not along the z of its file.
-
-    Raises
-    ------
-    ResultError
-        With the direction that they have.
-    """
-    if mesh_format not in ("landxml", "xml"):
-        return
-    a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
-    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    if model.up[2] <= 0 or (area < 0).any():
-        raise ResultError(
-            f"{model.name}: a LandXML surface has its heights along z, and this one has them along "
-            f"{model.up.round(6).tolist()}; write another format, such as ply"
-        )
-
-
-def _written_frame(model: OpenModel, mesh_format: str) -> dict[str, Any]:
-    """Return what `write_mesh` is to know of a model's frame; all meshes of a front have one origin."""
-    origin = local_origin(model.file_points) if mesh_format == "glb" else np.zeros(3)
-    return {"origin": origin, "georeference": model.georeference, "name": Path(model.name).stem}
-
-
 def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
     """Write a mesh of a model, its triangles (M, 3) in vector order, in the format of the path's suffix.
 
@@ -581,11 +423,11 @@ def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
     ModelWarning
         If single precision moves vertices by more than rounding.
     """
-    suffix = path.suffix.lower().lstrip(".")
-    refuse_format(model, suffix)
+    kind = format_of_output(path)
+    kind.check(model)
     arrays = mesh_arrays(model, faces)
-    warn_of_shift(model.name, model.diagonal, suffix, single_precision_shift(arrays[0]))
-    write_mesh(path, *arrays, **_written_frame(model, suffix))
+    warn_of_shift(kind, model.name, model.diagonal, single_precision_shift(arrays[0]))
+    write_mesh(path, *arrays, **shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference))
 
 
 def package_versions() -> dict[str, str]:
@@ -602,17 +444,6 @@ def _versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return versions
-
-
-def warn_of_shift(name: str, diagonal: float, mesh_format: str, shift: float) -> None:
-    """Warn if the format's single precision moves vertices by more than a person would see in the numbers."""
-    if mesh_format == "stl" and shift > SINGLE_PRECISION_LOSS * diagonal:
-        warnings.warn(
-            f"{name}: {mesh_format} holds single precision, which moves vertices by up to {shift:.3g} "
-            "[file units]; ply, obj and off keep them exactly, glb states a local origin",
-            ModelWarning,
-            stacklevel=3,
-        )
 
 
 def even_selection(count: int, most: int | None) -> list[int]:
@@ -735,159 +566,6 @@ def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
     if len(np.unique(source_index)) != len(source_index) or source_index.min(initial=0) < 0:
         raise ResultError(f"{path}: source_index is not a list of different rows")
     return F, packed, source_index
-
-
-def _ply_bytes(
-    vertices: FloatArray, faces: IntArray, attributes: Mapping[str, npt.NDArray[Any]], georeference: Mapping[str, Any]
-) -> bytes:
-    """Return a binary PLY with double coordinates; trimesh's own writer stores single precision."""
-    vertices = np.asarray(vertices, dtype=np.float64)
-    columns: list[tuple[str, npt.NDArray[Any]]] = [(axis, vertices[:, k]) for k, axis in enumerate("xyz")]
-    for name, values in attributes.items():
-        kind = values.dtype.str[1:]
-        kind = PLY_WIDER.get(kind, kind)
-        if kind not in PLY_TYPES or values.ndim > 2 or len(values) != len(vertices):
-            raise ValueError(
-                f"attribute {name!r} of type {values.dtype} and shape {values.shape} does not fit into a PLY"
-            )
-        table = values.astype(kind).reshape(len(values), -1)
-        for k in range(table.shape[1]):
-            spelled = PLY_COLORS[k] if name == "color" else name if values.ndim == 1 else f"{name}_{k}"
-            columns.append((spelled, table[:, k]))
-    names = ["_".join(name.split()) for name, _ in columns]
-    record = np.empty(len(vertices), dtype=[(f"c{k}", f"<{c.dtype.str[1:]}") for k, (_, c) in enumerate(columns)])
-    for k, (_, column) in enumerate(columns):
-        record[f"c{k}"] = column
-    triangles = np.empty(len(faces), dtype=[("count", "u1"), ("index", "<i4", (3,))])
-    triangles["count"], triangles["index"] = 3, faces
-    properties = [f"property {PLY_TYPES[c.dtype.str[1:]]} {name}" for name, (_, c) in zip(names, columns, strict=True)]
-    header = [
-        "ply",
-        "format binary_little_endian 1.0",
-        *_crs_comments(georeference),
-        f"element vertex {len(vertices)}",
-        *properties,
-        f"element face {len(faces)}",
-        "property list uchar int vertex_indices",
-        "end_header\n",
-    ]
-    return "\n".join(header).encode("utf-8") + record.tobytes() + triangles.tobytes()
-
-
-def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
-    """Return the line of a PLY header that says the coordinate reference system, if it is known."""
-    if georeference.get("epsg"):
-        return [f"comment crs EPSG:{georeference['epsg']}"]
-    wkt = " ".join(str(georeference.get("crs") or "").split())
-    return [f"comment crs {wkt}"] if wkt else []
-
-
-def _glb_bytes(
-    vertices: FloatArray,
-    faces: IntArray,
-    color: npt.NDArray[Any] | None,
-    origin: FloatArray,
-    georeference: Mapping[str, Any],
-) -> bytes:
-    """Return a GLB of one node with one mesh, whose coordinates are those from the origin."""
-    points = (np.asarray(vertices, dtype=np.float64) - origin).astype("<f4")
-    parts: list[tuple[npt.NDArray[Any], int, dict[str, Any]]] = [
-        (
-            points,
-            GLTF_VERTICES,
-            {
-                "componentType": GLTF_FLOAT,
-                "type": "VEC3",
-                "count": len(points),
-                "min": points.min(axis=0).tolist(),
-                "max": points.max(axis=0).tolist(),
-            },
-        ),
-        (
-            np.asarray(faces).astype("<u4").ravel(),
-            GLTF_INDICES,
-            {"componentType": GLTF_UINT, "type": "SCALAR", "count": 3 * len(faces)},
-        ),
-    ]
-    attributes = {"POSITION": 0}
-    if color is not None:
-        rgba = np.full((len(points), 4), 255, np.uint8)
-        rgba[:, : color.shape[1]] = color
-        form = {"componentType": GLTF_UBYTE, "type": "VEC4", "count": len(points), "normalized": True}
-        parts.append((rgba, GLTF_VERTICES, form))
-        attributes["COLOR_0"] = 2
-    binary, views = b"", []
-    for values, target, _ in parts:
-        content = values.tobytes()
-        views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(content), "target": target})
-        binary += content + b"\0" * (-len(content) % 4)
-    node: dict[str, Any] = {"mesh": 0}
-    if origin.any():
-        node |= {"translation": origin.tolist(), "extras": {"origin": origin.tolist()}}
-    crs = {key: georeference[key] for key in ("epsg", "crs") if georeference.get(key)}
-    if crs:
-        node["extras"] = node.get("extras", {}) | crs
-    tree = {
-        "asset": {"version": "2.0", "generator": "meshsimp_pymoo"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [node],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "mode": GLTF_TRIANGLES}]}],
-        "accessors": [{"bufferView": k} | form for k, (_, _, form) in enumerate(parts)],
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(binary)}],
-    }
-    text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    length = 12 + 8 + len(text) + 8 + len(binary)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return struct.pack("<4sII", b"glTF", 2, length) + chunks
-
-
-def _landxml_bytes(vertices: FloatArray, faces: IntArray, name: str, georeference: Mapping[str, Any]) -> bytes:
-    """Return a LandXML 1.2 surface: points as "northing easting elevation", faces counter-clockwise."""
-    from xml.sax.saxutils import quoteattr
-
-    system, unit = LANDXML_UNITS.get(str(georeference.get("unit") or "").lower(), LANDXML_UNITS["metre"])
-    measures = {"linearUnit": unit} | LANDXML_MEASURES[system]
-    crs = {"epsgCode": str(georeference.get("epsg") or ""), "ogcWktCode": str(georeference.get("crs") or "")}
-    z = vertices[:, 2]
-    points = [
-        f'<P id="{k}">{y!r} {x!r} {height!r}</P>' for k, (x, y, height) in enumerate(vertices.tolist(), start=1)
-    ]
-    triangles = [f"<F>{a} {b} {c}</F>" for a, b, c in (np.asarray(faces, dtype=np.int64) + 1).tolist()]
-
-    def spelled(attributes: Mapping[str, str]) -> str:
-        return "".join(f" {key}={quoteattr(_printable(value))}" for key, value in attributes.items() if value)
-
-    lines = [
-        '<?xml version="1.0" encoding="UTF-8"?>',
-        f'<LandXML xmlns="{LANDXML}" version="1.2" readOnly="false"{spelled(LANDXML_DATE)}>',
-        f"<Units><{system}{spelled(measures)}/></Units>",
-        *([f"<CoordinateSystem{spelled(crs)}/>"] if any(crs.values()) else []),
-        '<Application name="meshsimp_pymoo"/>',
-        f"<Surfaces><Surface{spelled({'name': name})}>",
-        f'<Definition surfType="TIN" elevMin="{float(z.min())!r}" elevMax="{float(z.max())!r}">',
-        "<Pnts>",
-        *points,
-        "</Pnts>",
-        "<Faces>",
-        *triangles,
-        "</Faces>",
-        "</Definition></Surface></Surfaces>",
-        "</LandXML>",
-    ]
-    return ("\n".join(lines) + "\n").encode("utf-8")
-
-
-def _printable(text: str) -> str:
-    """Return a text without the characters that XML cannot hold."""
-    return "".join(character if character.isprintable() else "?" for character in text)
-
-
-def single_precision_shift(vertices: FloatArray) -> float:
-    """Return by how much single precision moves the vertices at most, along an axis [their units]."""
-    return float(np.abs(vertices - vertices.astype(np.float32)).max(initial=0.0))
 
 
 def _plain(value: Any) -> Any:

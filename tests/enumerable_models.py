@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.formats.load import SourceMesh
+from meshsimp_pymoo.formats.source import SourceMesh
 
 # 512 subsets at most.
 MOST_FREE = 9

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.surface.model import OpenModel
 
 

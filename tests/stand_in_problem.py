@@ -22,7 +22,7 @@ class GridProblem(ElementwiseProblem):
         vertex = np.arange(n).reshape(side, side)
         self.pinned = np.zeros(n, dtype=bool)
         self.pinned[vertex[[0, 0, -1, -1], [0, -1, 0, -1]]] = True
-        self.model = SimpleNamespace(neighbours=grid_neighbours(side))
+        self.surface = SimpleNamespace(neighbours=grid_neighbours(side))
         self.weights = np.random.default_rng(5).integers(1, 1000, size=n).astype(float)
         self.max_triangles = max_triangles
         self.calls = 0

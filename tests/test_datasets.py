@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from meshsimp_pymoo import datasets
-from meshsimp_pymoo.datasets import describe, find_source, load, names
+from meshsimp_pymoo.datasets import describe, load, names
 from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.surface.evaluate import simplify
-from meshsimp_pymoo.surface.model import load_model
+from meshsimp_pymoo.surface.model import build_model
 
 SMALL = {"jacksboro": "jacksboro:40", "topobathy": "topobathy:9", "face": "face:300", "crater": "crater:13"}
 
@@ -31,7 +32,7 @@ CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 @pytest.mark.parametrize("name", names())
 def test_every_built_in_is_an_open_height_field_that_can_be_simplified(name):
-    model = load_model(load(SMALL.get(name, name)))
+    model = build_model(load(SMALL.get(name, name)))
     assert model.up.tolist() == [0, 0, 1]
     everything = simplify(model, np.ones(model.n_vertices, dtype=bool))
     assert everything.quality.error == pytest.approx(0, abs=1e-9 * model.diagonal * model.n_vertices)
@@ -77,7 +78,7 @@ def test_topobathy_has_its_north_up_and_sea_below_zero():
 
 @pytest.mark.parametrize("side", [3, 17, 33])
 def test_a_roof_is_exact_with_4_triangles_and_costs_its_known_error_without_its_ridge(side):
-    roof = load_model(load("roof", side=side))
+    roof = build_model(load("roof", side=side))
     ridge = simplify(roof, subset(roof, *CORNERS, (0, -1), (0, 1)))
     assert (ridge.quality.error, ridge.quality.triangles) == (0.0, 4)
     flat = simplify(roof, subset(roof, *CORNERS))
@@ -86,7 +87,7 @@ def test_a_roof_is_exact_with_4_triangles_and_costs_its_known_error_without_its_
 
 @pytest.mark.parametrize("side", [5, 17])
 def test_a_pyramid_is_exact_with_4_triangles_and_costs_its_known_error_without_its_apex(side):
-    pyramid = load_model(load("pyramid", side=side))
+    pyramid = build_model(load("pyramid", side=side))
     apex = simplify(pyramid, subset(pyramid, *CORNERS, (0, 0)))
     assert (apex.quality.error, apex.quality.triangles) == (0.0, 4)
     flat = simplify(pyramid, subset(pyramid, *CORNERS))
@@ -94,7 +95,7 @@ def test_a_pyramid_is_exact_with_4_triangles_and_costs_its_known_error_without_i
 
 
 def test_a_plane_is_exact_with_2_triangles():
-    plane = load_model(load("plane"))
+    plane = open_model("plane")
     flat = simplify(plane, subset(plane, *CORNERS))
     assert (flat.quality.error, flat.quality.triangles) == (0.0, 2)
 
@@ -102,7 +103,7 @@ def test_a_plane_is_exact_with_2_triangles():
 @pytest.mark.parametrize("name", ["face", "ring", "horseshoe"])
 @pytest.mark.parametrize("vertices", [60, 61, 922, 2622])
 def test_scattered_models_have_exactly_the_wanted_number_of_vertices_on_one_surface(name, vertices):
-    model = load_model(load(name, vertices=vertices))
+    model = build_model(load(name, vertices=vertices))
     assert model.n_vertices == vertices
     assert model.facts.components == 1
     assert model.facts.border_loops == (2 if name == "ring" else 1)
@@ -132,7 +133,7 @@ def test_a_face_has_a_nose_above_its_cheeks_and_eyes_in_sockets():
 
 @pytest.mark.parametrize(("name", "least"), [("ring", 0.1), ("horseshoe", 0.2)])
 def test_hull_triangles_outside_the_outline_are_left_out_by_the_footprint(name, least):
-    model = load_model(load(name))
+    model = open_model(name)
     kept = np.ones(model.n_vertices, dtype=bool)
 
     def area(footprint):
@@ -151,7 +152,7 @@ def test_a_terrain_can_be_scattered_to_any_number_of_its_posts():
     for axis in (0, 1):  # the corners stay, so the terrain keeps its extent
         assert part.points[:, axis].min() == whole.points[:, axis].min()
         assert part.points[:, axis].max() == whole.points[:, axis].max()
-    assert load_model(part).facts.border_loops == 1
+    assert build_model(part).facts.border_loops == 1
 
 
 def test_parameters_by_keyword_win_over_spelled_ones():
@@ -199,28 +200,6 @@ def test_describe_lists_every_model_with_its_parameters():
     assert list(lines) == names()
     assert lines["face"].startswith("face:vertices=2500,seed=1,noise=0.08 - a synthetic scan of a face")
     assert all("\n" not in line and not line.endswith(".") for line in lines.values())
-
-
-def test_a_file_wins_over_a_built_in_of_its_name(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "roof").write_text("no mesh")
-    with pytest.raises(ModelError, match="unknown suffix"):
-        find_source("roof")
-    assert find_source("plane").name == "plane"
-
-
-def test_what_looks_like_a_file_is_looked_for_as_a_file(tmp_path):
-    with pytest.raises(ModelError, match=r"face\.ply: no such file"):
-        find_source("face.ply")
-    with pytest.raises(ModelError, match="no such file"):
-        find_source(str(tmp_path / "roof"))
-    with pytest.raises(ModelError, match=r"did you mean 'face'"):
-        find_source("fase:noise=0.5")
-
-
-def test_spacing_is_for_grids_in_files():
-    with pytest.raises(ModelError, match="roof: spacing, nodata, window and max_edge are for files"):
-        find_source("roof", spacing=2.0)
 
 
 def test_missing_sample_data_are_named(monkeypatch, tmp_path):

@@ -127,12 +127,12 @@ def test_options_of_reading_that_cannot_be_are_refused(cloud, capsys, argv):
 
 
 def test_what_does_not_fit_into_memory_is_one_line(monkeypatch, capsys):
-    import meshsimp_pymoo.datasets
+    import meshsimp_pymoo.opening
 
     def refuse(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(meshsimp_pymoo.datasets, "find_source", refuse)
+    monkeypatch.setattr(meshsimp_pymoo.opening, "open_source", refuse)
     assert run("info", "roof") == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "does not fit into memory" in line

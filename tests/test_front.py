@@ -34,11 +34,12 @@ from meshsimp_pymoo import (
     weighted_ga_v1,
 )
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.front import starting_front
 from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
-from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front, write_mesh
+from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
 from meshsimp_pymoo.surface.evaluate import simplify
 
 

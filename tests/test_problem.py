@@ -31,7 +31,8 @@ from meshsimp_pymoo import (
 )
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.problem import ThreadRunner
 from meshsimp_pymoo.surface import evaluate as error
 

@@ -13,7 +13,7 @@ import pytest
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo import MeshProblem, thinning
-from meshsimp_pymoo.problem import open_model
+from meshsimp_pymoo.opening import open_model
 
 
 @pytest.fixture(scope="module")

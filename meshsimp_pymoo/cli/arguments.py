@@ -9,29 +9,25 @@ import argparse
 import difflib
 import math
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
 from meshsimp_pymoo.errors import UsageError
+from meshsimp_pymoo.formats.table import read_suffixes, written_formats, written_suffixes
 from meshsimp_pymoo.search.presets import DEFAULT, PRESETS
 
-__all__ = ["DEFAULT_GENERATIONS", "FORMATS", "SHELLS", "make_parser"]
+__all__ = ["DEFAULT_GENERATIONS", "SHELLS", "make_parser"]
 
 # Four times the paper's budget: its 50 generations take a second at its sizes and leave much to gain.
 DEFAULT_GENERATIONS = 200
 # What --measure calls the errors that can be an objective.
 MEASURES = {"l1": "error", "rms": "rms_error", "max": "max_error"}
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}
-FORMATS = ("ply", "obj", "stl", "off", "glb", "landxml")
 SHELLS = ("bash", "zsh", "tcsh")
 
-MODELS = """\
-MODEL is a mesh (PLY, OBJ, STL, OFF, GLB, ...), a height grid (.npy, .npz, .asc,
-GeoTIFF), a point cloud (.xyz, .pts, .txt, .csv, LAS, LAZ) or a built-in model
-such as jacksboro:11, face:5000 or roof; `meshsimp info` lists the built-in ones.
-"""
 SIMPLIFY_EXAMPLES = """\
 examples:
   meshsimp simplify face.ply
@@ -99,6 +95,16 @@ examples:
 """
 
 
+def _models() -> str:
+    """Return what a model may be, for the end of a help."""
+    of_mesh, of_grid, of_cloud = (", ".join(read_suffixes(sort, further=False)) for sort in ("mesh", "grid", "cloud"))
+    text = (
+        f"MODEL is a mesh ({of_mesh}, ...), a height grid ({of_grid}), a point cloud ({of_cloud}) or a built-in model "
+        "such as jacksboro:11, face:5000 or roof; `meshsimp info` lists the built-in ones."
+    )
+    return textwrap.fill(text, 80) + "\n"
+
+
 class _Parser(argparse.ArgumentParser):
     """Raises instead of printing the usage and exiting, names its own help, and knows what was probably meant."""
 
@@ -155,7 +161,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="meshsimp",
         description="Simplify an open mesh: not to one mesh, but to the whole trade-off between accuracy and size.",
-        epilog=MODELS + "\n`meshsimp COMMAND --help` has examples of each command.\n",
+        epilog=_models() + "\n`meshsimp COMMAND --help` has examples of each command.\n",
     )
     parser.add_argument("--version", action=_Version, nargs=0, dest=argparse.SUPPRESS, help="show the version and exit")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
@@ -171,7 +177,7 @@ def _add_simplify(commands: Any) -> None:
         description="Find the front of simplified meshes of MODEL and write it to a new folder:\n"
         "report.html (the page to look and choose), front.csv (the numbers), meshes/ (one mesh\n"
         "per solution), front.png, front.npz, run.json, and the chosen mesh if one is asked for.",
-        epilog=SIMPLIFY_EXAMPLES + "\n" + MODELS,
+        epilog=SIMPLIFY_EXAMPLES + "\n" + _models(),
     )
     simplify.set_defaults(command=_command("simplify", "simplify"))
     simplify.add_argument("model", metavar="MODEL")
@@ -252,7 +258,11 @@ def _add_simplify(commands: Any) -> None:
 
     output = simplify.add_argument_group("what is written and shown")
     output.add_argument(
-        "--format", type=str.lower, choices=FORMATS, default="ply", help="of the meshes (default: %(default)s)"
+        "--format",
+        type=str.lower,
+        choices=list(written_formats()),
+        default="ply",
+        help="of the meshes (default: %(default)s)",
     )
     output.add_argument(
         "--meshes",
@@ -292,8 +302,7 @@ def _add_pick(commands: Any) -> None:
         "-o",
         "--output",
         metavar="FILE",
-        help=f"mesh to write; its suffix is its format: {', '.join(FORMATS[:-1])}, xml (LandXML) (default: nothing is "
-        "written)",
+        help=f"mesh to write; its suffix is its format: {', '.join(written_suffixes())} (default: nothing is written)",
     )
     pick.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
     pick.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
@@ -307,7 +316,7 @@ def _add_score(commands: Any) -> None:
         description="Measure OTHER, any simplified mesh of MODEL, by the error of this package: the sum,\n"
         "mean, RMS and maximum of the deviations at all vertices of MODEL, and how many of\n"
         "them no triangle covers.",
-        epilog=SCORE_EXAMPLES + "\n" + MODELS,
+        epilog=SCORE_EXAMPLES + "\n" + _models(),
     )
     score.set_defaults(command=_command("score", "score"))
     score.add_argument("model", metavar="MODEL", help="the original")
@@ -332,7 +341,7 @@ def _add_info(commands: Any) -> None:
         help="say what a model is and whether it can be simplified",
         description="Say what MODEL is, whether it is a height field, and what would be refused. Without a\n"
         "MODEL: list the built-in models.",
-        epilog=INFO_EXAMPLES + "\n" + MODELS,
+        epilog=INFO_EXAMPLES + "\n" + _models(),
     )
     info.set_defaults(command=_command("info", "info"))
     info.add_argument("model", metavar="MODEL", nargs="?")

@@ -22,13 +22,12 @@ def info(args: argparse.Namespace) -> int:
     import numpy as np
 
     from meshsimp_pymoo.errors import ModelError
-    from meshsimp_pymoo.surface.orient import front_patch, surface_facts, up_direction, upright_rotation
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.opening import open_source
+    from meshsimp_pymoo.settings import taken
+    from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
 
-    source = datasets.find_source(
-        args.model, spacing=args.spacing, nodata=args.nodata, window=args.window, max_edge=args.max_edge
-    )
-    if args.patch == "front":
-        source = front_patch(source, args.up)
+    source = open_source(args.model, taken(Options, None, dict(vars(args))))
     used = source.points[np.unique(source.faces)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     content: dict[str, Any] = {

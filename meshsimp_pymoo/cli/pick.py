@@ -10,14 +10,14 @@ from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
 from meshsimp_pymoo.cli.tiled import pick_tiled
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.files import claim_file
+from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.front import Front, FrontSolution
-from meshsimp_pymoo.storage import MESH_SUFFIXES
 from meshsimp_pymoo.tiles.output import is_tiled
 
 
 def pick(args: argparse.Namespace) -> int:
     """Say which solution of the front in ``args.front`` is meant, and write its mesh if a file is named."""
-    path = None if args.output is None else claim_file(args.output, MESH_SUFFIXES, overwrite=args.overwrite)
+    path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     if is_tiled(args.front):
         return pick_tiled(args, path)
     front = Front.load(args.front, model=args.model)

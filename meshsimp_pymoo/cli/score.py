@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from meshsimp_pymoo.cli.terminal import OK, described
-from meshsimp_pymoo.datasets import find_source
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.files import claim_file, new_file
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.front import Front
-from meshsimp_pymoo.problem import open_model
-from meshsimp_pymoo.surface.evaluate import mesh_deviation, mesh_quality
+from meshsimp_pymoo.opening import open_model, open_source
+from meshsimp_pymoo.settings import taken
+from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality
 
-PICTURES = ("png", "svg", "pdf")
+PICTURES = (".png", ".svg", ".pdf")
 # A mesh of the front itself, measured from its file, differs by less.
 ROUNDING = 1e-9
 
@@ -24,15 +25,7 @@ ROUNDING = 1e-9
 def score(args: argparse.Namespace) -> int:
     """Measure ``args.other`` against ``args.model``, place it against a front, and draw its error."""
     path = None if args.output is None else claim_file(args.output, PICTURES, overwrite=args.overwrite)
-    model = open_model(
-        args.model,
-        up=args.up,
-        patch=args.patch,
-        spacing=args.spacing,
-        nodata=args.nodata,
-        window=args.window,
-        max_edge=args.max_edge,
-    )
+    model = open_model(args.model, taken(Options, None, dict(vars(args))))
     if args.weights is not None:
         model = model.with_weights(args.weights)
     front = None if args.front is None else Front.load(args.front, model=model)
@@ -43,7 +36,7 @@ def score(args: argparse.Namespace) -> int:
         )
     if front is not None:
         model = front.model  # with the weights of the front
-    other = find_source(args.other)
+    other = open_source(args.other)
     try:
         quality = mesh_quality(model, other.points, other.faces, outside=outside)
     except ValueError as problem:

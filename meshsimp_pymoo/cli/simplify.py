@@ -32,6 +32,8 @@ from meshsimp_pymoo.cli.terminal import (
 from meshsimp_pymoo.cli.tiled import simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
+from meshsimp_pymoo.formats.source.precision import shared_frame
+from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.checkpoint import (
@@ -47,10 +49,7 @@ from meshsimp_pymoo.storage import (
     CHECKPOINT,
     claim_output,
     is_unfinished,
-    local_origin,
-    mesh_suffix,
     package_versions,
-    refuse_format,
 )
 
 # What of the command line does not decide the results.
@@ -84,7 +83,7 @@ def simplify(args: argparse.Namespace) -> int:
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     folder = _claim(args)
     problem = _mesh_problem(args)
-    refuse_format(problem.model, args.format)
+    format_to_write(args.format).check(problem.model)
     _refuse_impossible(args, problem)
     with _Kept(args, folder, problem) as kept:
         return _search_and_write(args, folder, problem, kept)
@@ -355,8 +354,9 @@ def _choose(args: argparse.Namespace, front: Front) -> tuple[FrontSolution | Non
 
 def _summarise(args: argparse.Namespace, problem: MeshProblem, found: _Found, chosen: FrontSolution | None) -> None:
     model, quality, folder = problem.model, found.front.quality, Path(args.output)
-    chosen_path = None if chosen is None else str(folder / f"chosen.{mesh_suffix(args.format)}")
-    origin = local_origin(model.file_points).tolist() if args.format == "glb" else [0.0, 0.0, 0.0]
+    kind = format_to_write(args.format)
+    chosen_path = None if chosen is None else str(folder / f"chosen{kind.suffix}")
+    origin = shared_frame(kind, model.file_points, name=model.name, georeference={})["origin"].tolist()
     if args.json:
         summary = {
             "model": {

@@ -14,8 +14,11 @@ from typing import Any
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
 from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.search.presets import DEFAULT
-from meshsimp_pymoo.storage import claim_output, mesh_suffix, refuse_format
+from meshsimp_pymoo.settings import taken
+from meshsimp_pymoo.storage import claim_output
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
 from meshsimp_pymoo.tiles.grid import HeightGrid, count_samples, open_grid
 from meshsimp_pymoo.tiles.memory import check_memory
@@ -61,9 +64,9 @@ def simplify_tiled(args: argparse.Namespace) -> int:
     restore(Path(args.output))
     out = _claim(args)
     start = time.perf_counter()
-    grid = open_grid(args.model, spacing=args.spacing, nodata=args.nodata, window=args.window, up=args.up)
+    grid = open_grid(args.model, taken(Options, None, dict(vars(args))))
     if grid.model is not None:
-        refuse_format(grid.model, args.format)
+        format_to_write(args.format).check(grid.model)
     tile = args.tile or TILE
     most = max(args.triangles or 2, usual_most(grid))
     jobs = args.jobs or os.cpu_count() or 1
@@ -198,7 +201,7 @@ def _forget_other(work: Path, what: dict[str, Any]) -> None:
 def pick_tiled(args: argparse.Namespace, path: Path | None) -> int:
     """Say which solution of a tiled front is meant, and write its mesh if a file is named."""
     stored, options = stored_model(args.front)
-    grid = open_grid(args.model or stored, **options)
+    grid = open_grid(args.model or stored, options)
     front = read_tiled_front(args.front, grid)
     wish = argparse.Namespace(**vars(args) | {"pick": "knee" if args.knee else None})
     if args.solution is not None:
@@ -253,7 +256,7 @@ def _choose(args: argparse.Namespace, front: TiledFront, threads: int) -> tuple[
 def _summarise(args: argparse.Namespace, out: Path, front: TiledFront, chosen: int | None, seconds: float) -> None:
     grid, quality = front.grid, front.quality
     solution = None if chosen is None else len(front) - 1 - chosen
-    path = str(out / "chosen") if args.pieces else str(out / f"chosen.{mesh_suffix(args.format)}")
+    path = str(out / "chosen") if args.pieces else str(out / f"chosen{format_to_write(args.format).suffix}")
     if args.json:
         summary = {
             "model": {

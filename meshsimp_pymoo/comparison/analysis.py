@@ -39,9 +39,10 @@ from dataclasses import dataclass, replace
 
 import moocore
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.indicators import (
     cardinality,
     coverage,
@@ -78,8 +79,6 @@ __all__ = [
     "vargha_delaney",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Runs = Mapping[str, Mapping[int, ArrayLike]]
 
 # The paper's level of significance, and the coverage from which one run counts as dominating another.

@@ -13,19 +13,18 @@ import threading
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, reason_of, warn_of
-from meshsimp_pymoo.files import DEFLATE_LIMIT, UNPACKED_LIMIT
-from meshsimp_pymoo.formats.load import SourceMesh, Window, check_window, grid_mesh
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import Format, register
 
-__all__ = ["RasterHeights", "count_raster_samples", "read_raster"]
+if TYPE_CHECKING:
+    import numpy as np
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+    from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
+    from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.formats.source.heights import PlacedHeights
 
 # rasterio logs what GDAL says; without a handler Python would print that to stderr.
 logging.getLogger("rasterio").addHandler(logging.NullHandler())
@@ -40,13 +39,7 @@ CACHE_MEGABYTES = 128
 BAND_SAMPLES = 2_000_000
 
 
-def read_raster(
-    path: Path,
-    name: str,
-    steps: tuple[float, float] | None,
-    nodata: float | None,
-    window: Window | None,
-) -> SourceMesh:
+def _read(path: Path, name: str, options: Options) -> SourceMesh:
     """Read the one band of a GeoTIFF as a triangle mesh.
 
     A sample lies at the middle of its pixel, at the place that the raster's transform says; rotated and mirrored
@@ -59,12 +52,10 @@ def read_raster(
         The file.
     name : str
         What messages call it.
-    steps : (dx, dy), optional
-        Distance between columns and rows in place of the transform's; the raster's north-west corner stays.
-    nodata : float, optional
-        Height that marks missing samples in place of what the file says, before scale and offset.
-    window : (column, row, columns, rows), optional
-        The part to take.
+    options : Options
+        ``spacing`` is the distance between columns and rows in place of the transform's; the raster's north-west corner
+        stays. ``nodata`` marks missing samples in place of what the file says, before scale and offset. ``window`` is
+        the part to take.
 
     Returns
     -------
@@ -83,8 +74,38 @@ def read_raster(
     ModelWarning
         If its coordinates are degrees.
     """
+    from meshsimp_pymoo.formats.source.heights import check_window, grid_mesh, steps_of
+
+    steps = steps_of(options.spacing, name)
     with _opened(path, name) as raster:
-        return _band_mesh(raster, path.stat().st_size, name, steps, nodata, window)
+        kind, shape = _checked_band(raster, name)
+        column, row, columns, rows = check_window(options.window, shape, name)
+        _check_size(raster, kind, (columns, rows), path.stat().st_size, name)
+        place, mirrored = _placement(raster, steps, name)
+        height, hidden, missing = _read_part(raster, (column, row, columns, rows), options.nodata)
+        return grid_mesh(
+            height,
+            hidden,
+            place,
+            nodata=missing,
+            name=name,
+            corner=(row, column),
+            file_columns=shape[1],
+            mirrored=mirrored,
+            georeference=_georeference(raster, name) | {"window": [column, row, columns, rows]},
+        )
+
+
+def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
+    from meshsimp_pymoo.formats.source.heights import PlacedHeights
+
+    found = RasterHeights(path, name, options)
+    return PlacedHeights(found, found.x, found.y, None, found.corner, found.file_columns, found.georeference)
+
+
+def _count_samples(path: Path, name: str) -> int:
+    with _opened(path, name) as raster:
+        return int(raster.width) * int(raster.height)
 
 
 class RasterHeights:
@@ -95,8 +116,8 @@ class RasterHeights:
 
     Parameters
     ----------
-    path, name, steps, nodata, window
-        As in :func:`read_raster`.
+    path, name, options
+        As a format's ``open_heights`` has them.
 
     Attributes
     ----------
@@ -105,13 +126,13 @@ class RasterHeights:
     dtype : numpy dtype
         float64.
     x, y : (columns,), (rows,) float arrays
-        Where the columns and rows lie, as :func:`read_raster` places them [file units].
+        Where the columns and rows lie, as in the mesh that is made of the raster [file units].
     corner : (int, int)
         Row and column of the part in the raster.
     file_columns : int
         Columns of the whole raster.
     georeference : dict
-        See :func:`read_raster`.
+        As that of the mesh.
 
     Raises
     ------
@@ -120,22 +141,20 @@ class RasterHeights:
         north to south along the axes. Later, if a part of it cannot be read.
     """
 
-    dtype = np.dtype(np.float64)
     ndim = 2
 
-    def __init__(
-        self,
-        path: Path,
-        name: str,
-        steps: tuple[float, float] | None = None,
-        nodata: float | None = None,
-        window: Window | None = None,
-    ) -> None:
+    def __init__(self, path: Path, name: str, options: Options) -> None:
+        import numpy as np
+
+        from meshsimp_pymoo.formats.source.heights import check_window, steps_of
+
+        self.dtype = np.dtype(np.float64)
+        steps = steps_of(options.spacing, name)
         self.path, self.name = path, name
         self._lock = threading.Lock()
         with _opened(path, name, keep=True) as raster:
             kind, shape = _checked_band(raster, name)
-            column, row, columns, rows = check_window(window, shape, name)
+            column, row, columns, rows = check_window(options.window, shape, name)
             _check_size(raster, kind, (columns, rows), path.stat().st_size, name, by_windows=True)
             place, mirrored = _placement(raster, steps, name)
             a, b, _, d = tuple(raster.transform)[:4]
@@ -151,9 +170,11 @@ class RasterHeights:
             self.x: FloatArray = np.asarray(place(np.int64(row), j)[0], np.float64)
             self.y: FloatArray = np.asarray(place(i, np.int64(column))[1], np.float64)
             self.georeference = _georeference(raster, name) | {"window": [column, row, columns, rows]}
-            self._raster, self._nodata = raster, nodata
+            self._raster, self._nodata = raster, options.nodata
 
     def __getitem__(self, key: Any) -> FloatArray:
+        import numpy as np
+
         rows, columns = key if isinstance(key, tuple) else (key, slice(None))
         if isinstance(rows, slice) and isinstance(columns, slice):
             top, bottom, _ = rows.indices(self.shape[0])
@@ -165,15 +186,17 @@ class RasterHeights:
         part = (self.corner[1] + left, self.corner[0] + top, right - left, bottom - top)
         with self._lock, _guarded(self.name), _environment():
             height, hidden, missing = _read_part(self._raster, part, self._nodata)
-        values = height.astype(np.float64)
+        values: FloatArray = height.astype(self.dtype)
         if missing is not None:
             # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
             hidden |= height == (height.dtype.type(missing) if height.dtype.kind == "f" else missing)
-        values[hidden] = np.nan
+        values[hidden] = math.nan
         return values
 
     def _scattered(self, rows: IntArray, columns: IntArray) -> FloatArray:
         """Return the heights at samples in any order, band by band."""
+        import numpy as np
+
         values = np.empty(rows.shape)
         step = max(1, BAND_SAMPLES // self.shape[1])
         order = np.argsort(rows, kind="stable")
@@ -188,18 +211,6 @@ class RasterHeights:
         return values
 
 
-def count_raster_samples(path: Path, name: str) -> int:
-    """Return rows times columns of a GeoTIFF, from its header alone.
-
-    Raises
-    ------
-    ModelError
-        If rasterio is not installed, or the file is no GeoTIFF.
-    """
-    with _opened(path, name) as raster:
-        return int(raster.width) * int(raster.height)
-
-
 def _environment() -> Any:
     import rasterio
 
@@ -209,11 +220,9 @@ def _environment() -> Any:
 @contextlib.contextmanager
 def _guarded(name: str) -> Iterator[None]:
     """Say in one line what GDAL and rasterio say, and ignore their warnings."""
-    try:
-        import rasterio  # noqa: F401 - its parts may have been imported where it is missing now
-        from rasterio.errors import NotGeoreferencedWarning
-    except ImportError:
-        raise ModelError(f"{name}: GeoTIFF needs rasterio; install it by pip install 'meshsimp-pymoo[geo]'") from None
+    import rasterio  # noqa: F401 - its parts may have been imported where it is missing now
+    from rasterio.errors import NotGeoreferencedWarning
+
     try:
         with warnings.catch_warnings():
             for kind in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
@@ -241,34 +250,10 @@ def _opened(path: Path, name: str, *, keep: bool = False) -> Iterator[Any]:
             raster.close()
 
 
-def _band_mesh(
-    raster: Any,
-    file_size: int,
-    name: str,
-    steps: tuple[float, float] | None,
-    nodata: float | None,
-    window: Window | None,
-) -> SourceMesh:
-    kind, shape = _checked_band(raster, name)
-    column, row, columns, rows = check_window(window, shape, name)
-    _check_size(raster, kind, (columns, rows), file_size, name)
-    place, mirrored = _placement(raster, steps, name)
-    height, hidden, missing = _read_part(raster, (column, row, columns, rows), nodata)
-    return grid_mesh(
-        height,
-        hidden,
-        place,
-        nodata=missing,
-        name=name,
-        corner=(row, column),
-        file_columns=shape[1],
-        mirrored=mirrored,
-        georeference=_georeference(raster, name) | {"window": [column, row, columns, rows]},
-    )
-
-
 def _checked_band(raster: Any, name: str) -> tuple[np.dtype[Any], tuple[int, int]]:
     """Return the type of the heights and the rows and columns, if they are one band of real numbers."""
+    import numpy as np
+
     if raster.count != 1:
         raise ModelError(
             f"{name}: has {raster.count} bands; heights are one band: take it out (gdal_translate -b 1, say)"
@@ -281,8 +266,9 @@ def _checked_band(raster: Any, name: str) -> tuple[np.dtype[Any], tuple[int, int
 
 def _read_part(
     raster: Any, part: tuple[int, int, int, int], nodata: float | None
-) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_], float | None]:
+) -> tuple[AnyArray, BoolArray, float | None]:
     """Read (column, row, columns, rows): heights, which are hidden, and the height that means "no sample" besides."""
+    import numpy as np
     from rasterio.enums import MaskFlags
     from rasterio.windows import Window as Part
 
@@ -315,6 +301,8 @@ def _check_size(
     by_windows: bool = False,
 ) -> None:
     """Refuse what no file of this size can hold, before anything is allocated; read by windows it may be larger."""
+    from meshsimp_pymoo.files import DEFLATE_LIMIT, UNPACKED_LIMIT
+
     credible = max(UNPACKED_FLOOR, DEFLATE_LIMIT * file_size)
     blocks = [(raster.width, raster.height)] if raster.compression is None else []
     # a strip or tile is unpacked whole, however small the window is
@@ -344,7 +332,7 @@ def _placement(raster: Any, steps: tuple[float, float] | None, name: str) -> tup
             raise ModelError(f"{name}: the spacing is {steps}; give positive numbers")
         a, e = steps[0], -steps[1]
 
-    def place(row: npt.NDArray[np.int64], column: npt.NDArray[np.int64]) -> tuple[Any, Any]:
+    def place(row: IntArray, column: IntArray) -> tuple[Any, Any]:
         i, j = row + 0.5, column + 0.5
         return c + (a * j + b * i), f + (d * j + e * i)
 
@@ -367,3 +355,17 @@ def _georeference(raster: Any, name: str) -> dict[str, Any]:
                 "shapes in metres project it first (gdalwarp -t_srs)"
             )
     return facts
+
+
+register(
+    Format(
+        "geotiff",
+        (".tif", ".tiff"),
+        "GeoTIFF",
+        "grid",
+        read=_read,
+        extra="geo",
+        open_heights=_open_heights,
+        count_samples=_count_samples,
+    )
+)

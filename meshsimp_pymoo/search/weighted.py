@@ -120,6 +120,11 @@ class WeightedSum(Problem):
         return self.problem.pinned
 
     @property
+    def surface(self) -> Any:
+        """What a chromosome means to the inner problem."""
+        return self.problem.surface
+
+    @property
     def model(self) -> Any:
         """The inner problem's model."""
         return self.problem.model

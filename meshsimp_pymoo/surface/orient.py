@@ -19,11 +19,11 @@ from numba import njit
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import FloatArray, IntArray, SourceMesh
+from meshsimp_pymoo.formats.source import SourceMesh
 
 Up = str | Sequence[float] | FloatArray
-BoolArray = npt.NDArray[np.bool_]
 
 # up="auto" prefers an axis that sees at least this share of the area the best direction sees (within 21.6
 # degrees).
@@ -104,7 +104,7 @@ def up_direction(source: SourceMesh, up: Up = "auto") -> FloatArray:
 
     Examples
     --------
-    >>> from meshsimp_pymoo.formats.load import grid_source
+    >>> from meshsimp_pymoo.formats.source.heights import grid_source
     >>> up_direction(grid_source([[0.0, 1.0], [2.0, 5.0]]))
     array([0., 0., 1.])
     """
@@ -187,7 +187,7 @@ class SurfaceFacts:
     Parameters
     ----------
     name : str
-        As in :class:`~meshsimp_pymoo.formats.load.SourceMesh`.
+        As in :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
     n_vertices, n_faces : int
         Vertices that faces use, and faces.
     unused_vertices : int

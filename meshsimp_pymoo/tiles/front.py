@@ -26,7 +26,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -34,17 +34,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import new_file
-from meshsimp_pymoo.surface.evaluate import Quality
+from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
 from meshsimp_pymoo.tiles.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
 from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.thin import Tile, thin_tile
 from meshsimp_pymoo.tiles.weld import measure, weld
 from meshsimp_pymoo.workers import Engine, Serial
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: Samples along one side of a tile.
 TILE = 512
@@ -457,9 +455,7 @@ def cut_axis(n: int, tile: int, shift: float, stride: int = 1) -> IntArray:
 class _Work:
     """One call's work on a grid."""
 
-    def __init__(
-        self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | Memory, progress: Progress
-    ) -> None:
+    def __init__(self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | Memory, progress: Progress) -> None:
         self.grid = grid
         self.tile = tile
         self.engine = engine
@@ -474,11 +470,7 @@ class _Work:
     def boxes(self, shift: float, stride: int) -> list[tuple[int, int, int, int]]:
         """Return first and last row, first and last column of each tile."""
         rows, columns = (cut_axis(n, self.tile, shift, stride).tolist() for n in self.grid.shape)
-        return [
-            (top, bottom, left, right)
-            for top, bottom in pairwise(rows)
-            for left, right in pairwise(columns)
-        ]
+        return [(top, bottom, left, right) for top, bottom in pairwise(rows) for left, right in pairwise(columns)]
 
     def task(self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None) -> Tile:
         """Return what a tile's task needs to know."""
@@ -596,9 +588,7 @@ class _Work:
             return moved
         coarse = CoarseGrid(self.grid)
         missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
-        tasks = (
-            coarse.task(solutions[k], int(_weight(self.grid, solutions[k]).sum()) - 2) for k in missing
-        )
+        tasks = (coarse.task(solutions[k], int(_weight(self.grid, solutions[k]).sum()) - 2) for k in missing)
         for place, rows in self.engine.each(_move, tasks):
             self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
@@ -617,11 +607,9 @@ class _Work:
             stored = self.store.get(name)
             if stored is None:
                 q = measure(self.grid, weld(self.grid, kept), n_threads=threads)
-                numbers = (q.error, q.triangles, q.vertices, q.mean_error, q.rms_error, q.max_error, q.uncovered)
-                self.store.put(name, numbers=np.array(numbers, np.float64))
+                self.store.put(name, numbers=np.array(list(asdict(q).values()), np.float64))
             else:
-                error, triangles, vertices, mean, rms, most, uncovered = stored["numbers"].tolist()
-                q = Quality(error, int(triangles), int(vertices), mean, rms, most, int(uncovered))
+                q = quality_of(zip(MEASURES, stored["numbers"].tolist(), strict=True))
             quality.append(q)
             self.progress(0.8 + 0.2 * (k + 1) / len(solutions), f"solution {k + 1} of {len(solutions)} measured")
         return quality

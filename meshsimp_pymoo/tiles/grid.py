@@ -4,43 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.datasets import find_source
+from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, NoFullGrid
-from meshsimp_pymoo.formats.load import RASTER_SUFFIXES, Window, check_window
+from meshsimp_pymoo.formats.options import Options, Window
+from meshsimp_pymoo.formats.source.heights import Heights, PlacedHeights, placed_heights
+from meshsimp_pymoo.formats.table import format_of_input, guarded, refuse_foreign
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.surface.model import OpenModel, build_model
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from meshsimp_pymoo.settings import settings_of, taken
+from meshsimp_pymoo.surface.model import OpenModel
 
 # Samples that are looked at together where all are: some tens of megabytes.
 BAND_SAMPLES = 2_000_000
-# The lines of an ESRI ASCII grid that say what it is are the first few hundred bytes.
-HEADER_BYTES = 2000
-
-
-class Heights(Protocol):
-    """An array of two dimensions, or what is read like one: by slices, or by arrays of rows and columns."""
-
-    @property
-    def shape(self) -> Any:
-        """Rows and columns."""
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Type of the heights."""
-
-    def __getitem__(self, key: Any) -> Any: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +31,7 @@ class HeightGrid:
     """Heights at the crossings of rows and columns.
 
     A sample's number is ``row * columns + column``. Its place in the plane is the one that
-    :func:`~meshsimp_pymoo.surface.model.load_model` would give it, so that triangulations are the same too.
+    :func:`~meshsimp_pymoo.surface.model.build_model` would give it, so that triangulations are the same too.
 
     Attributes
     ----------
@@ -71,7 +54,7 @@ class HeightGrid:
     file_columns : int, optional
         Columns of the file; None: those of the grid.
     georeference : dict
-        Where on Earth it is, as far as the file says; see :class:`~meshsimp_pymoo.formats.load.SourceMesh`.
+        Where on Earth it is, as far as the file says; see :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
     """
 
     name: str
@@ -177,7 +160,7 @@ class HeightGrid:
         rows, columns = np.divmod(samples, self.shape[1])
         return np.column_stack([self.file_x[columns], self.file_y[rows], self.height_at(samples)])
 
-    def attributes_at(self, samples: IntArray) -> dict[str, npt.NDArray[Any]]:
+    def attributes_at(self, samples: IntArray) -> dict[str, AnyArray]:
         """Return colours and whatever else the file says of samples."""
         if self.model is None or self.row_of is None:
             return {}
@@ -219,11 +202,8 @@ class HeightGrid:
 
 def open_grid(
     model: str | os.PathLike[str] | npt.ArrayLike | OpenModel | HeightGrid,
-    *,
-    spacing: float | tuple[float, float] | None = None,
-    nodata: float | None = None,
-    window: Window | None = None,
-    up: Any = "auto",
+    options: Options | None = None,
+    **kwargs: Any,
 ) -> HeightGrid:
     """Open a height grid for work by tiles.
 
@@ -232,35 +212,35 @@ def open_grid(
     model : path, built-in name, (R, C) array, OpenModel or HeightGrid
         A ``.npy`` file is mapped into memory and a GeoTIFF opened, and both are read by windows only; any other file is
         read whole first. A model's vertices must be all the crossings of rows and columns, and nothing else.
-    spacing : float or (dx, dy), optional
-        Distances of the samples; those of the file, or 1, by default [units].
-    nodata : float, optional
-        Height that means "no sample"; where there is one, the grid is refused.
-    window : (column, row, columns, rows), optional
-        The part to take; places and rows stay those of the whole file.
-    up : optional
-        Direction of the height, for meshes; see :func:`~meshsimp_pymoo.surface.model.load_model`.
+    options : Options, optional
+        How it is read; a grid with samples of the height ``nodata`` is refused.
+    **kwargs
+        Settings of :class:`~meshsimp_pymoo.formats.options.Options` that differ from those, such as ``spacing``.
 
     Raises
     ------
     ModelError
         If it cannot be read or is no such grid.
     """
+    options = taken(Options, options, kwargs)
+    if kwargs:
+        raise TypeError(f"open_grid has no argument {next(iter(kwargs))!r}; it takes {', '.join(settings_of(Options))}")
     if isinstance(model, HeightGrid):
         return model
     if isinstance(model, OpenModel):
         return _grid_of_model(model)
     if not isinstance(model, (str, os.PathLike)):
-        return _grid_of_array(np.asanyarray(model), "grid", spacing, nodata, window)
+        return _grid_of_heights("grid", placed_heights(np.asanyarray(model), "grid", options))
     path = Path(model)
-    by_windows = path.suffix.lower() in (".npy", *RASTER_SUFFIXES) and path.is_file()
-    if by_windows and up not in ("auto", "z", "+z"):
-        raise ModelError(f"{path}: heights of a grid are along z; leave up={up!r} out")
-    if by_windows and path.suffix.lower() == ".npy":
-        return _grid_of_array(_map_array(path), str(path), spacing, nodata, window)
-    if by_windows:
-        return _grid_of_raster(path, spacing, nodata, window)
-    return _grid_of_model(build_model(find_source(model, spacing=spacing, nodata=nodata, window=window), up=up))
+    kind = format_of_input(path)
+    if kind is None or kind.open_heights is None or not path.is_file():
+        return _grid_of_model(open_model(model, options))
+    if options.up not in ("auto", "z", "+z"):
+        raise ModelError(f"{path}: heights of a grid are along z; leave up={options.up!r} out")
+    name = str(path)
+    refuse_foreign(name, kind.sort, options)
+    with guarded(kind, name):
+        return _grid_of_heights(name, kind.open_heights(path, name, options))
 
 
 def count_samples(model: str | os.PathLike[str], *, window: Window | None = None) -> int | None:
@@ -269,101 +249,31 @@ def count_samples(model: str | os.PathLike[str], *, window: Window | None = None
     Parameters
     ----------
     model : path
-        A ``.npy``, ``.asc``, ``.tif`` or ``.tiff`` file.
+        A file whose format knows how to count them, such as ``.npy`` or ``.tif``.
     window : (column, row, columns, rows), optional
         The part.
     """
     path = Path(model)
-    suffix = path.suffix.lower()
-    if suffix not in (".npy", ".asc", *RASTER_SUFFIXES) or not path.is_file():
+    kind = format_of_input(path)
+    if kind is None or kind.count_samples is None or not path.is_file():
         return None
     if window is not None:
         return int(window[2]) * int(window[3])
-    if suffix == ".npy":
-        return int(_map_array(path).size)
-    if suffix in RASTER_SUFFIXES:
-        from meshsimp_pymoo.formats.geotiff import count_raster_samples
-
-        return count_raster_samples(path, str(path))
-    with path.open("rb") as file:
-        header = file.read(HEADER_BYTES).decode("utf-8", errors="replace").lower()
-    sizes = [re.search(rf"^[ \t]*{key}[ \t]+(\d+)", header, re.MULTILINE) for key in ("nrows", "ncols")]
-    return int(sizes[0][1]) * int(sizes[1][1]) if sizes[0] and sizes[1] else None
+    with guarded(kind, str(path)):
+        return kind.count_samples(path, str(path))
 
 
-def _map_array(path: Path) -> npt.NDArray[Any]:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about the header's spelling
-            heights = np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as problem:  # its header is Python text: anything may break
-        reason = str(problem).strip().splitlines()
-        raise ModelError(
-            f"{path}: is not a whole NumPy array file ({reason[0] if reason else type(problem).__name__}); "
-            "save or copy it again"
-        ) from None
-    if not isinstance(heights, np.ndarray):
-        raise ModelError(f"{path}: holds several arrays; save the heights alone with numpy.save")
-    return heights
-
-
-def _grid_of_array(
-    heights: npt.NDArray[Any],
-    name: str,
-    spacing: float | tuple[float, float] | None,
-    nodata: float | None,
-    window: Window | None = None,
-) -> HeightGrid:
-    if isinstance(heights, np.ma.MaskedArray):
-        if np.ma.getmaskarray(heights).any():
-            raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
-        heights = heights.data
-    if heights.dtype.kind not in "iuf":
-        raise ModelError(f"{name}: heights have the type {heights.dtype}; give real numbers")
-    if heights.ndim != 2 or min(heights.shape) < 2:
-        raise ModelError(f"{name}: heights have the shape {heights.shape}; give a grid of at least 2 x 2")
-    dx, dy = _steps(name, spacing) or (1.0, 1.0)
-    for label, step in (("dx", dx), ("dy", dy)):
-        if not (np.isfinite(step) and step > 0):
-            raise ModelError(f"{name}: the spacing {label} is {step}; give a positive number")
-    column, row, columns, rows = check_window(window, heights.shape, name)
+def _grid_of_heights(name: str, found: PlacedHeights) -> HeightGrid:
     return HeightGrid(
         name,
-        heights[row : row + rows, column : column + columns],
-        np.arange(column, column + columns, dtype=np.float64) * dx,
-        0.0 - np.arange(row, row + rows, dtype=np.float64) * dy,
-        nodata=nodata,
-        corner=(row, column),
-        file_columns=heights.shape[1],
+        found.heights,
+        found.x,
+        found.y,
+        nodata=found.nodata,
+        corner=found.corner,
+        file_columns=found.file_columns,
+        georeference=found.georeference,
     )
-
-
-def _grid_of_raster(
-    path: Path, spacing: float | tuple[float, float] | None, nodata: float | None, window: Window | None
-) -> HeightGrid:
-    from meshsimp_pymoo.formats.geotiff import RasterHeights
-
-    heights = RasterHeights(path, str(path), _steps(str(path), spacing), nodata, window)
-    return HeightGrid(
-        str(path),
-        heights,
-        heights.x,
-        heights.y,
-        corner=heights.corner,
-        file_columns=heights.file_columns,
-        georeference=heights.georeference,
-    )
-
-
-def _steps(name: str, spacing: float | tuple[float, float] | None) -> tuple[float, float] | None:
-    """Return the distances of columns and rows."""
-    if spacing is None:
-        return None
-    try:
-        dx, dy = np.broadcast_to(np.asarray(spacing, np.float64), 2).tolist()
-    except ValueError:
-        raise ModelError(f"{name}: the spacing is {spacing!r}; give one number or (dx, dy)") from None
-    return dx, dy
 
 
 def _grid_of_model(model: OpenModel) -> HeightGrid:

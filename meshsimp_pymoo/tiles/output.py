@@ -28,24 +28,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
+from meshsimp_pymoo.formats.table import Format, format_of_output, format_to_write, write_mesh
 from meshsimp_pymoo.storage import (
     FRONT_COLUMNS,
-    MESH_FORMATS,
     MESHES_BY_DEFAULT,
     even_selection,
-    local_origin,
-    mesh_suffix,
     package_versions,
     read_front_csv,
-    refuse_format,
-    single_precision_shift,
     spelled_value,
-    warn_of_shift,
-    write_mesh,
 )
 from meshsimp_pymoo.tiles.front import TiledFront
 from meshsimp_pymoo.tiles.grid import HeightGrid
@@ -53,6 +49,8 @@ from meshsimp_pymoo.tiles.weld import WeldedMesh, pieces, weld
 
 NESTED_FILE = "nested.npz"
 WORK = "tiles"
+# What of how a grid is read the record of its front says.
+RECORDED = ("spacing", "nodata", "window", "up")
 WAY_OUT = "what is finished stays there: mend that, and the same call goes on"
 
 
@@ -78,7 +76,7 @@ def write_tiled_front(
     meshes : int or None
         The most meshes to write, an even selection; None: all.
     mesh_format : str
-        One of `meshsimp_pymoo.storage.MESH_FORMATS`.
+        A name out of :func:`~meshsimp_pymoo.formats.table.written_formats`.
     chosen : int, optional
         Solution of ``front`` to write as ``chosen`` too.
     piece_size : int, optional
@@ -93,12 +91,11 @@ def write_tiled_front(
     ResultError
         If the folder cannot be written.
     """
-    if mesh_format not in MESH_FORMATS:
-        raise ValueError(f"mesh_format is {mesh_format!r}; it must be one of {', '.join(MESH_FORMATS)}")
+    kind = format_to_write(mesh_format)
     grid, count = front.grid, len(front)
     if grid.model is not None:
-        refuse_format(grid.model, mesh_format)
-    suffix, look = mesh_suffix(mesh_format), _frame(front, mesh_format)
+        kind.check(grid.model)
+    look = _frame(front, kind)
     target = Path(folder).resolve()
     with new_folder(folder, replace=True, way_out=WAY_OUT) as partial:
         with_mesh = set(even_selection(count, meshes))
@@ -113,14 +110,14 @@ def write_tiled_front(
             if solution in with_mesh or row == chosen:
                 mesh = weld(grid, front.kept(row))
                 if solution in with_mesh:
-                    path = f"meshes/{solution:0{digits}}_{quality.triangles}.{suffix}"
+                    path = f"meshes/{solution:0{digits}}_{quality.triangles}{kind.suffix}"
                     _write(partial / path, grid, mesh.samples, mesh.faces, look)
                 if row == chosen:
-                    _write_chosen(partial, grid, mesh, suffix, piece_size, look)
+                    _write_chosen(partial, grid, mesh, kind.suffix, piece_size, look)
             numbers = [spelled_value(column, getattr(quality, column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path])
         if with_mesh or chosen is not None:
-            _warn(front, mesh_format)
+            _warn(front, kind)
         write_csv(partial / "front.csv", FRONT_COLUMNS, rows)
         moved = [np.empty(0, np.int64) if new is None else grid.source_rows(new) for new in front.moved[::-1]]
         write_npz(
@@ -173,46 +170,43 @@ def clear_up(folder: Path) -> None:
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def _frame(front: TiledFront, mesh_format: str) -> dict[str, Any]:
-    """Return what `write_mesh` is to know of a grid's frame; all meshes of a front have one origin."""
+def _frame(front: TiledFront, kind: Format) -> dict[str, Any]:
     grid = front.grid
-    origin = local_origin(grid.file_points(front.samples)) if mesh_format == "glb" else np.zeros(3)
-    return {"origin": origin, "georeference": grid.georeference, "name": Path(grid.name).stem}
+    points = grid.file_points(front.samples) if kind.states_origin else np.empty((0, 3))
+    return shared_frame(kind, points, name=grid.name, georeference=grid.georeference)
 
 
-def _warn(front: TiledFront, mesh_format: str) -> None:
-    if mesh_format != "stl":
+def _warn(front: TiledFront, kind: Format) -> None:
+    if not kind.single_precision:
         return
     points = front.grid.file_points(front.samples)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    warn_of_shift(front.grid.name, diagonal, mesh_format, single_precision_shift(points))
+    warn_of_shift(kind, front.grid.name, diagonal, single_precision_shift(points))
 
 
 def _write_chosen(
     folder: Path, grid: HeightGrid, mesh: WeldedMesh, suffix: str, piece_size: int | None, look: dict[str, Any]
 ) -> None:
     if piece_size is None:
-        _write(folder / f"chosen.{suffix}", grid, mesh.samples, mesh.faces, look)
+        _write(folder / f"chosen{suffix}", grid, mesh.samples, mesh.faces, look)
         return
     (folder / "chosen").mkdir()
     for row, column, samples, faces in pieces(grid, mesh, piece_size):
-        _write(folder / "chosen" / f"{row:03}_{column:03}.{suffix}", grid, samples, faces, look)
+        _write(folder / "chosen" / f"{row:03}_{column:03}{suffix}", grid, samples, faces, look)
 
 
 def write_welded(path: Path, front: TiledFront, row: int) -> None:
     """Write the mesh of a solution in the format of the path's suffix, all or nothing."""
-    mesh_format = path.suffix.lower().lstrip(".")
+    kind = format_of_output(path)
     if front.grid.model is not None:
-        refuse_format(front.grid.model, mesh_format)
+        kind.check(front.grid.model)
     mesh = weld(front.grid, front.kept(row))
-    _warn(front, mesh_format)
+    _warn(front, kind)
     with new_file(path) as unfinished:
-        _write(unfinished, front.grid, mesh.samples, mesh.faces, _frame(front, mesh_format))
+        _write(unfinished, front.grid, mesh.samples, mesh.faces, _frame(front, kind))
 
 
-def _write(
-    path: Path, grid: HeightGrid, samples: npt.NDArray[np.int64], faces: npt.NDArray[np.int64], look: dict[str, Any]
-) -> None:
+def _write(path: Path, grid: HeightGrid, samples: IntArray, faces: IntArray, look: dict[str, Any]) -> None:
     write_mesh(path, grid.file_points(samples), faces, grid.attributes_at(samples), **look)
 
 
@@ -231,7 +225,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     ResultError
         If a file is missing or damaged, or the grid is another one.
     """
-    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.measures import Quality
 
     folder = Path(folder)
     columns = read_front_csv(folder / "front.csv")[0]
@@ -252,7 +246,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     names = list(asdict(Quality(0.0, 0, 0, 0.0, 0.0, 0.0, 0)))
     table = zip(*(columns[name].tolist() for name in names), strict=True)
     quality = tuple(Quality(**dict(zip(names, row, strict=True))) for row in table)
-    samples: npt.NDArray[np.int64] = grid.samples_of_rows(rows)
+    samples: IntArray = grid.samples_of_rows(rows)
     found = [grid.samples_of_rows(part) if len(part) else None for part in np.split(moved, start[1:-1])]
     return TiledFront(grid, samples, level, slope[::-1].copy(), quality[::-1], tuple(found[::-1]))
 
@@ -262,15 +256,13 @@ def is_tiled(folder: str | os.PathLike[str]) -> bool:
     return (Path(folder) / NESTED_FILE).is_file()
 
 
-def stored_model(folder: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
-    """Return where the grid of a stored tiled front was, and the settings it was read with."""
+def stored_model(folder: str | os.PathLike[str]) -> tuple[str, Options]:
+    """Return where the grid of a stored tiled front was, and how it was read."""
     record = _read_record(Path(folder))
     file = record["model"].get("file")
     settings = record.get("settings", {})
     name = record["model"]["name"] if file is None else str((Path(folder) / file).resolve())
-    return name, {"up": settings.get("up", "auto")} | {
-        key: settings.get(key) for key in ("spacing", "nodata", "window")
-    }
+    return name, Options(**{key: settings[key] for key in RECORDED if key in settings})
 
 
 def _read_record(folder: Path) -> dict[str, Any]:

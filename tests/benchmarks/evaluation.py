@@ -23,11 +23,11 @@ from rich.table import Table
 from scipy.spatial import Delaunay
 
 from meshsimp_pymoo import MeshProblem, greedy_insertion, moead, nsga2_v1, nsga2_v2, thinning
-from meshsimp_pymoo.formats.load import grid_source
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets
 from meshsimp_pymoo.surface.live import build, lent_live, make_ground, try_exchange
-from meshsimp_pymoo.surface.model import load_model
+from meshsimp_pymoo.surface.model import build_model
 
 ROUNDS = 15
 CONSOLE = Console(width=110)
@@ -202,7 +202,7 @@ def million():
     noise = np.random.default_rng(1).normal(size=(n, n))
     heights = np.fft.ifft2(np.fft.fft2(noise) * frequency**-2.0).real
     heights = (heights - heights.min()) / np.ptp(heights) * 500
-    return load_model(grid_source(heights, 10.0, 10.0, name="noise 1000 x 1000"), up="z")
+    return build_model(grid_source(heights, 10.0, 10.0, name="noise 1000 x 1000"), up="z")
 
 
 def memory():

@@ -12,9 +12,9 @@ import pytest
 
 from meshsimp_pymoo.comparison.config import PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.search.operators import OAX, OPERATORS, SubsetUniformCrossover
 from meshsimp_pymoo.search.presets import PRESETS
-from meshsimp_pymoo.storage import write_mesh
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 

@@ -247,12 +247,10 @@ def test_meshlabs_own_collapse_abandons_the_border_and_the_unit_matters(shared_m
 
 @pytest.fixture(scope="module")
 def model():
-    from meshsimp_pymoo.formats.load import SourceMesh
-    from meshsimp_pymoo.surface.model import load_model
+    from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.surface.model import build_model
 
-    return load_model(
-        SourceMesh(points=np.add(VERTICES, [5e5, 4e6, 0]), faces=FACES, attributes={}, name="hills")
-    )
+    return build_model(SourceMesh(points=np.add(VERTICES, [5e5, 4e6, 0]), faces=FACES, attributes={}, name="hills"))
 
 
 @pytest.mark.usefixtures("pymeshlab")
@@ -278,9 +276,9 @@ class TestFront:
             assert (lenient.quality.error < strict.quality.error) == (strict.quality.uncovered > 0)
 
     def test_agrees_with_the_referee_on_a_bust(self, shared_data, vertical_error):
-        from meshsimp_pymoo.surface.model import load_model
+        from meshsimp_pymoo.opening import open_model
 
-        bust = load_model(shared_data / "m1_laurana.ply")
+        bust = open_model(shared_data / "m1_laurana.ply")
         for mesh in meshlab_front(bust, [1000, 300]):
             error, uncovered, _ = vertical_error(bust.file_points, mesh.vertices, mesh.faces)
             assert_allclose(mesh.quality.error, error, rtol=1e-6)

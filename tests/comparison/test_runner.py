@@ -29,9 +29,9 @@ from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.storage import write_mesh
 from meshsimp_pymoo.workers import DaskEngine
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -443,7 +443,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     assert run.arrays["paper"].sum() == 10
     model = study.model(problem)
     from meshsimp_pymoo.comparison.store import classic_mesh
-    from meshsimp_pymoo.surface.evaluate import mesh_quality
+    from meshsimp_pymoo.surface.score import mesh_quality
 
     for row in range(len(run.arrays["asked"])):
         vertices, faces = classic_mesh(run, row)

@@ -13,8 +13,8 @@ from scipy.spatial import Delaunay
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.cloud import cloud_source
-from meshsimp_pymoo.formats.load import read_source
+from meshsimp_pymoo.formats.source.points import cloud_source
+from meshsimp_pymoo.formats.table import read_source
 
 UTM = np.array([412_345.125, 5_654_321.5, 120.0])
 

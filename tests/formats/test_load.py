@@ -19,7 +19,10 @@ from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_array_equal
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import SourceMesh, build_source, from_trimesh, grid_source, read_source
+from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.source.scenes import from_trimesh
+from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.tiles.grid import open_grid
 
 # A pyramid without its base: five vertices, four faces, and coordinates that no float32 holds.
@@ -317,7 +320,8 @@ def test_reading_is_silent(tmp_path):
 
 SILENT = """
 from pathlib import Path
-from meshsimp_pymoo.formats.load import ModelError, read_source
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.table import read_source
 for path in sorted(Path(".").glob("*.*")):
     try:
         read_source(path)

@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import grid_source, read_source
+from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.table import read_source
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402

@@ -92,7 +92,7 @@ def good_files() -> tuple[tuple[str, bytes], ...]:
     """Return (suffix, content) of one good file or more of every kind that is read."""
     import trimesh
 
-    from meshsimp_pymoo.formats.load import grid_source
+    from meshsimp_pymoo.formats.source.heights import grid_source
 
     source = grid_source(heights(), 2.0, 3.0)
     points, faces = source.points, source.faces
@@ -199,12 +199,11 @@ def good_front() -> tuple[tuple[str, bytes], ...]:
     import tempfile
     from pathlib import Path
 
-    from meshsimp_pymoo.datasets import load
+    from meshsimp_pymoo.opening import open_model
     from meshsimp_pymoo.storage import write_front
     from meshsimp_pymoo.surface.evaluate import simplify
-    from meshsimp_pymoo.surface.model import load_model
 
-    model = load_model(load("roof:5"))
+    model = open_model("roof:5")
     kept = np.random.default_rng(1).random((3, model.n_vertices)) < 0.5
     kept[:, model.corners] = True
     found = [simplify(model, row) for row in kept]

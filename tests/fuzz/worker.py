@@ -26,7 +26,7 @@ import mutations
 
 from meshsimp_pymoo.comparison.config import ConfigError, read_experiment_file
 from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
-from meshsimp_pymoo.formats.load import read_source
+from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.model import build_model

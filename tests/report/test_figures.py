@@ -8,7 +8,7 @@ import trimesh
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
-from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.report.figures import (
     AMBIENT,
     LIGHT,
@@ -21,7 +21,6 @@ from meshsimp_pymoo.report.figures import (
     plot_mesh,
 )
 from meshsimp_pymoo.surface.evaluate import simplify
-from meshsimp_pymoo.surface.model import load_model
 
 
 @pytest.fixture
@@ -31,7 +30,7 @@ def ax():
 
 @pytest.fixture(scope="module")
 def roof():
-    return load_model(load("roof:5"))
+    return open_model("roof:5")
 
 
 def polygons(ax):
@@ -250,7 +249,7 @@ def test_an_exact_mesh_has_an_error_map_too(ax, roof):
 
 @pytest.mark.parametrize("name", ["face:300", "jacksboro:40", "plane"])
 def test_the_front_stands_beside_the_original_and_its_meshes(tmp_path, name):
-    model = load_model(load(name))
+    model = open_model(name)
     rng = np.random.default_rng(3)
     kept = rng.random((3, model.n_vertices)) < np.array([[0.2], [0.5], [0.8]])
     kept[:, model.corners] = True

@@ -21,13 +21,13 @@ from scipy.spatial import Delaunay
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.formats.load import read_source
+from meshsimp_pymoo.formats.table import read_source, write_mesh
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.report import page as page_module
 from meshsimp_pymoo.report.document import ASSETS, embedded_array, embedded_faces, html_document
 from meshsimp_pymoo.report.page import FIXED_BYTES, PAGE_BYTES, simplification_page, write_page
-from meshsimp_pymoo.storage import mesh_arrays, read_front, write_mesh
-from meshsimp_pymoo.surface.evaluate import mesh_quality
+from meshsimp_pymoo.storage import mesh_arrays, read_front
+from meshsimp_pymoo.surface.score import mesh_quality
 
 SIDE = 24  # samples along a side of the model
 

@@ -3,11 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.formats.load import SourceMesh
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets, mesh_deviation, simplify
-from meshsimp_pymoo.surface.model import build_model, load_model
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
+from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.score import mesh_deviation
 
 METHODS = {
     "thinning": thinning,
@@ -23,7 +24,7 @@ def corners_of(model):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", ["jacksboro:30", "face:200", "horseshoe:150", "pyramid:9"])
 def test_every_subset_has_the_error_and_the_triangles_that_are_said(method, name):
-    model = load_model(load(name))
+    model = open_model(name)
     front = METHODS[method](model)
     rows = np.unique(np.linspace(0, len(front) - 1, 25).astype(int))
     table = evaluate_subsets(model, np.array([front.kept(k) for k in rows]))
@@ -36,7 +37,7 @@ def test_every_subset_has_the_error_and_the_triangles_that_are_said(method, name
 
 def test_thinning_equals_its_slow_twin():
     """Remove, by full evaluation of every candidate, the vertex that adds least; ties by the lower index."""
-    model = load_model(load("face:60"))
+    model = open_model("face:60")
     pinned = corners_of(model)
     kept = np.ones(model.n_vertices, bool)
     order = []
@@ -53,7 +54,7 @@ def test_thinning_equals_its_slow_twin():
 
 
 def test_worst_point_insertion_equals_its_slow_twin():
-    model = load_model(load("face:60"))
+    model = open_model("face:60")
     kept = corners_of(model)
     order = []
     while len(order) < 40:
@@ -66,7 +67,7 @@ def test_worst_point_insertion_equals_its_slow_twin():
 
 
 def test_thinning_beats_insertion_on_a_terrain():
-    model = load_model(load("jacksboro:20"))
+    model = open_model("jacksboro:20")
     thin, grow = thinning(model), greedy_insertion(model)
     for triangles in (50, 100, 200):
         assert thin.error[thin.triangles <= triangles].min() < grow.error[grow.triangles <= triangles].min()
@@ -74,7 +75,7 @@ def test_thinning_beats_insertion_on_a_terrain():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_pinned_vertices_are_in_every_subset(method):
-    model = load_model(load("face:150"))
+    model = open_model("face:150")
     pinned = corners_of(model)
     pinned[[3, 70, 99]] = True
     front = METHODS[method](model, pinned)
@@ -83,7 +84,7 @@ def test_pinned_vertices_are_in_every_subset(method):
 
 
 def test_insertion_stops_where_the_error_is_zero():
-    roof = load_model(load("roof:9"))
+    roof = open_model("roof:9")
     front = greedy_insertion(roof)
     assert front.error[-1] == 0
     assert front.triangles[-1] <= 8
@@ -91,7 +92,7 @@ def test_insertion_stops_where_the_error_is_zero():
 
 
 def test_other_starts_and_wrong_arguments():
-    model = load_model(load("face:150"))
+    model = open_model("face:150")
     some = np.random.default_rng(0).random(150) < 0.5
     front = thinning(model, kept=some)
     np.testing.assert_array_equal(front.kept(len(front) - 1), some | corners_of(model))
@@ -115,7 +116,7 @@ def test_insertion_leaves_out_vertices_whose_position_is_taken():
 
 
 def test_pins_and_counts_that_are_none_are_refused():
-    model = load_model(load("face:150"))
+    model = open_model("face:150")
     with pytest.raises(ValueError, match=r"pinned is a bool array of shape \(150,\)"):
         thinning(model, np.arange(4))
     with pytest.raises(ValueError, match="most=-1"):

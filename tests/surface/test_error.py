@@ -12,22 +12,15 @@ from samples import holey_grid, subset
 
 from meshsimp_pymoo.datasets import load, names
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import SourceMesh, grid_source
-from meshsimp_pymoo.surface.evaluate import (
-    ERROR,
-    FOOTPRINTS,
-    MEASURES,
-    OUTSIDES,
-    TRIANGLES,
-    UNCOVERED,
-    evaluate_subsets,
-    measured,
-    mesh_deviation,
-    mesh_quality,
-    mesh_samples,
-    simplify,
-)
-from meshsimp_pymoo.surface.model import build_model, load_model
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.table import read_source
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
+from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES, UNCOVERED, measured
+from meshsimp_pymoo.surface.measures import OBJECTIVES as MEASURES
+from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
+from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
 
 RULES = [(f, o) for f in FOOTPRINTS for o in OUTSIDES]
 
@@ -43,7 +36,7 @@ MODELS = {
 
 @pytest.fixture(scope="module", params=MODELS)
 def model(request):
-    return load_model(MODELS[request.param](), up="z")
+    return build_model(MODELS[request.param](), up="z")
 
 
 # ------------------------------------------------------------------------------------------------ slow twin
@@ -135,7 +128,7 @@ def test_everything_kept_has_no_error(model):
 
 
 def test_a_roof_of_four_triangles_is_exact_and_of_two_loses_its_ridge():
-    roof = load_model(load("roof:17"))
+    roof = build_model(load("roof:17"))
     corners = np.isin(np.arange(roof.n_vertices), roof.corners)
     flat = evaluate_subsets(roof, corners)[0]
     heights = roof.points[:, 2]
@@ -151,7 +144,7 @@ def test_a_roof_of_four_triangles_is_exact_and_of_two_loses_its_ridge():
 def test_a_dropped_corner_costs_its_distance_in_space():
     elevation = np.zeros((2, 2))
     elevation[0, 0] = 12.0
-    square = load_model(grid_source(elevation, 5.0, 5.0), up="z")
+    square = build_model(grid_source(elevation, 5.0, 5.0), up="z")
     peak = int(np.argmax(square.points[:, 2]))
     kept = np.ones(4, bool)
     kept[peak] = False
@@ -175,7 +168,7 @@ def test_quality_numbers_are_those_of_the_deviation(model):
 
 @pytest.mark.parametrize("kept_rows", [[], [0], [0, 1]])
 def test_fewer_than_three_vertices_are_no_mesh(kept_rows):
-    plane = load_model(load("plane:5"))
+    plane = build_model(load("plane:5"))
     kept = np.zeros(plane.n_vertices, bool)
     kept[kept_rows] = True
     row = evaluate_subsets(plane, kept)[0]
@@ -185,7 +178,7 @@ def test_fewer_than_three_vertices_are_no_mesh(kept_rows):
 
 
 def test_unknown_rules_and_wrong_lengths_are_refused():
-    plane = load_model(load("plane:5"))
+    plane = build_model(load("plane:5"))
     with pytest.raises(ValueError, match="footprint='bbox' is unknown"):
         evaluate_subsets(plane, np.ones(25, bool), footprint="bbox")
     with pytest.raises(ValueError, match="outside='drop' is unknown"):
@@ -293,7 +286,7 @@ def test_vertices_at_one_position_all_count_and_the_first_kept_carries_the_surfa
 
 @pytest.mark.parametrize("name", ["ring", "horseshoe", "holey"])
 def test_the_default_footprint_bridges_no_hole_and_no_bay(name):
-    model = load_model(MODELS[name](), up="z")
+    model = build_model(MODELS[name](), up="z")
     xy = model.points[:, :2]
     for share in (0.1, 0.5, 1.0):
         kept = subset(model, share)
@@ -303,10 +296,10 @@ def test_the_default_footprint_bridges_no_hole_and_no_bay(name):
 
 
 def test_a_model_pickles_without_its_caches():
-    model = load_model(load("face:300"))
+    model = build_model(load("face:300"))
     kept = subset(model, 0.3)
     before = simplify(model, kept)
-    small = pickle.dumps(load_model(load("face:300")))
+    small = pickle.dumps(build_model(load("face:300")))
     again = pickle.dumps(model)
     assert len(again) == len(small)
     np.testing.assert_array_equal(simplify(pickle.loads(again), kept).faces, before.faces)
@@ -326,7 +319,7 @@ def test_the_error_of_a_written_mesh_is_that_of_its_subset(model, outside):
 
 
 def test_of_folded_triangles_the_closest_counts_and_vertices_may_lie_anywhere():
-    plane = load_model(load("plane:5"))
+    plane = build_model(load("plane:5"))
     low = plane.file_points.min(axis=0) - [1, 1, 0]
     high = plane.file_points.max(axis=0) + np.array([1, 1, 0])
     sheet = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
@@ -342,7 +335,7 @@ def test_of_folded_triangles_the_closest_counts_and_vertices_may_lie_anywhere():
 
 
 def test_meshes_without_area_or_with_wrong_indices_are_refused():
-    plane = load_model(load("plane:5"))
+    plane = build_model(load("plane:5"))
     with pytest.raises(ValueError, match="at least one triangle"):
         mesh_quality(plane, np.zeros((3, 3)), np.zeros((0, 3), int))
     with pytest.raises(ValueError, match="area in the plane"):
@@ -420,14 +413,14 @@ def test_weights_follow_the_rows_of_the_file_or_come_from_it():
     grid = np.arange(12.0).reshape(3, 4)
     elevation = np.random.default_rng(0).random((3, 4))
     elevation[0, 3] = np.nan
-    plain = load_model(grid_source(elevation, 1.0, 1.0), up="z")
+    plain = build_model(grid_source(elevation, 1.0, 1.0), up="z")
     model = plain.with_weights(grid)
     np.testing.assert_array_equal(model.weights, plain.source_index)
     source = load("face:150")
     named = SourceMesh(source.points, source.faces, {"importance": np.arange(150, dtype=np.uint16)}, "named")
-    model = load_model(named, up="z").with_weights("importance")
+    model = build_model(named, up="z").with_weights("importance")
     np.testing.assert_array_equal(model.weights, model.source_index)
-    assert model.hash != load_model(named, up="z").hash
+    assert model.hash != build_model(named, up="z").hash
     assert model.neighbours is not None
 
 
@@ -447,7 +440,7 @@ def test_weights_follow_the_rows_of_the_file_or_come_from_it():
 def test_what_cannot_be_weights_is_refused(weights, message):
     source = load("face:150")
     attributes = {"color": np.zeros((150, 4), np.uint8), "label": np.array(["a"] * 150)}
-    model = load_model(SourceMesh(source.points, source.faces, attributes, "labelled"), up="z")
+    model = build_model(SourceMesh(source.points, source.faces, attributes, "labelled"), up="z")
     with pytest.raises(ModelError, match=message):
         model.with_weights(weights)
 
@@ -484,12 +477,12 @@ def assert_referee_agrees(referee, model, shares, rules=RULES):
 
 @pytest.mark.parametrize("name", [n for n in names() if n not in ("jacksboro", "topobathy")])
 def test_the_referee_agrees_on_built_in_models(referee, name):
-    assert_referee_agrees(referee, load_model(load(name)), [0.03, 0.5])
+    assert_referee_agrees(referee, build_model(load(name)), [0.03, 0.5])
 
 
 @pytest.mark.parametrize("name", ["jacksboro:11", "topobathy:24"])
 def test_the_referee_agrees_on_terrain(referee, name):
-    assert_referee_agrees(referee, load_model(load(name)), [0.03, 0.5])
+    assert_referee_agrees(referee, build_model(load(name)), [0.03, 0.5])
 
 
 @pytest.mark.parametrize(
@@ -498,13 +491,13 @@ def test_the_referee_agrees_on_terrain(referee, name):
     "f_mask_holes l_laurana_front".split(),
 )
 def test_the_referee_agrees_on_real_scans(referee, shared_data, name):
-    assert_referee_agrees(referee, load_model(shared_data / f"{name}.ply"), [0.05, 0.4])
+    assert_referee_agrees(referee, build_model(read_source(shared_data / f"{name}.ply")), [0.05, 0.4])
 
 
 def test_the_referee_agrees_on_a_terrain_with_nodata(referee, shared_data):
     with np.load(shared_data / "dem_sthelens.npz", allow_pickle=False) as stored:
         source = grid_source(stored["elevation"][::6, ::6], float(stored["dx"]) * 6, float(stored["dy"]) * 6)
-    assert_referee_agrees(referee, load_model(source), [0.03, 0.3])
+    assert_referee_agrees(referee, build_model(source), [0.03, 0.3])
 
 
 def test_a_hole_is_seen_although_an_overlap_makes_up_for_its_area():
@@ -527,7 +520,7 @@ def test_vertices_far_from_a_long_outline_are_found_at_once():
     side = 60
     elevation = np.zeros((side, side))
     elevation[2:, 2::3] = np.nan
-    model = load_model(grid_source(elevation, 1.0, 1.0), up="z")
+    model = build_model(grid_source(elevation, 1.0, 1.0), up="z")
     kept = (model.points[:, :2] < side / 4).all(axis=1)
     kept[model.corners] = True
     row = evaluate_subsets(model, kept, footprint="hull")[0]
@@ -537,7 +530,7 @@ def test_vertices_far_from_a_long_outline_are_found_at_once():
 
 @pytest.mark.parametrize("dtype", [float, int, object])
 def test_subsets_that_are_not_bool_are_refused(dtype):
-    plane = load_model(load("plane:5"))
+    plane = build_model(load("plane:5"))
     with pytest.raises(TypeError, match="bool array"):
         evaluate_subsets(plane, np.ones((2, 25), dtype))
     with pytest.raises(TypeError, match="bool array"):
@@ -545,7 +538,7 @@ def test_subsets_that_are_not_bool_are_refused(dtype):
 
 
 def test_quads_and_fractional_faces_are_refused():
-    plane = load_model(load("plane:5"))
+    plane = build_model(load("plane:5"))
     with pytest.raises(ValueError, match=r"faces have shape \(1, 4\)"):
         mesh_quality(plane, plane.file_points, [[0, 1, 2, 3]])
     with pytest.raises(ValueError, match="faces are float64"):

@@ -10,15 +10,17 @@ from hypothesis import strategies as st
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelWarning
-from meshsimp_pymoo.formats.load import SourceMesh, grid_source
-from meshsimp_pymoo.surface.model import build_model, find_corners, load_model, vector_order
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.plane.order import find_corners, vector_order
+from meshsimp_pymoo.surface.model import build_model
 
 SIDE = 16
 
 
 @pytest.fixture(scope="module")
 def face():
-    return load_model(load("face:400"))
+    return build_model(load("face:400"))
 
 
 def test_vector_order_is_a_hilbert_curve():
@@ -79,7 +81,7 @@ def test_one_rings_are_those_of_the_mesh(face):
 
 
 def test_the_hull_of_a_grid_is_its_whole_border():
-    grid = load_model(grid_source(np.random.default_rng(0).random((5, 7)), 2.0, 3.0), up="z")
+    grid = build_model(grid_source(np.random.default_rng(0).random((5, 7)), 2.0, 3.0), up="z")
     x, y = grid.points[:, 0], grid.points[:, 1]
     border = (x == 0) | (x == x.max()) | (y == 0) | (y == y.max())
     np.testing.assert_array_equal(grid.hull, np.flatnonzero(border))
@@ -122,11 +124,6 @@ def test_a_model_turned_any_way_is_the_same_model(up):
 
 def test_copies_share_the_model_and_the_hash_follows_the_geometry(face):
     assert copy.deepcopy(face) is face
-    assert load_model(load("face:400")).hash == face.hash
-    assert load_model(load("face:400,seed=2")).hash != face.hash
+    assert build_model(load("face:400")).hash == face.hash
+    assert build_model(load("face:400,seed=2")).hash != face.hash
     assert len(face) == face.n_vertices == 400
-
-
-def test_what_is_no_mesh_is_refused_by_type():
-    with pytest.raises(TypeError, match="not int"):
-        load_model(7)

@@ -13,7 +13,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.load import SourceMesh, build_source, from_trimesh, grid_source, read_source
+from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.source.scenes import from_trimesh
+from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.surface.orient import (
     FOLD_SHARE,
     SurfaceFacts,

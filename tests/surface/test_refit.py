@@ -12,11 +12,15 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.formats.load import SourceMesh, grid_source
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.greedy import thinning
-from meshsimp_pymoo.surface.evaluate import FOOTPRINTS, OUTSIDES, mesh_quality, mesh_samples, simplify
-from meshsimp_pymoo.surface.model import build_model, load_model
-from meshsimp_pymoo.surface.refit import TOLERANCE, least_error, refit_heights
+from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import refit_heights
+from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
+from meshsimp_pymoo.surface.score import mesh_quality, mesh_samples
 
 MODELS = {
     "terrain": lambda: load("jacksboro:20"),
@@ -28,7 +32,7 @@ MODELS = {
 
 @pytest.fixture(scope="module", params=MODELS)
 def model(request):
-    return load_model(MODELS[request.param](), up="z")
+    return build_model(MODELS[request.param](), up="z")
 
 
 def by_linear_programme(model, kept, weights=None):
@@ -94,7 +98,7 @@ def test_heights_never_make_the_error_larger_and_it_is_that_of_the_mesh(model, f
 
 def test_no_small_change_of_heights_makes_it_better():
     """Uncovered vertices too, whose cost is a distance in space; 200 random directions and each vertex alone."""
-    model = load_model(load("horseshoe:200"), up="z")
+    model = build_model(load("horseshoe:200"), up="z")
     kept = subset(model, 0.15)
     best = refit_heights(model, kept, tolerance=1e-9)
     assert simplify(model, kept).quality.uncovered > 10
@@ -113,7 +117,7 @@ def test_a_plane_is_refitted_exactly_from_vertices_that_stick_out():
     plane = 0.5 * x - 0.25 * y
     spiked = plane.copy()
     spiked[::6, ::6] += 3.0
-    model = load_model(grid_source(spiked, 1.0, 1.0), up="z")
+    model = build_model(grid_source(spiked, 1.0, 1.0), up="z")
     kept = (model.points[:, :2] % 6 == 0).all(axis=1)
     refitted = refit_heights(model, kept, tolerance=1e-9)
     assert refitted.before > 100
@@ -132,7 +136,7 @@ def test_the_heights_of_vertices_that_do_not_count_do_not_matter():
     kept[::10, ::10] = True
     errors = []
     for shift in (0.0, rng.normal(0, 5, (11, 11))):
-        model = load_model(grid_source(heights + shift * kept, 1.0, 1.0), up="z")
+        model = build_model(grid_source(heights + shift * kept, 1.0, 1.0), up="z")
         model = model.with_weights(np.where(kept, 0.0, 1.0))
         errors.append(refit_heights(model, kept.ravel()[model.source_index], tolerance=1e-6).error)
     assert errors[0] == pytest.approx(errors[1], rel=1e-5)
@@ -154,7 +158,7 @@ def test_a_tilted_model_moves_its_vertices_along_its_own_height():
 
 
 def test_the_same_call_gives_the_same_bytes_and_thinning_gains_by_it():
-    model = load_model(load("jacksboro:12"), up="z")
+    model = build_model(load("jacksboro:12"), up="z")
     front = thinning(model)
     for k in (50, 200):
         one, two = (refit_heights(model, front.kept(k)) for _ in range(2))
@@ -168,7 +172,7 @@ def test_the_referee_agrees_with_the_refitted_error(oracle):
     referee = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(referee)
     for name in ("face:300", "horseshoe:200", "jacksboro:20"):
-        model = load_model(load(name), up="z")
+        model = build_model(load(name), up="z")
         for outside in OUTSIDES:
             refitted = refit_heights(model, subset(model, 0.15), outside=outside)
             faces = np.searchsorted(refitted.rows, refitted.faces)

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiled as tiled_command
@@ -12,13 +13,14 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats import geotiff as raster_module
 from meshsimp_pymoo.formats.geotiff import RasterHeights
-from meshsimp_pymoo.formats.load import read_source
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import read_source
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.surface.model import build_model, load_model
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import grid as grid_module
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.output import read_tiled_front
-from meshsimp_pymoo.tiles.weld import find_cracks
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402
@@ -56,7 +58,7 @@ BLOCKS = {"compress": "lzw", "tiled": True, "blockxsize": 32, "blockysize": 16}
 @pytest.mark.parametrize("window", [None, WINDOW])
 def test_a_raster_opened_for_tiles_has_its_samples_where_the_model_of_it_has_them(tmp_path, options, window):
     file = write(tmp_path / "dem.tif", **options)
-    model = load_model(file, window=window)
+    model = open_model(file, Options(window=window))
     grid = open_grid(file, window=window)
     samples = grid.samples_of_rows(model.source_index)
     assert np.array_equal(grid.source_rows(samples), model.source_index)
@@ -70,7 +72,7 @@ def test_a_raster_opened_for_tiles_has_its_samples_where_the_model_of_it_has_the
 def test_scale_offset_and_spacing_are_those_of_the_raster_read_whole(tmp_path):
     whole_numbers = np.rint(10 * HEIGHTS).astype(np.int16)
     file = write(tmp_path / "dem.tif", whole_numbers, after={"scales": (0.1,), "offsets": (5.0,)})
-    model = load_model(file, spacing=(3.0, 4.0))
+    model = open_model(file, Options(spacing=(3.0, 4.0)))
     grid = open_grid(file, spacing=(3.0, 4.0))
     assert np.array_equal(grid.file_points(model.source_index), model.file_points)
     assert np.ptp(grid.file_x) == 3.0 * (HEIGHTS.shape[1] - 1)
@@ -78,7 +80,7 @@ def test_scale_offset_and_spacing_are_those_of_the_raster_read_whole(tmp_path):
 
 def test_a_window_of_a_mapped_array_has_the_places_and_rows_of_the_whole(tmp_path):
     np.save(tmp_path / "z.npy", HEIGHTS)
-    model = load_model(tmp_path / "z.npy", spacing=(2.0, 3.0), window=WINDOW)
+    model = open_model(tmp_path / "z.npy", Options(spacing=(2.0, 3.0), window=WINDOW))
     grid = open_grid(tmp_path / "z.npy", spacing=(2.0, 3.0), window=WINDOW)
     samples = grid.samples_of_rows(model.source_index)
     assert isinstance(grid.heights, np.memmap)
@@ -122,7 +124,7 @@ def test_a_raster_becomes_a_front_in_its_own_coordinates_and_any_mesh_is_picked(
     call = ["simplify", str(path), "-o", str(out), "--tile", "64", "--window", window, "--triangles", "300"]
     assert main([*call, "--meshes", "2", "--jobs", "1", "--quiet"]) == 0
     record = json.loads((out / "run.json").read_text())
-    model = load_model(path, window=WINDOW)
+    model = open_model(path, Options(window=WINDOW))
     assert record["model"]["georeference"] == json.loads(json.dumps(model.georeference))
     assert record["model"]["georeference"]["epsg"] == 25832
     assert record["settings"]["window"] == list(WINDOW)

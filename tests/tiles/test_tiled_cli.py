@@ -7,19 +7,20 @@ import time
 
 import numpy as np
 import pytest
+from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiled as tiled_command
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.formats.load import read_source
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import read_source, write_mesh
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.storage import write_mesh
-from meshsimp_pymoo.surface.model import build_model, load_model
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.grid import open_grid
 from meshsimp_pymoo.tiles.output import read_tiled_front
 from meshsimp_pymoo.tiles.thin import thin_tile
-from meshsimp_pymoo.tiles.weld import find_cracks
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +219,7 @@ def test_unfinished_tiles_of_other_settings_are_named_and_can_be_overwritten(pat
 
 def test_a_front_of_another_grid_is_not_read(out, path):
     with pytest.raises(ResultError, match="is not a front of"):
-        read_tiled_front(out, open_grid(load_model(path, spacing=(30.0, 31.0))))
+        read_tiled_front(out, open_grid(open_model(path, Options(spacing=(30.0, 31.0)))))
     (out / "nested.npz").rename(out / "gone.npz")
     try:
         with pytest.raises(ResultError, match=r"nested\.npz: cannot be read"):

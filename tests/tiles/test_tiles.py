@@ -5,20 +5,23 @@ import json
 
 import numpy as np
 import pytest
+from cracks import find_cracks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import thinning
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
-from meshsimp_pymoo.surface.model import build_model, load_model
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED, CoarseGrid, move
 from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_front
 from meshsimp_pymoo.tiles.front import settings as call_settings
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
-from meshsimp_pymoo.tiles.weld import find_cracks, measure, pieces, weld
+from meshsimp_pymoo.tiles.weld import measure, pieces, weld
 from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))
@@ -52,7 +55,7 @@ def test_a_grid_has_its_samples_where_the_model_of_the_same_heights_has_them(tmp
     np.save(tmp_path / "z.npy", z)
     grid = open_grid(tmp_path / "z.npy", spacing=(0.1, 0.7))
     assert isinstance(grid.heights, np.memmap)
-    model = load_model(tmp_path / "z.npy", spacing=(0.1, 0.7))
+    model = open_model(tmp_path / "z.npy", Options(spacing=(0.1, 0.7)))
     number = model.source_index
     assert np.array_equal(grid.xy_at(number), model.xy)
     assert np.array_equal(grid.file_points(number), model.file_points)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.operators.pair_crossover import PairCrossover
-from meshsimp_pymoo.search.requirements import pinned_vertices, plane_coordinates
+from meshsimp_pymoo.search.requirements import pinned_vertices, surface_of
 
 
 class HalfPlaneCrossover(PairCrossover):
@@ -43,8 +43,8 @@ class HalfPlaneCrossover(PairCrossover):
     def _do(
         self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
     ) -> NDArray[np.bool_]:
-        xy = plane_coordinates(problem, self)
-        exchanged = half_planes(xy, X.shape[1], random_state)
+        surface = surface_of(problem, self)
+        exchanged = half_planes(surface.places, X.shape[1], random_state)
         exchanged &= X[0] ^ X[1]
         children = X[: self.n_offsprings] ^ exchanged
         if self.keep_size:
@@ -53,29 +53,33 @@ class HalfPlaneCrossover(PairCrossover):
             flat = children.reshape(-1, X.shape[2])
             unequal = np.flatnonzero((flat | pinned).sum(axis=1) != sizes)
             flat[unequal] = relocate_all(
-                problem, flat[unequal], np.zeros(len(unequal), int), random_state, sizes=sizes[unequal]
+                surface, flat[unequal], np.zeros(len(unequal), int), random_state, sizes=sizes[unequal]
             )
         return children
 
 
-def half_planes(xy: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Draw ``n`` random lines; return which vertices lie on the left of each, as (n, N) bool.
+def half_planes(places: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Draw ``n`` random lines (in space: planes); return which vertices lie on one side of each, as (n, N) bool.
 
-    Each line has a uniform direction and leaves a uniform share of the vertices, 10 to 90 %, on its left.
+    Each has a uniform direction and leaves a uniform share of the vertices, 10 to 90 %, on that side.
 
     Parameters
     ----------
-    xy : (N, 2) float array
+    places : (N, 2) or (N, 3) float array
         Positions of the vertices.
     n : int
         Number of lines.
     rng : numpy.random.Generator
         Source of randomness.
     """
-    angle = rng.uniform(0.0, 2.0 * np.pi, size=n)
-    n_left = np.clip((rng.uniform(0.1, 0.9, size=n) * len(xy)).astype(int), 1, len(xy) - 1)
-    sides = np.empty((n, len(xy)), dtype=bool)
-    for side, a, k in zip(sides, angle, n_left, strict=True):
-        offset = xy @ np.array([-np.sin(a), np.cos(a)])
+    if places.shape[1] == 2:
+        angle = rng.uniform(0.0, 2.0 * np.pi, size=n)
+        normals = np.column_stack([-np.sin(angle), np.cos(angle)])
+    else:
+        normals = rng.normal(size=(n, 3))
+    n_left = np.clip((rng.uniform(0.1, 0.9, size=n) * len(places)).astype(int), 1, len(places) - 1)
+    sides = np.empty((n, len(places)), dtype=bool)
+    for side, normal, k in zip(sides, normals, n_left, strict=True):
+        offset = places @ normal
         np.less(offset, np.partition(offset, k)[k], out=side)
     return sides

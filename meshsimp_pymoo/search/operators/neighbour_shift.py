@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 
-from meshsimp_pymoo.search.requirements import mesh_neighbours, pinned_vertices, require_bool, require_probability
+from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool, require_probability, surface_of
 
 # Rows are mutated in blocks of about this many genes, so that even high rates need little memory beside X.
 GENES_PER_BLOCK = 1 << 24
@@ -46,7 +46,7 @@ class NeighbourShift(Mutation):
     ValueError
         If ``along`` is unknown or a probability is not in [0, 1].
     TypeError
-        When applied to a problem without ``pinned`` (or ``model.neighbours``, along the mesh), or to
+        When applied to a problem without ``pinned`` (or ``surface.neighbours``, along the mesh), or to
         chromosomes that are not bool.
     """
 
@@ -63,7 +63,7 @@ class NeighbourShift(Mutation):
     ) -> NDArray[np.bool_]:
         require_bool(X, self)
         pinned = pinned_vertices(problem, self)
-        neighbours = mesh_neighbours(problem, self) if self.along == "mesh" else None
+        neighbours = surface_of(problem, self).neighbours if self.along == "mesh" else None
         rate = float(self.get_prob_var(problem))
         shifted = X.copy()
         rows = max(1, GENES_PER_BLOCK // X.shape[1])

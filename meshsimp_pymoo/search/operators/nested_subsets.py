@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.sampling import Sampling
 
-from meshsimp_pymoo.search.greedy import NestedFront, thinning
+from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.random_subset import RandomSubset
-from meshsimp_pymoo.search.requirements import mesh_neighbours, pinned_vertices, require_probability, summed_measure
+from meshsimp_pymoo.search.requirements import pinned_vertices, require_probability, surface_of
 
 
 class NestedSubsets(Sampling):
@@ -46,7 +45,7 @@ class NestedSubsets(Sampling):
     ) -> NDArray[np.bool_]:
         pinned = pinned_vertices(problem, self)
         n_random = int(self.random_share * n_samples)
-        front = nested_front(problem, self)
+        front = thinned(surface_of(problem, self))
         rows = np.flatnonzero(front.triangles > 0)
         if self.triangles is not None:
             low, high = self.triangles
@@ -64,22 +63,3 @@ class NestedSubsets(Sampling):
         if n_random:
             X[n_samples - n_random :] = RandomSubset()._do(problem, n_random, random_state=random_state)
         return X
-
-
-def nested_front(problem: Any, operator: object) -> NestedFront:
-    """Return the thinning of the problem's model, computed once a problem."""
-    mesh_neighbours(problem, operator)  # asks for a MeshProblem, with its message
-    front = _FRONTS.get(problem)
-    if front is None:
-        front = thinning(
-            problem.model,
-            problem.pinned,
-            footprint=problem.footprint,
-            outside=problem.outside,
-            measure=summed_measure(problem),
-        )
-        _FRONTS[problem] = front
-    return front
-
-
-_FRONTS: WeakKeyDictionary[Any, NestedFront] = WeakKeyDictionary()

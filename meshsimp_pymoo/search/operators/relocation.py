@@ -64,4 +64,4 @@ class Relocation(Mutation):
         total = moves.sum()
         if total > self.max_moves:
             moves = moves * (self.max_moves / total)
-        return relocate_all(problem, X, moves.astype(int), random_state, temperature=self.temperature)
+        return relocate_all(problem.surface, X, moves.astype(int), random_state, temperature=self.temperature)

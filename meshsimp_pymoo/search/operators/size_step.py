@@ -52,4 +52,4 @@ class SizeStep(Mutation):
         wanted = np.round(free * (1.0 + self.step) ** draw).astype(int)
         wanted = np.where(wanted == free, free + np.where(draw < 0.0, -1, 1), wanted)
         sizes = pinned.sum() + np.clip(wanted, 0, int((~pinned).sum()))
-        return relocate_all(problem, X, np.zeros(len(X), int), random_state, sizes=sizes)
+        return relocate_all(problem.surface, X, np.zeros(len(X), int), random_state, sizes=sizes)

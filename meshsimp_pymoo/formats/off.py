@@ -1,0 +1,81 @@
+"""OFF: counts, vertices with colours if the keyword says so, and faces, one a line."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import Format, OutMesh, register
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from meshsimp_pymoo.formats.source import SourceMesh
+
+
+def _read(path: Path, name: str, options: Options) -> SourceMesh:
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source import build_source
+    from meshsimp_pymoo.formats.source.numbers import even_table, fans, parse_numbers, rgba_of, text_lines, whole
+
+    lines = [line for line in text_lines(path) if line]
+    keyword = re.match(r"(ST)?(C)?(N)?OFF\b\s*", lines[0]) if lines else None
+    if keyword is None:
+        begin = lines[0][:24] if lines else ""
+        raise ModelError(f"{name}: is not an OFF file (it begins with {begin!r}, not with 'OFF'); check the suffix")
+    rest = lines[0][keyword.end() :]
+    if "BINARY" in rest.upper():
+        raise ModelError(f"{name}: is a binary OFF, which is not read; save it as text or as PLY")
+    lines = ([rest] if rest else []) + lines[1:]
+    if not lines:
+        raise ModelError(f"{name}: ends before its counts; the file is truncated, export it again")
+    header = whole(parse_numbers(lines[0], name), name, "the count")
+    if len(header) < 2 or header.min() < 0:
+        raise ModelError(f"{name}: cannot read the counts {lines[0][:60]!r}; export the file again")
+    n_vertices, n_faces = int(header[0]), int(header[1])
+    if len(lines) - 1 < n_vertices + n_faces:
+        raise ModelError(
+            f"{name}: truncated: declares {n_vertices} vertices and {n_faces} faces, but {len(lines) - 1} "
+            "lines follow; copy or export the file again"
+        )
+    table, width = even_table(lines[1 : 1 + n_vertices], name, "vertex", 3)
+    attributes: dict[str, npt.ArrayLike] = {}
+    first_color = 6 if keyword[3] else 3
+    last_color = min(first_color + 4, width - (2 if keyword[1] else 0))
+    if keyword[2] and last_color - first_color >= 3:
+        if (color := rgba_of(list(table[:, first_color:last_color].T))) is not None:
+            attributes["color"] = color
+        else:
+            warn_of(f"{name}: its vertex colours are neither in 0..1 nor in 0..255 and stay behind")
+    if n_faces == 0:
+        return build_source(table[:, :3], np.empty((0, 3), np.int64), attributes, name)
+    face_lines = lines[1 + n_vertices : 1 + n_vertices + n_faces]
+    widths = np.array([len(line.split()) for line in face_lines], dtype=np.int64)
+    values = parse_numbers(" ".join(face_lines), name)
+    starts = np.cumsum(widths) - widths
+    counts = whole(values[starts], name, "the number of corners")
+    if (counts < 0).any() or (counts + 1 > widths).any():
+        short = face_lines[int(np.argmax((counts < 0) | (counts + 1 > widths)))]
+        raise ModelError(
+            f"{name}: the face line {short[:60]!r} has too few indices; the file is damaged, export it again"
+        )
+    first = np.cumsum(counts) - counts
+    corners = values[np.arange(counts.sum()) + np.repeat(starts + 1 - first, counts)]
+    faces = fans(whole(corners, name, "the face index"), counts)
+    return build_source(table[:, :3], faces, attributes, name)
+
+
+# ------------------------------------------------------------ through trimesh
+
+
+def _write(path: Path, mesh: OutMesh) -> None:
+    from meshsimp_pymoo.formats.source.scenes import EXACT_DIGITS, export
+
+    export(path, mesh, digits=EXACT_DIGITS)
+
+
+register(Format("off", (".off",), "OFF", read=_read, write=_write))

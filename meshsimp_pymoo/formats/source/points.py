@@ -1,0 +1,143 @@
+"""Points without faces: their Delaunay triangulation in the plane is the original mesh.
+
+The triangulation is the one of this package, so that keeping all points gives the original mesh again, to the last
+triangle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.source import SourceMesh, build_source, check_points
+from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
+from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.plane.triangulation import INFINITE, RECORD, triangulate
+
+
+def cloud_source(
+    points: npt.ArrayLike,
+    *,
+    max_edge: float | None = None,
+    attributes: Mapping[str, npt.ArrayLike] | None = None,
+    name: str = "points",
+    georeference: dict[str, Any] | None = None,
+) -> SourceMesh:
+    """Triangulate points in the plane of x and y: the Delaunay triangulation, ties broken as everywhere here.
+
+    Parameters
+    ----------
+    points : (P, 3) array
+        Points; z is the height [units].
+    max_edge : float, optional
+        A triangle with an edge longer than this in the plane is left out [units]. Without it the triangulation covers
+        the convex hull of the points, and bridges every bay of their outline and every hole; about three times the
+        usual distance of neighbours keeps both open.
+    attributes : mapping of str to arrays of P rows, optional
+        Per-point data.
+    name : str
+        What messages call it.
+    georeference : dict, optional
+        See :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
+
+    Returns
+    -------
+    SourceMesh
+        Of points with one (x, y) the lowest stays; ``rows`` holds the rows of ``points`` that stay.
+
+    Raises
+    ------
+    ModelError
+        If there are fewer than 4 different places, all on one line, or no triangle has short enough edges.
+
+    Warns
+    -----
+    ModelWarning
+        If points share their place in the plane, with their number.
+
+    Examples
+    --------
+    A square with its middle, and the middle once more, higher:
+
+    >>> import warnings
+    >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore")
+    ...     source = cloud_source([*corners, [0.5, 0.5, 2], [0.5, 0.5, 1]])
+    >>> len(source.faces), source.points[-1].tolist()
+    (4, [0.5, 0.5, 1.0])
+    """
+    xyz = check_points(points, name)
+    if max_edge is not None and not (np.isfinite(max_edge) and max_edge > 0):
+        raise ModelError(f"{name}: max_edge is {max_edge}; give a positive length")
+    local = xyz - xyz.min(axis=0)
+    if not np.ptp(local[:, :2], axis=0).any():
+        raise ModelError(f"{name}: all {len(xyz)} points share one (x, y); a surface needs different ones")
+    _, xy = unit_square(local)
+    order = vector_order(xy, xyz[:, 2])  # the lowest of a place first
+    sorted_xy = xy[order]
+    first = np.ones(len(order), bool)
+    first[1:] = (sorted_xy[1:] != sorted_xy[:-1]).any(axis=1)
+    n_twins = len(first) - int(first.sum())
+    if n_twins:
+        warn_of(
+            f"{name}: {n_twins} of {len(first)} points share their (x, y) with another one and were dropped; the "
+            "lowest of each place stays"
+        )
+    order = order[first]
+    triangles = _delaunay(np.ascontiguousarray(sorted_xy[first]))
+    if not len(triangles):
+        raise ModelError(f"{name}: its {len(order)} different places lie on one line; a surface needs points beside it")
+    faces = order[triangles]
+    if max_edge is not None:
+        corners = local[faces, :2]
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        faces = faces[longest <= max_edge]
+        if not len(faces):
+            raise ModelError(
+                f"{name}: all {len(longest)} triangles have an edge longer than {max_edge:g} (half of them one longer "
+                f"than {np.median(longest):.4g}); give a larger --max-edge"
+            )
+    rows = np.sort(order)
+    place = np.full(len(xyz), -1, np.int64)
+    place[rows] = np.arange(len(rows))
+    values = {key: np.asarray(value)[rows] for key, value in (attributes or {}).items()}
+    facts = dict(georeference or {}) | {"points": len(xyz), "same_place": n_twins, "max_edge": max_edge}
+    return build_source(xyz[rows], place[faces], values, name, rows=rows, up="z", georeference=facts)
+
+
+def _delaunay(xy: FloatArray) -> IntArray:
+    """Return the triangles (T, 3) of points in the unit square, in vector order; slivers are peeled off the hull."""
+    n = len(xy)
+    if n < 3:
+        return np.empty((0, 3), np.int64)
+    area, lift = exact_ranges(xy)
+    records = np.empty(16 * n, np.uint32)
+    flat = np.ascontiguousarray(xy).ravel()
+    end = triangulate(flat, n, find_corners(xy), np.empty(0, np.int64), np.empty(n, np.uint8), records, area, lift)
+    table = records[:end].reshape(-1, RECORD)
+    triangles = table[:, :3].astype(np.int64)
+    beyond = (table[:, :3] == INFINITE).any(axis=1)
+    neighbours = (table[:, 4:7] >> 3).astype(np.int64)
+    real = np.flatnonzero(~beyond)
+    corners = xy[triangles[real]]
+    edges = np.roll(corners, -1, axis=1) - corners
+    double = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    longest = np.hypot(edges[..., 0], edges[..., 1]).max(axis=1)
+    flat_ones = np.zeros(len(table), bool)
+    diagonal = float(np.hypot(*np.ptp(xy, axis=0)))
+    flat_ones[real] = double < SLIVER_HEIGHT * diagonal * longest
+    peel = np.flatnonzero(flat_ones)
+    while len(peel):
+        outer = beyond[neighbours[peel]].any(axis=1)
+        if not outer.any():
+            break
+        beyond[peel[outer]] = True
+        peel = peel[~outer]
+    return triangles[~beyond]

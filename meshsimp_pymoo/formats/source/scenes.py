@@ -1,0 +1,166 @@
+"""Meshes that trimesh reads or writes: scenes of several meshes as one, corners that a format repeats merged."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError, reason_of, warn_of
+from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source.numbers import rgba_of
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from meshsimp_pymoo.formats.table import OutMesh
+
+# trimesh logs what it cannot parse; without a handler Python would print that to stderr. Users' own handlers still get
+# it.
+logging.getLogger("trimesh").addHandler(logging.NullHandler())
+
+# Significant digits that carry any double.
+EXACT_DIGITS = 17
+
+
+def from_trimesh(mesh: trimesh.Trimesh, name: str = "mesh") -> SourceMesh:
+    """Take over a ``trimesh.Trimesh``: its vertices in their order, its vertex colours and vertex attributes.
+
+    Texture coordinates, face attributes and normals stay behind.
+
+    Raises
+    ------
+    ModelError
+        As :func:`~meshsimp_pymoo.formats.source.build_source`.
+    """
+    points, faces, attributes = _trimesh_arrays(mesh)
+    return build_source(points, faces, attributes, name)
+
+
+def read_scene(path: Path, name: str) -> SourceMesh:
+    """Read a file as trimesh does; of vertices at exactly one position the first one's row and attributes stay.
+
+    STL and glTF repeat a vertex for every face or texture seam.
+
+    Raises
+    ------
+    ModelError
+        If trimesh cannot, or it holds no mesh.
+    """
+    suffix = path.suffix.lower()
+    import trimesh
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        # older NumPy only warns when a number cannot be read
+        warnings.filterwarnings("error", message="string or file could not be read")
+        try:
+            loaded = trimesh.load(str(path), process=False)
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:  # a damaged file may break the reader anywhere
+            raise ModelError(
+                f"{name}: cannot be read as {suffix} ({type(error).__name__}: {reason_of(error)}); "
+                "export the file again"
+            ) from error
+        pieces = _scene_pieces(loaded)
+    if not pieces:
+        raise ModelError(f"{name}: holds no triangle mesh; export it with faces")
+    points, faces, attributes = _concatenated(pieces, name)
+    if len(faces) == 0:
+        return build_source(points, faces, attributes, name)
+    first, inverse = _equal_points(points)
+    inside = (faces >= 0) & (faces < len(points))
+    if inside.all():
+        points, faces = points[first], inverse[faces]
+        attributes = {key: values[first] for key, values in attributes.items()}
+        return build_source(points, faces, attributes, name, rows=first)
+    return build_source(points, faces, attributes, name)
+
+
+def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
+    points = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+    faces = np.array(mesh.faces)
+    attributes = {
+        str(key): np.array(values)
+        for key, values in mesh.vertex_attributes.items()
+        if np.ndim(values) > 0 and len(values) == len(points)
+    }
+    visual = mesh.visual
+    if visual.kind == "vertex":
+        colors = np.asarray(visual.vertex_colors)
+    else:  # a glTF with a material keeps its vertex colours beside it
+        colors = np.asarray(getattr(visual, "vertex_attributes", {}).get("color", ()))
+    if colors.ndim == 2 and len(colors) == len(points) and colors.shape[1] in (3, 4):
+        if (color := rgba_of(list(colors.T))) is not None:
+            attributes["color"] = color
+    return points, faces, attributes
+
+
+def _scene_pieces(loaded: Any) -> list[tuple[FloatArray, IntArray, dict[str, AnyArray]]]:
+    """Return the arrays of every mesh in a scene, placed where the scene has it."""
+    if hasattr(loaded, "faces"):
+        return [_trimesh_arrays(loaded)]
+    if not hasattr(loaded, "graph"):  # a point cloud: vertices without faces
+        points = np.array(getattr(loaded, "vertices", np.empty((0, 3))), dtype=np.float64)
+        return [(points, np.empty((0, 3), np.int64), {})]
+    pieces = []
+    for node in loaded.graph.nodes_geometry:
+        transform, geometry = loaded.graph[node]
+        mesh = loaded.geometry[geometry]
+        if not hasattr(mesh, "faces"):
+            continue
+        points, faces, attributes = _trimesh_arrays(mesh)
+        if not np.array_equal(transform, np.eye(4)):
+            points = points @ transform[:3, :3].T + transform[:3, 3]
+            if np.linalg.det(transform[:3, :3]) < 0:
+                faces = faces[:, ::-1]
+        pieces.append((points, faces, attributes))
+    return pieces
+
+
+def _concatenated(
+    pieces: list[tuple[FloatArray, IntArray, dict[str, AnyArray]]], name: str
+) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
+    if len(pieces) == 1:
+        return pieces[0]
+    counts = [len(points) for points, _, _ in pieces]
+    offsets = np.cumsum(counts) - counts
+    attributes = {}
+    for key in sorted({key for _, _, attributes in pieces for key in attributes}):
+        parts = [attributes.get(key) for _, _, attributes in pieces]
+        shapes = {None if part is None else (part.dtype, part.shape[1:]) for part in parts}
+        if len(shapes) == 1:
+            attributes[key] = np.concatenate([part for part in parts if part is not None])
+        else:
+            warn_of(f"{name}: only some of its {len(pieces)} meshes have the attribute {key!r}, which stays behind")
+    faces = np.concatenate([piece[1] + offset for piece, offset in zip(pieces, offsets, strict=True)])
+    return np.concatenate([piece[0] for piece in pieces]), faces, attributes
+
+
+def _equal_points(points: FloatArray) -> tuple[IntArray, IntArray]:
+    """Group points at exactly one position: the first of each group, in order, and every point's group."""
+    tidy = points + 0.0  # -0.0 and 0.0 are one position
+    order = np.lexsort(tidy.T)  # stable: within a group the rows ascend
+    ordered = tidy[order]
+    starts = np.ones(len(points), bool)
+    starts[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    leader = np.empty(len(points), np.int64)
+    leader[order] = order[starts][np.cumsum(starts) - 1]
+    first = np.flatnonzero(leader == np.arange(len(points)))
+    position = np.empty(len(points), np.int64)
+    position[first] = np.arange(len(first))
+    return first, position[leader]
+
+
+def export(path: Path, mesh: OutMesh, **options: Any) -> None:
+    """Write a mesh and its colours as trimesh does, in the format of the path's suffix."""
+    import trimesh
+
+    exported = trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.attributes.get("color"), process=False)
+    written = exported.export(file_type=path.suffix.lower().lstrip("."), **options)
+    path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))

@@ -1,0 +1,397 @@
+"""The formats of files, in one table: what reads a suffix, what writes it, and what is to be known of both.
+
+A format is one file of this folder. It says all of itself in a :class:`Format`, which its last line registers::
+
+    register(Format("toy", (".toy",), "toy meshes", read=_read, write=_write))
+
+Nothing else has to change: the table finds the files of the folder by itself, and the commands, their help and every
+message that lists suffixes ask the table. Help is made of it, so that a format's file imports nothing heavy before it
+is to read or write.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import TYPE_CHECKING, Any, Protocol
+
+from meshsimp_pymoo import formats
+from meshsimp_pymoo.errors import ModelError, reason_of
+from meshsimp_pymoo.formats.options import DEFAULT, Options
+from meshsimp_pymoo.settings import defaults_of, settings_of
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+    from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.formats.source.heights import PlacedHeights
+
+# The sorts of models, as messages call them; a setting may describe one of them alone.
+SORTS = {"mesh": "meshes", "grid": "height grids", "cloud": "point clouds"}
+
+
+class Held(Protocol):
+    """What a format may want to know of a model before it writes meshes of it."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+
+    @property
+    def file_points(self) -> FloatArray:
+        """Vertices (N, 3), as in the file."""
+
+    @property
+    def faces(self) -> IntArray:
+        """Triangles (T, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutMesh:
+    """A mesh to be written; see :func:`write_mesh` for its parts."""
+
+    vertices: FloatArray
+    faces: IntArray
+    attributes: dict[str, AnyArray]
+    origin: FloatArray | None = None
+    georeference: dict[str, Any] = field(default_factory=dict)
+    name: str = "surface"
+
+
+@dataclass(frozen=True)
+class Format:
+    """All that is known of a format of files.
+
+    Attributes
+    ----------
+    name : str
+        What options call it.
+    suffixes : tuple of str
+        Suffixes of its files, with the dot, in lower case; the first is the one that is written.
+    title : str
+        What people call it.
+    sort : str
+        What it holds: "mesh", "grid" or "cloud".
+    read : callable, optional
+        ``read(path, name, options)`` returns the model that a file holds; ``name`` is what messages call it, and the
+        file is there and not empty. None: it is not read.
+    write : callable, optional
+        ``write(path, mesh)``; the same bytes for the same mesh. None: it is not written.
+    extra : str
+        The extra of this package that brings the library it needs; empty: none.
+    further : callable, optional
+        Returns further suffixes, which are those of no other format: ones that a library knows, asked only if needed.
+    single_precision : bool
+        Whether it cannot hold double precision.
+    states_origin : bool
+        Whether it says from which origin its coordinates count; then single precision loses nothing that matters.
+    refuse : callable, optional
+        ``refuse(model)`` raises a ResultError if it cannot hold meshes of this model.
+    open_heights : callable, optional
+        ``open_heights(path, name, options)`` opens a height grid that is read by windows.
+    count_samples : callable, optional
+        ``count_samples(path, name)`` returns the number of samples of a height grid from its header alone, or None.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    title: str
+    sort: str = "mesh"
+    read: Callable[[Path, str, Options], SourceMesh] | None = None
+    write: Callable[[Path, OutMesh], None] | None = None
+    extra: str = ""
+    further: Callable[[], Iterable[str]] | None = None
+    single_precision: bool = False
+    states_origin: bool = False
+    refuse: Callable[[Held], None] | None = None
+    open_heights: Callable[[Path, str, Options], PlacedHeights] | None = None
+    count_samples: Callable[[Path, str], int | None] | None = None
+
+    @property
+    def suffix(self) -> str:
+        """The suffix of the files that are written, with the dot."""
+        return self.suffixes[0]
+
+    def check(self, model: Held) -> None:
+        """Raise a ResultError if meshes of this model cannot be written in it."""
+        if self.refuse is not None:
+            self.refuse(model)
+
+
+# --------------------------------------------------------------------------------------------------------- the table
+
+_TABLE: dict[str, Format] = {}
+
+
+def register(kind: Format) -> None:
+    """Add a format to the table.
+
+    Raises
+    ------
+    ValueError
+        If another format has its name, or reads or writes one of its suffixes.
+    """
+    for other in _TABLE.values():
+        both = set(kind.suffixes) & set(other.suffixes)
+        clash = both and ((kind.read and other.read) or (kind.write and other.write))
+        if kind.name == other.name or clash:
+            raise ValueError(f"the formats {kind.name!r} and {other.name!r} share a name or {sorted(both)}")
+    if kind.sort not in SORTS:
+        raise ValueError(f"the format {kind.name!r} is of the sort {kind.sort!r}; it must be one of {', '.join(SORTS)}")
+    _TABLE[kind.name] = kind
+
+
+def all_formats() -> tuple[Format, ...]:
+    """Return all formats, by name."""
+    _import_all(tuple(formats.__path__))
+    return tuple(_TABLE[name] for name in sorted(_TABLE))
+
+
+@cache
+def _import_all(folders: tuple[str, ...]) -> None:
+    for module in iter_modules(folders):
+        if not module.ispkg:
+            import_module(f"{formats.__name__}.{module.name}")
+
+
+def written_formats() -> dict[str, Format]:
+    """Return the formats that are written, by name."""
+    return {kind.name: kind for kind in all_formats() if kind.write is not None}
+
+
+def written_suffixes() -> list[str]:
+    """Return the suffixes of files that can be written, with the dot."""
+    return [suffix for kind in written_formats().values() for suffix in kind.suffixes]
+
+
+def format_to_write(name: str) -> Format:
+    """Return the format of this name.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or it is not written.
+    """
+    known = written_formats()
+    if name not in known:
+        raise ValueError(f"mesh_format is {name!r}; it must be one of {', '.join(known)}")
+    return known[name]
+
+
+def format_of_output(path: str | os.PathLike[str]) -> Format:
+    """Return the format in which a file of this name is written, by its suffix.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    suffix, known = Path(path).suffix.lower(), written_formats()
+    for kind in known.values():
+        if suffix in kind.suffixes:
+            return kind
+    raise ValueError(f"{path}: no such mesh format; write one of {', '.join(known)}")
+
+
+def format_of_input(path: str | os.PathLike[str]) -> Format | None:
+    """Return the format in which a file of this name is read, by its suffix; None: it is not read."""
+    suffix, known = Path(path).suffix.lower(), [kind for kind in all_formats() if kind.read is not None]
+    for kind in known:
+        if suffix in kind.suffixes:
+            return kind
+    for kind in known:
+        if suffix and kind.further is not None and suffix in kind.further():
+            return kind
+    return None
+
+
+def read_suffixes(sort: str, *, further: bool = True) -> list[str]:
+    """Return the suffixes of files that are read as this sort of model; ``further``: those that libraries know too."""
+    known = [kind for kind in all_formats() if kind.read is not None]
+    stated = {suffix: kind.sort for kind in known for suffix in kind.suffixes}
+    found = {suffix for suffix, its_sort in stated.items() if its_sort == sort}
+    for kind in known:
+        if further and kind.sort == sort and kind.further is not None:
+            found |= set(kind.further()) - set(stated)
+    return sorted(found)
+
+
+# ------------------------------------------------------------------------------------------------------------ reading
+
+
+def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> SourceMesh:
+    """Read a mesh, a height grid or a point cloud; the suffix tells which.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A file in one of the formats of this folder. A scene of several meshes is read as one. Polygons are cut into
+        triangle fans.
+    options : Options
+        How it is read; what describes another sort of model than this one is refused.
+
+    Returns
+    -------
+    SourceMesh
+
+    Raises
+    ------
+    ModelError
+        One line with the file, the cause and the way out. Counts that a header declares are compared with the size of
+        the file before anything is allocated.
+
+    Warns
+    -----
+    ModelWarning
+        If faces that name a vertex twice were dropped, per-vertex data could not be kept, a usual "no data" value
+        stands among the heights of a grid, or points of a cloud share their place in the plane.
+    """
+    path = Path(path)
+    name = str(path)
+    _check_file(path, name)
+    kind = format_of_input(path)
+    if kind is None or kind.read is None:
+        known = [f"{' '.join(read_suffixes(sort))} for {title}" for sort, title in SORTS.items()]
+        raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; known are {listed(known)}")
+    refuse_foreign(name, kind.sort, options)
+    with guarded(kind, name):
+        return kind.read(path, name, options)
+
+
+def listed(words: Iterable[str]) -> str:
+    """Return words as a text lists them.
+
+    >>> listed(["spacing", "nodata", "window"]), listed(["max_edge"])
+    ('spacing, nodata and window', 'max_edge')
+    """
+    *others, last = words
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def described(sort: str | None = None) -> list[str]:
+    """Return the settings of `Options` that describe this sort of model; None: that describe one sort alone."""
+    known = settings_of(Options).items()
+    return [name for name, setting in known if setting.describes and sort in (None, setting.describes)]
+
+
+def are_given(names: Iterable[str], options: Options) -> bool:
+    """Tell whether one of these settings differs from its default."""
+    defaults = defaults_of(Options)
+    pairs = [(getattr(options, name), defaults[name]) for name in names]
+    # an array is never a default, and is not to be compared with one
+    return any(
+        value is not default and (type(value) is not type(default) or value != default) for value, default in pairs
+    )
+
+
+def refuse_foreign(name: str, sort: str, options: Options) -> None:
+    """Refuse settings that describe another sort of model than this one.
+
+    Raises
+    ------
+    ModelError
+        With the settings of that sort, and the suffixes of its files.
+    """
+    for other, title in SORTS.items():
+        names = described(other)
+        if other == sort or not are_given(names, options):
+            continue
+        describe, leave = ("describe", "them") if len(names) > 1 else ("describes", "it")
+        suffixes = " ".join(read_suffixes(other, further=False))
+        raise ModelError(f"{name}: {listed(names)} {describe} {title} ({suffixes}); leave {leave} out")
+
+
+def _check_file(path: Path, name: str) -> None:
+    try:
+        if path.is_dir():
+            raise ModelError(f"{name}: is a folder; name the mesh file in it")
+        if not path.exists():
+            raise ModelError(f"{name}: no such file; check the path")
+        if not path.is_file():
+            raise ModelError(f"{name}: is not a regular file; save the model to one")
+        if path.stat().st_size == 0:
+            raise ModelError(f"{name}: is empty (0 bytes); export it again")
+    except ModelError:
+        raise
+    except (OSError, ValueError) as error:
+        raise ModelError(f"{name}: cannot be read ({reason_of(error)}); check the path and its permissions") from error
+
+
+@contextmanager
+def guarded(kind: Format, name: str) -> Iterator[None]:
+    """Say in one line what a reader of this format meets in the file, or that it lacks its library."""
+    import numpy as np
+
+    try:
+        # numbers that overflow become infinite, and are refused with their row
+        with np.errstate(over="ignore", invalid="ignore"):
+            yield
+    except ModelError:
+        raise
+    except ImportError as error:
+        if not kind.extra:
+            raise
+        library = (error.name or kind.extra).partition(".")[0]
+        raise ModelError(
+            f"{name}: {kind.title} needs {library}; install it by pip install 'meshsimp-pymoo[{kind.extra}]'"
+        ) from None
+    except OSError as error:
+        raise ModelError(f"{name}: cannot be read ({reason_of(error)}); check the path and its permissions") from error
+    except MemoryError as error:
+        raise ModelError(f"{name}: does not fit into memory; cut it into tiles first") from error
+
+
+# ------------------------------------------------------------------------------------------------------------ writing
+
+
+def write_mesh(
+    path: str | os.PathLike[str],
+    vertices: FloatArray,
+    faces: IntArray,
+    attributes: Mapping[str, AnyArray] | None = None,
+    *,
+    origin: npt.ArrayLike | None = None,
+    georeference: Mapping[str, Any] | None = None,
+    name: str = "surface",
+) -> None:
+    """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
+
+    Parameters
+    ----------
+    path : path
+        Ends in one of :func:`written_suffixes`; ``.xml`` is LandXML, a surface for survey and GIS programs.
+    vertices : (V, 3) float array
+        Coordinates; written in double precision (STL and GLB, by definition: single). LandXML takes z for the height,
+        y for the northing and x for the easting.
+    faces : (M, 3) int array
+        Triangles.
+    attributes : mapping of str to (V,) or (V, k) array, optional
+        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, anything else to PLY only.
+    origin : (3,) floats, optional
+        Of GLB: what is subtracted from the coordinates before they lose their double precision. The file says it twice:
+        as the translation of its one node, which puts the mesh back where it was, and as ``extras.origin``. By default
+        it is 0 where that loses nothing, else the mesh's lower corner in whole units.
+    georeference : mapping, optional
+        What is known of the coordinates (see :class:`~meshsimp_pymoo.formats.source.SourceMesh`): PLY says the CRS in a
+        comment, GLB in ``extras``, LandXML as its coordinate system and unit.
+    name : str
+        What LandXML calls the surface.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is not known.
+    """
+    import numpy as np
+
+    kind = format_of_output(path)
+    start = None if origin is None else np.asarray(origin, dtype=np.float64)
+    assert kind.write is not None
+    kind.write(Path(path), OutMesh(vertices, faces, dict(attributes or {}), start, dict(georeference or {}), name))

@@ -1,0 +1,101 @@
+"""The one way in: a path, a built-in name or arrays, and how to read them, become the original mesh."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.files import is_there
+from meshsimp_pymoo.formats.options import DEFAULT, Options
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.scenes import from_trimesh
+from meshsimp_pymoo.formats.table import are_given, described, listed, read_source
+from meshsimp_pymoo.surface.model import OpenModel, build_model
+from meshsimp_pymoo.surface.orient import front_patch
+
+if TYPE_CHECKING:
+    import trimesh
+
+# A file, the name of a built-in model, or a mesh in memory.
+Source: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | SourceMesh"
+
+
+def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenModel:
+    """Read, check and orient a mesh.
+
+    Parameters
+    ----------
+    model : path, built-in name, trimesh.Trimesh, SourceMesh or OpenModel
+        The mesh; a file wins over a built-in model of the same name, and an :class:`OpenModel` is returned as it is.
+    options : Options
+        How it is read.
+
+    Returns
+    -------
+    OpenModel
+
+    Raises
+    ------
+    ModelError
+        If it cannot be read or is no open height field; the message names the cause and the way out.
+    TypeError
+        If it is nothing of that kind.
+
+    Examples
+    --------
+    >>> open_model("roof:3").n_vertices, len(open_model("roof:3").faces)
+    (9, 8)
+    """
+    if isinstance(model, OpenModel):
+        return model
+    return build_model(open_source(model, options), up=options.up)
+
+
+def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
+    """Read a mesh as it lies, unchecked but for its numbers; with ``patch``, only that patch of it.
+
+    Parameters
+    ----------
+    model, options
+        As in :func:`open_model`.
+
+    Raises
+    ------
+    ModelError
+        If there is neither a file nor a built-in model of this name, or it cannot be used.
+    """
+    if options.patch not in (None, "front"):
+        raise ModelError(f'patch={options.patch!r} is unknown; use patch="front" or leave it out')
+    source = _source_of(model, options)
+    return front_patch(source, options.up) if options.patch == "front" else source
+
+
+def _source_of(model: Source, options: Options) -> SourceMesh:
+    if isinstance(model, SourceMesh):
+        return model
+    if isinstance(model, (str, os.PathLike)):
+        return read_source(model, options) if _is_file(model) else _built_in(os.fspath(model), options)
+    if hasattr(model, "vertices") and hasattr(model, "faces"):
+        return from_trimesh(model)
+    raise TypeError(
+        "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
+        f"not {type(model).__name__}"
+    )
+
+
+def _is_file(model: str | os.PathLike[str]) -> bool:
+    """Tell whether a file is meant: there is one of this name, or it is spelled like a path."""
+    text = os.fspath(model)
+    looks_like_file = bool(Path(text.partition(":")[0]).suffix) or os.sep in text or "/" in text
+    return is_there(Path(text)) or looks_like_file or not isinstance(model, str)
+
+
+def _built_in(name: str, options: Options) -> SourceMesh:
+    source = load(name)
+    names = described()
+    if are_given(names, options):
+        raise ModelError(f"{name}: {listed(names)} are for files; a built-in model has its own samples")
+    return source

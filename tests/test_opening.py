@@ -1,0 +1,61 @@
+"""The one way in: what a name means, what may be passed in its place, and which settings do not fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_array_equal
+
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.opening import open_model, open_source
+
+
+def test_a_file_wins_over_a_built_in_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "roof").write_text("no mesh")
+    with pytest.raises(ModelError, match="unknown suffix"):
+        open_source("roof")
+    assert open_source("plane").name == "plane"
+
+
+def test_what_looks_like_a_file_is_looked_for_as_a_file(tmp_path):
+    with pytest.raises(ModelError, match=r"face\.ply: no such file"):
+        open_source("face.ply")
+    with pytest.raises(ModelError, match="no such file"):
+        open_source(str(tmp_path / "roof"))
+    with pytest.raises(ModelError, match=r"did you mean 'face'"):
+        open_source("fase:noise=0.5")
+
+
+def test_spacing_is_for_grids_in_files():
+    with pytest.raises(ModelError, match="roof: spacing, nodata, window and max_edge are for files"):
+        open_source("roof", Options(spacing=2.0))
+
+
+def test_whatever_a_mesh_is_given_as_the_model_is_the_same(tmp_path):
+    source = load("face:200")
+    mesh = trimesh.Trimesh(source.points, source.faces, process=False)
+    np.save(tmp_path / "z.npy", np.arange(12.0).reshape(3, 4) ** 2)
+    expected = open_model("face:200")
+    for given in (source, mesh, expected):
+        model = open_model(given, Options(up="z"))
+        assert_array_equal(model.points, expected.points)
+        assert_array_equal(model.faces, expected.faces)
+    assert open_model(expected) is expected
+    assert open_model(tmp_path / "z.npy").hash == open_model(str(tmp_path / "z.npy")).hash
+
+
+def test_what_is_no_mesh_is_refused_by_type():
+    with pytest.raises(TypeError, match="not int"):
+        open_model(7)
+
+
+def test_a_patch_is_cut_out_on_the_way_and_must_be_one_that_is_known():
+    ball = trimesh.creation.icosphere(3)
+    lid = open_source(ball, Options(up="z", patch="front"))
+    assert 0 < len(lid.faces) < len(ball.faces)
+    with pytest.raises(ModelError, match="patch='back' is unknown"):
+        open_model("roof:3", Options(patch="back"))
