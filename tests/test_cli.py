@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from meshsimp_pymoo.cli.simplify import _mesh_problem as mesh_problem
 from pymoo.optimize import minimize
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
@@ -25,7 +26,6 @@ import meshsimp_pymoo
 from meshsimp_pymoo import Front, MeshProblem, memetic
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli.arguments import SHELLS, make_parser
-from meshsimp_pymoo.cli.simplify import _mesh_problem as mesh_problem
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.table import write_mesh, written_formats
 from meshsimp_pymoo.search.presets import PRESETS

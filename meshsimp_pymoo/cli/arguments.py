@@ -32,7 +32,7 @@ def models() -> str:
     return textwrap.fill(text, 80) + "\n"
 
 
-# ------------------------------------------------------------------------------------------------ from a table to options
+# ---------------------------------------------------------------------------------------------- from a table to options
 
 
 def add_settings(parser: Any, kind: type[Any], *, only: Sequence[str] = (), **defaults: Any) -> None:
@@ -85,7 +85,7 @@ def _option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-# --------------------------------------------------------------------------------------------- what several commands take
+# ------------------------------------------------------------------------------------------- what several commands take
 
 
 def add_model(parser: argparse.ArgumentParser, kind: type[Any], **how: Any) -> None:
@@ -122,7 +122,7 @@ def add_checkpoint(parser: Any, what: str, besides: str) -> None:
     )
 
 
-# --------------------------------------------------------------------------------------------------------- types of values
+# ------------------------------------------------------------------------------------------------------ types of values
 
 
 def typed(parse: Callable[[str], Any]) -> Callable[[str], Any]:

@@ -50,6 +50,7 @@ class Parser(argparse.ArgumentParser):
         return super().format_help()
 
     def error(self, message: str) -> NoReturn:
+        """Raise a UsageError that names the help of this command."""
         raise UsageError(f"{message} (see {self.prog} --help)")
 
     def parse_known_args(  # type: ignore[override]

@@ -1,28 +1,53 @@
-"""``meshsimp run`` and ``meshsimp report``: experiments from YAML files."""
+"""``meshsimp run``: a whole comparison from a YAML file."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, bar, say
+from meshsimp_pymoo.cli.arguments import add_checkpoint, add_shown, add_workers
+from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say
 from meshsimp_pymoo.errors import UsageError
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.workers import DaskEngine
-from meshsimp_pymoo.comparison.config import read_experiment_file
-from meshsimp_pymoo.comparison.report import write_report
-from meshsimp_pymoo.comparison.runner import run_experiment
-from meshsimp_pymoo.storage import read_front
+
+HELP = "do a whole comparison from a YAML file"
+DESCRIPTION = """\
+Do all runs that CONFIG.yaml asks for and report on them: tables, figures, findings. What is
+finished is never done again, so an interrupted call is continued by the same command. See the
+configs folder of the source for examples."""
+EXAMPLES = """\
+examples:
+  meshsimp run configs/quick.yaml -o results --jobs 2
+      the same call again does what is missing
+  meshsimp run configs/scans.yaml --models ~/scans
+      with files of yours
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    parser.add_argument("config", metavar="CONFIG.yaml")
+    parser.add_argument("-o", "--output", metavar="OUT", help="folder to make or to continue (default: CONFIG_results)")
+    add_workers(parser)
+    add_checkpoint(parser, "the state of every run is saved", "; algorithms given by import path may begin anew")
+    parser.add_argument(
+        "--models", metavar="FOLDER", help="where the model files are, in place of the configuration's folder"
+    )
+    add_shown(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Do the runs of ``args.config`` that are missing, and report on all of them."""
+    from meshsimp_pymoo.cli.reporting import report_on_experiment
+    from meshsimp_pymoo.comparison.config import read_experiment_file
+    from meshsimp_pymoo.comparison.runner import run_experiment
+
     experiment = read_experiment_file(args.config, folder=args.models)
     out = Path(args.output or f"{Path(args.config).stem}_results")
     jobs = args.jobs or os.cpu_count() or 1
@@ -40,9 +65,8 @@ def run(args: argparse.Namespace) -> int:
         seconds = time.perf_counter() - start
         if not (args.quiet or args.json):
             print(f"{out}: {done.finished:,} runs done in {seconds:.0f} s, {done.reused:,} were there already")
-        return _write_report(
-            args, out, {"finished": done.finished, "reused": done.reused, "seconds": round(seconds, 3)}
-        )
+        facts = {"finished": done.finished, "reused": done.reused, "seconds": round(seconds, 3)}
+        return report_on_experiment(out, facts, quiet=args.quiet, as_json=args.json)
     except KeyboardInterrupt:
         say(f"interrupted; the finished runs are in {out}, the same command does the rest")
         return INTERRUPTED
@@ -55,40 +79,3 @@ def _cluster(address: str) -> DaskEngine:
         return DaskEngine(address)
     except EngineError as problem:
         raise UsageError(str(problem)) from None
-
-
-def report(args: argparse.Namespace) -> int:
-    """Make the report of the experiment, or the page of the front, in ``args.output`` anew."""
-    out = Path(args.output)
-    if (out / "front.csv").is_file():
-        return _write_front_page(args, out)
-    if args.model is not None:
-        raise UsageError(f"--model is for the page of a front; {out} holds none")
-    return _write_report(args, out, {})
-
-
-def _write_front_page(args: argparse.Namespace, out: Path) -> int:
-    from meshsimp_pymoo.front import Front
-    from meshsimp_pymoo.indicators import knee
-    from meshsimp_pymoo.report.page import write_page
-
-    front = Front.load(out, model=args.model)
-    path = write_page(read_front(out), front.problem, folder=out, knee=knee(front.F))
-    if args.json:
-        print(json.dumps({"page": str(path), "solutions": len(front)}, indent=2))
-    elif not args.quiet:
-        print(f"written: {path} ({len(front)} solutions)")
-    return OK
-
-
-def _write_report(args: argparse.Namespace, out: Path, facts: dict[str, Any]) -> int:
-    with bar(args.quiet, "report") as show:
-        study = write_report(out, progress=lambda done, total, text: show(done / max(total, 1), text))
-    if args.json:
-        summary = {"folder": str(out), **facts, "runs": len(study.all_runs), "missing": len(study.missing)}
-        print(json.dumps(summary, indent=2))
-    elif not args.quiet:
-        left_out = f", {len(study.missing)} runs are missing" if study.missing else ""
-        files = "report.html, findings.md, tables, figures, times.csv"
-        print(f"written: {out}: {files} ({len(study.all_runs):,} runs{left_out})")
-    return OK
