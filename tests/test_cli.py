@@ -453,7 +453,7 @@ def test_an_interruption_while_writing_leaves_nothing_half_written(tmp_path, mon
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to one process")
 def test_ctrl_c_in_a_real_shell_keeps_the_front(tmp_path):
-    command = [sys.executable, "-m", "meshsimp_pymoo.cli", "simplify", "face:2000", "--time", "10min"]
+    command = [sys.executable, "-m", "meshsimp_pymoo", "simplify", "face:2000", "--time", "10min"]
     command += ["-o", str(tmp_path / "out")]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         time.sleep(6)
@@ -807,7 +807,7 @@ def test_completion_prints_a_script_that_knows_the_options(capsys, shell):
 @pytest.mark.parametrize("command", [["info"], ["completion", "bash"]])
 def test_a_reader_that_has_seen_enough_is_no_error(command):
     process = subprocess.Popen(
-        [sys.executable, "-m", "meshsimp_pymoo.cli", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [sys.executable, "-m", "meshsimp_pymoo", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     process.stdout.close()
     assert process.stderr.read() == b""

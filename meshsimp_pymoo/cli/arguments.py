@@ -35,7 +35,7 @@ def models() -> str:
 # ---------------------------------------------------------------------------------------------- from a table to options
 
 
-def add_settings(parser: Any, kind: type[Any], *, only: Sequence[str] = (), **defaults: Any) -> None:
+def add_settings(parser: Any, kind: type[Any], *, only: Sequence[str] = (), **otherwise: str) -> None:
     """Add an option for each setting of a class (see `meshsimp_pymoo.settings`), or for some of them.
 
     Parameters
@@ -46,8 +46,8 @@ def add_settings(parser: Any, kind: type[Any], *, only: Sequence[str] = (), **de
         The class.
     only : sequence of str
         Names of the settings; by default all that a user says himself.
-    **defaults
-        Values that are taken where nothing is said, in place of the class's own.
+    **otherwise
+        What the help says of the default of a setting, where that is found out later: then the value is None.
     """
     own = defaults_of(kind)
     for name, known in settings_of(kind).items():
@@ -56,8 +56,10 @@ def add_settings(parser: Any, kind: type[Any], *, only: Sequence[str] = (), **de
         values: dict[str, Any] = {"type": typed(known.kind.from_text), "metavar": known.metavar or None}
         if isinstance(known.kind, Choice):
             values = {"choices": known.kind.names}
-        default = defaults.get(name, own[name])
-        parser.add_argument(_option(name), default=default, help=known.help, **values)
+        default = None if name in otherwise else own[name]
+        said = otherwise.get(name, str(default) if isinstance(known.kind, Choice) and default is not None else "")
+        help_text = known.help + (f" (default: {said})" if said else "")
+        parser.add_argument(_option(name), default=default, help=help_text, **values)
 
 
 def settings_from(args: argparse.Namespace, kind: type[Settings], **derived: Any) -> Settings:

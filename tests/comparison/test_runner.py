@@ -358,7 +358,7 @@ def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(conf
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a POSIX signal")
 def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(config, tmp_path, reference):
     out = tmp_path / "out"
-    call = [sys.executable, "-m", "meshsimp_pymoo.cli", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
+    call = [sys.executable, "-m", "meshsimp_pymoo", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
     config.write_text(CONFIG.replace("seeds: [1, 2, 3]", f"seeds: {list(range(1, 60))}"), encoding="utf-8")
     parent = subprocess.Popen(call, start_new_session=True)
     deadline = time.monotonic() + 60

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-from meshsimp_pymoo.cli.terminal import OK
-
 HELP = "print what makes a shell complete these commands"
 DESCRIPTION = "Print a script that makes a shell complete the commands, options and files of meshsimp."
 EXAMPLES = """\
@@ -31,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
     import shtab
 
     from meshsimp_pymoo.cli.parser import make_parser
+    from meshsimp_pymoo.cli.terminal import OK
 
     parser = make_parser()
     for action in _arguments(parser):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.cli.arguments import add_model, add_shown, settings_from
-from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
-from meshsimp_pymoo.formats.options import Options
+if TYPE_CHECKING:
+    from meshsimp_pymoo.formats.options import Options
 
 HELP = "say what a model is and whether it can be simplified"
 DESCRIPTION = """\
@@ -27,15 +25,24 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_model, add_shown
+    from meshsimp_pymoo.formats.options import Options
+
     add_model(parser, Options, nargs="?")
     add_shown(parser, quiet=False)
 
 
 def run(args: argparse.Namespace) -> int:
     """Describe ``args.model``; without one, list the built-in models."""
+    import json
+
+    from meshsimp_pymoo import datasets
+    from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.terminal import OK
+    from meshsimp_pymoo.formats.options import Options
+
     if args.model is not None:
         return _describe(args.model, settings_from(args, Options), as_json=args.json)
-    from meshsimp_pymoo import datasets
 
     lines = datasets.describe()
     print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
@@ -43,10 +50,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(model: str, options: Options, *, as_json: bool) -> int:
+    import json
     from dataclasses import asdict
 
     import numpy as np
 
+    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.opening import open_source
     from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
-
-from meshsimp_pymoo.cli.arguments import add_shown, add_wishes, numbered, whole, wishes_of
-from meshsimp_pymoo.cli.requests import Wish
-from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
-from meshsimp_pymoo.formats.table import written_suffixes
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from meshsimp_pymoo.cli.requests import Wish
 
 HELP = "take one mesh out of a front that is stored"
 DESCRIPTION = """\
@@ -33,6 +28,9 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_shown, add_wishes, whole
+    from meshsimp_pymoo.formats.table import written_suffixes
+
     parser.add_argument("front", metavar="OUT", help="the folder of a front")
     wanted = parser.add_argument_group("which one").add_mutually_exclusive_group(required=True)
     add_wishes(wanted)
@@ -51,8 +49,11 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Say which solution of the front in ``args.front`` is meant, and write its mesh if a file is named."""
+    from meshsimp_pymoo.cli.arguments import wishes_of
+    from meshsimp_pymoo.cli.requests import Wish
     from meshsimp_pymoo.cli.tiling import pick_tiled
     from meshsimp_pymoo.files import claim_file
+    from meshsimp_pymoo.formats.table import written_suffixes
     from meshsimp_pymoo.tiles.output import is_tiled
 
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
@@ -73,6 +74,11 @@ def _pick(
     quiet: bool,
     as_json: bool,
 ) -> int:
+    import json
+    from dataclasses import asdict
+
+    from meshsimp_pymoo.cli.arguments import numbered
+    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
     from meshsimp_pymoo.front import Front
 
     front = Front.load(folder, model=model)

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-
-from meshsimp_pymoo.cli.arguments import add_shown
-from meshsimp_pymoo.errors import UsageError
 
 HELP = "make the report of a comparison or the page of a front anew"
 DESCRIPTION = """\
@@ -23,6 +19,8 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_shown
+
     parser.add_argument("output", metavar="OUT", help="the folder of an experiment or of a front")
     parser.add_argument("--model", metavar="MODEL", help="the original of the front, if it is no longer where it was")
     add_shown(parser)
@@ -30,7 +28,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Make the report of the experiment, or the page of the front, in ``args.output`` anew."""
+    from pathlib import Path
+
     from meshsimp_pymoo.cli.reporting import report_on_experiment, report_on_front
+    from meshsimp_pymoo.errors import UsageError
 
     out, shown = Path(args.output), {"quiet": args.quiet, "as_json": args.json}
     if (out / "front.csv").is_file():

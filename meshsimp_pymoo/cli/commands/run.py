@@ -3,15 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import os
-import time
-from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING
-
-from meshsimp_pymoo.cli.arguments import add_checkpoint, add_shown, add_workers
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say
-from meshsimp_pymoo.errors import UsageError
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.workers import DaskEngine
@@ -32,6 +24,8 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_checkpoint, add_shown, add_workers
+
     parser.add_argument("config", metavar="CONFIG.yaml")
     parser.add_argument("-o", "--output", metavar="OUT", help="folder to make or to continue (default: CONFIG_results)")
     add_workers(parser)
@@ -44,7 +38,13 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Do the runs of ``args.config`` that are missing, and report on all of them."""
+    import os
+    import time
+    from contextlib import ExitStack
+    from pathlib import Path
+
     from meshsimp_pymoo.cli.reporting import report_on_experiment
+    from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say
     from meshsimp_pymoo.comparison.config import read_experiment_file
     from meshsimp_pymoo.comparison.runner import run_experiment
 
@@ -73,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _cluster(address: str) -> DaskEngine:
+    from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.workers import DaskEngine, EngineError
 
     try:

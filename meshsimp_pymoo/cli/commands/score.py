@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import json
-from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.cli.arguments import add_model, add_settings, add_shown, settings_from
-from meshsimp_pymoo.cli.terminal import OK, described
-from meshsimp_pymoo.errors import UsageError
-from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.surface.rules import Rules
-
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.front import Front
+    from meshsimp_pymoo.surface.rules import Rules
 
 HELP = "measure a mesh that another tool simplified"
 DESCRIPTION = """\
@@ -39,19 +34,28 @@ ROUNDING = 1e-9
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_model, add_settings, add_shown
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
+
     add_model(parser, Options, help="the original")
     parser.add_argument("other", metavar="OTHER", help="the simplified mesh, in the same frame and units")
     parser.add_argument("--front", metavar="OUT", help="folder of a front of MODEL to compare with")
     parser.add_argument("-o", "--output", metavar="FILE", help="picture of the error to write: png, svg or pdf")
     parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
-    # By default as in the front, if one is named.
-    add_settings(parser, Rules, only=("outside", "weights"), outside=None)
+    add_settings(parser, Rules, only=("outside", "weights"), outside="nearest, or as in the front")
     add_shown(parser, quiet=False)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure ``args.other`` against ``args.model``, place it against a front, and draw its error."""
+    import json
+
+    from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.terminal import OK
     from meshsimp_pymoo.files import claim_file
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
 
     path = None if args.output is None else claim_file(args.output, PICTURES, overwrite=args.overwrite)
     options, rules = settings_from(args, Options), settings_from(args, Rules)
@@ -64,6 +68,11 @@ def _scored(
     model: str, options: Options, rules: Rules, outside: str | None, other: str, folder: str | None, path: Path | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Return what is said of a mesh, as numbers and in words; draw its error if a file is named."""
+    from dataclasses import asdict
+    from pathlib import Path
+
+    from meshsimp_pymoo.cli.terminal import described
+    from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.front import Front
     from meshsimp_pymoo.opening import open_model, open_source
     from meshsimp_pymoo.surface.height import HeightSurface

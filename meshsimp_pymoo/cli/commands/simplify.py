@@ -3,29 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
-from pathlib import Path
-
-from meshsimp_pymoo.cli.arguments import (
-    add_checkpoint,
-    add_model,
-    add_settings,
-    add_shown,
-    add_wishes,
-    add_workers,
-    duration,
-    mesh_count,
-    settings_from,
-    tile,
-    whole,
-    wishes_of,
-)
-from meshsimp_pymoo.cli.requests import Output, Search, Tiling, Wish, requested
-from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import written_formats
-from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
-from meshsimp_pymoo.surface.measures import OBJECTIVES
-from meshsimp_pymoo.surface.rules import Rules
 
 HELP = "write the front of simplified meshes of a model"
 DESCRIPTION = """\
@@ -53,6 +30,25 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import (
+        add_checkpoint,
+        add_model,
+        add_settings,
+        add_shown,
+        add_wishes,
+        add_workers,
+        duration,
+        mesh_count,
+        tile,
+        whole,
+    )
+    from meshsimp_pymoo.cli.requests import Output, Search
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.formats.table import written_formats
+    from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
+    from meshsimp_pymoo.surface.measures import OBJECTIVES
+    from meshsimp_pymoo.surface.rules import Rules
+
     parser.add_argument("-o", "--output", metavar="OUT", help="folder to make (default: MODEL_front, here)")
     parser.add_argument("--overwrite", action="store_true", help="replace results that are in OUT already")
 
@@ -141,7 +137,15 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Turn the command line into objects, and search."""
+    import re
+    from pathlib import Path
+
+    from meshsimp_pymoo.cli.arguments import settings_from, wishes_of
+    from meshsimp_pymoo.cli.requests import Output, Search, Tiling, Wish, requested
     from meshsimp_pymoo.cli.searching import simplify
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.measures import OBJECTIVES
+    from meshsimp_pymoo.surface.rules import Rules
 
     default_folder = f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
     measure = next(name for name, known in OBJECTIVES.items() if known.minimised == args.measure)
