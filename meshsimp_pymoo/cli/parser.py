@@ -98,7 +98,7 @@ def make_parser() -> Parser:
     listed = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name, command in _commands():
         added = listed.add_parser(name, help=command.HELP, description=command.DESCRIPTION, fill=_filling(command))
-        added.set_defaults(command=command.run)
+        added.set_defaults(command=command.run, parser=parser)
     return parser
 
 

@@ -16,8 +16,9 @@ from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.figures import box_figure, fronts_figure, selected_figure
 from meshsimp_pymoo.comparison.report import write_tables
 from meshsimp_pymoo.comparison.store import ExperimentWarning
-from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, Study, slug
+from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, Study
 from meshsimp_pymoo.comparison.tables import Table
+from meshsimp_pymoo.report.document import slug
 
 # Optimal together: (10, 20), (5, 40), (0, 60). Normalised by that front: error / 10, (triangles - 20) / 40.
 FRONTS = {

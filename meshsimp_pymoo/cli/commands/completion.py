@@ -28,14 +28,12 @@ def run(args: argparse.Namespace) -> int:
     """Print the script for ``args.shell``."""
     import shtab
 
-    from meshsimp_pymoo.cli.parser import make_parser
     from meshsimp_pymoo.cli.terminal import OK
 
-    parser = make_parser()
-    for action in _arguments(parser):
+    for action in _arguments(args.parser):
         if action.dest in PATHS and action.choices is None:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    print(shtab.complete(parser, shell=args.shell))
+    print(shtab.complete(args.parser, shell=args.shell))
     return OK
 
 
