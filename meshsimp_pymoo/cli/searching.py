@@ -31,8 +31,7 @@ from meshsimp_pymoo.cli.tiling import simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.source.precision import shared_frame
-from meshsimp_pymoo.formats.table import format_to_write
+from meshsimp_pymoo.formats.table import format_to_write, shared_frame
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.checkpoint import (
