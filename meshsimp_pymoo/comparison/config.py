@@ -308,7 +308,9 @@ def settings(part: Any) -> dict[str, Any]:
     0.8
     """
     kind = type(part)
-    found: dict[str, Any] = {"class": f"{kind.__module__}.{kind.__qualname__}"}
+    # a class of this package is known by its name, wherever it lives
+    home = "meshsimp_pymoo" if kind.__module__.startswith("meshsimp_pymoo.") else kind.__module__
+    found: dict[str, Any] = {"class": f"{home}.{kind.__qualname__}"}
     for name in sorted((_parameters(kind) or set()) - WITHOUT_EFFECT):
         value: Any = getattr(part, name, None)
         if type(value).__module__ == "pymoo.core.variable":

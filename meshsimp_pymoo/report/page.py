@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
-from meshsimp_pymoo.comparison.study import slug
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import new_file
-from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma
+from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
 from meshsimp_pymoo.surface.measures import MEASURES, Measure

@@ -33,8 +33,15 @@ from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
-from meshsimp_pymoo.formats.table import Format, format_of_output, format_to_write, write_mesh
+from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.table import (
+    Format,
+    format_of_output,
+    format_to_write,
+    shared_frame,
+    warn_of_shift,
+    write_mesh,
+)
 from meshsimp_pymoo.storage import (
     FRONT_COLUMNS,
     MESHES_BY_DEFAULT,

@@ -92,7 +92,7 @@ def test_a_window_of_a_mapped_array_has_the_places_and_rows_of_the_whole(tmp_pat
 
 def test_heights_are_read_in_any_order_as_from_an_array(path, monkeypatch):
     monkeypatch.setattr(raster_module, "BAND_SAMPLES", 700)
-    heights = RasterHeights(path, "dem", window=WINDOW)
+    heights = RasterHeights(path, "dem", Options(window=WINDOW))
     column, row, columns, rows = WINDOW
     part = HEIGHTS[row : row + rows, column : column + columns].astype(float)
     rng = np.random.default_rng(1)

@@ -172,7 +172,7 @@ def again(path, target):
 
 def test_killed_and_started_again_it_goes_on_and_ends_with_the_same_bytes(out, path, tmp_path, monkeypatch):
     target = tmp_path / "out"
-    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo.cli", *again(path, target)])
+    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo", *again(path, target)])
     deadline = time.monotonic() + 120
     while len(list((target / "tiles").glob("*.npz"))) < 3 and child.poll() is None:
         assert time.monotonic() < deadline
