@@ -27,6 +27,7 @@ from scipy import stats
 from meshsimp_pymoo.comparison.analysis import ALPHA, holm
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.comparison.tables import INDICATOR_NAMES, Table, markdown_text
+from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = [
@@ -414,7 +415,7 @@ def times_page(study: Study) -> str:
     return _joined(lines)
 
 
-RIVALS_IN_TIME = ("nsga2_v1", "nsga2_v2", "weighted_ga_v1", "weighted_ga_v2")
+RIVALS_IN_TIME = tuple(name for name, preset in PRESETS.items() if preset.is_the_papers and name != "moead")
 _TIME = Claim("time", "MOEA/D takes the least time", "better", (), ())
 
 

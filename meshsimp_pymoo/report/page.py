@@ -18,7 +18,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.files import new_file
+from meshsimp_pymoo.files import put_text
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
@@ -86,8 +86,7 @@ def write_page(
     """Write ``report.html`` to the folder of a front, whole or not at all; see :func:`simplification_page`."""
     content = simplification_page(front, problem, folder=folder, knee=knee)
     path = front.folder / "report.html"
-    with new_file(path) as unfinished:
-        unfinished.write_text(content, encoding="utf-8", newline="\n")
+    put_text(path, content, flush=True)
     return path
 
 
@@ -182,10 +181,16 @@ def simplification_page(
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,
-        errors={name: measure.label for name, measure in MEASURES.items() if measure.unit},
+        errors={name: MEASURES[name].label for name in _errors()},
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
+
+
+def _errors() -> list[str]:
+    """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
+    errors = [name for name, measure in MEASURES.items() if measure.unit]
+    return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
 
 
 def spoken(measure: Measure) -> dict[str, str]:
