@@ -21,8 +21,10 @@ from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import put_text
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
+from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
 from meshsimp_pymoo.surface.measures import MEASURES, Measure
+from meshsimp_pymoo.surface.rules import Rules
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
@@ -304,9 +306,11 @@ def _settings(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what is known of how the front was made, as rows of a table."""
     rows = [("model", run["model"]["name"]), ("hash of the model", run["model"]["hash"])]
     rows += [(key, str(run[key])) for key in RECORDED if run.get(key) is not None]
+    derived = [name for name, known in settings_of(Rules).items() if known.derived]
     said = [part for name in ("options", "rules", "settings") for part in (run.get(name) or {}).items()]
-    for key, value in said:
-        if value not in (None, False) and key not in (*run, "threads"):  # which change no result
+    said = [(key, value) for key, value in said if key not in (*run, *derived, "threads")]  # which change no result
+    for key, value in [*said, ("objectives", run.get("objectives"))]:
+        if value not in (None, False):
             rows.append((key.replace("_", " "), ", ".join(map(str, value)) if isinstance(value, list) else str(value)))
     version = (run.get("versions") or {}).get("meshsimp-pymoo")
     return rows + ([("meshsimp-pymoo", version)] if version else [])
