@@ -192,7 +192,7 @@ MISTAKES = {
     ),
     "measure that an algorithm cannot lower": (
         {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]"},
-        ["algorithms[0]", "'memetic' fails", "lower a sum"],
+        ["algorithms[0]", "'memetic' cannot be used on the problem 'A'", "lower a sum"],
     ),
     "weights not in the file": ({"problem": "{weights: sharpness}"}, ["problems[0]", "'sharpness'", "it has: none"]),
     "pin impossible": ({"problem": "{pin: [100000]}"}, ["problems[0]", "100000"]),
