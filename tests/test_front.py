@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import dataclasses
 import itertools
 import json
 import pickle
@@ -43,6 +44,7 @@ from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
+from meshsimp_pymoo.surface.measures import MEASURES
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +176,9 @@ def test_a_solution_has_its_numbers_and_its_mesh(front):
     assert (solution.error, solution.triangles, solution.vertices) == (q.error, q.triangles, q.vertices)
     assert (solution.mean_error, solution.rms_error, solution.max_error) == (q.mean_error, q.rms_error, q.max_error)
     assert solution.uncovered == q.uncovered
+    assert {name: getattr(solution, name) for name in MEASURES} == dataclasses.asdict(q)
+    with pytest.raises(AttributeError, match="a solution of a front has no 'eror'; its numbers are error, triangles"):
+        _ = solution.eror
     assert isinstance(solution.mesh, trimesh.Trimesh)
     assert len(solution.mesh.faces) == solution.triangles == len(solution.faces)
     assert solution.simplified.deviation.sum() == pytest.approx(solution.error)
@@ -188,8 +193,8 @@ def test_best_of_a_size_is_the_most_accurate_that_is_small_enough(front):
         assert front.best(triangles=limit).error == min(s.error for s in fitting)
 
 
-@pytest.mark.parametrize("name", ["error", "mean_error", "rms_error", "max_error"])
-def test_best_within_an_error_is_the_smallest(front, name):
+@pytest.mark.parametrize("name", [name for name in MEASURES if name != "triangles"])
+def test_best_within_a_measure_is_the_smallest(front, name):
     values = np.array([getattr(s, name) for s in front])
     for limit in (np.median(values), values.min(), values.max()):
         fitting = [s for s in front if getattr(s, name) <= limit]
@@ -205,6 +210,9 @@ def test_a_limit_that_nothing_meets_says_how_near_the_front_comes(front):
         front.best(triangles=5, error=3)
     with pytest.raises(TypeError, match="0 are given"):
         front.best()
+    with pytest.raises(TypeError, match=r"best\(\) knows no limit 'size'; it takes error, triangles, vertices, mean_err"):
+        front.best(size=5)
+    assert front.best(triangles=50, error=None) == front.best(triangles=50)
 
 
 def test_the_knee_lies_farthest_below_the_line_between_the_ends(front):

@@ -20,9 +20,11 @@ from meshsimp_pymoo import (
     MeshProblem,
     NeighbourShift,
     NestedSubsets,
+    Options,
     PinnedCorners,
     RandomSubset,
     Relocation,
+    Rules,
     memetic,
     moead,
     nsga2_v1,
@@ -33,6 +35,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import ThreadRunner
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES
@@ -140,6 +143,43 @@ def test_impossible_arguments_are_refused(arguments, message):
 def test_a_misspelt_argument_is_refused_with_the_nearest_name():
     with pytest.raises(TypeError, match="no argument 'footprnt'; did you mean 'footprint'"):
         MeshProblem("roof:3", footprnt="hull")
+
+
+def test_options_and_rules_come_whole_or_by_name_and_those_by_name_win(tmp_path):
+    np.save(tmp_path / "grid.npy", np.random.default_rng(2).random((5, 6)))
+    options, rules = Options(spacing=(10, 20)), Rules(footprint="hull", outside="ignore", pin="hull")
+    whole = MeshProblem(tmp_path / "grid.npy", options=options, rules=rules)
+    by_name = {"spacing": (10, 20), "footprint": "hull", "outside": "ignore", "pin": "hull"}
+    for arguments in (
+        by_name,
+        {"options": Options(spacing=(1, 1)), "rules": Rules(outside="ignore")} | by_name,
+        {"options": options, "rules": Rules(footprint="hull", pin="hull"), "outside": "ignore"},
+    ):
+        problem = MeshProblem(tmp_path / "grid.npy", **arguments)
+        assert (problem.options, problem.surface.rules) == (options, rules)
+        assert problem.model.hash == whole.model.hash
+        np.testing.assert_array_equal(problem.pinned, whole.pinned)
+        np.testing.assert_array_equal(problem.evaluate(subsets(whole, 5)), whole.evaluate(subsets(whole, 5)))
+
+
+def test_the_measure_of_the_rules_is_the_first_objective():
+    problem = MeshProblem("roof:5", rules=Rules(measure="max_error"))
+    assert problem.objectives == ("max_error", "triangles")
+    problem = MeshProblem("roof:5", rules=Rules(measure="max_error"), objectives=("rms_error", "triangles"))
+    assert problem.surface.rules == Rules(measure="rms_error")
+
+
+def test_a_surface_brings_its_rules_and_takes_no_other_ones():
+    surface = HeightSurface(open_model("roof:5"), Rules(footprint="hull", measure="rms_error"))
+    problem = MeshProblem(surface)
+    assert problem.surface is surface
+    assert problem.model is surface.model
+    assert problem.objectives == ("rms_error", "triangles")
+    for arguments in ({"footprint": "model"}, {"rules": Rules()}, {"spacing": 2.0}, {"options": Options(up="z")}):
+        with pytest.raises(TypeError, match="a HeightSurface is a model that was read, with its rules; make an"):
+            MeshProblem(surface, **arguments)
+    with pytest.raises(ValueError, match=r"the surface's rules measure 'rms_error'; .* Rules\(measure='error'\)"):
+        MeshProblem(surface, objectives=("error", "triangles"))
 
 
 # ------------------------------------------------------------------------------- other objectives, and weights

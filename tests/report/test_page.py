@@ -29,6 +29,7 @@ from meshsimp_pymoo.report.page import FIXED_BYTES, PAGE_BYTES, simplification_p
 from meshsimp_pymoo.storage import mesh_arrays, read_front
 from meshsimp_pymoo.surface.measures import MEASURES
 
+ERRORS = ["mean_error", "max_error", "rms_error", "error"]
 SIDE = 24  # samples along a side of the model
 
 
@@ -199,7 +200,21 @@ def test_a_search_by_triangles_finds_the_most_accurate(visit, front):
     assert shown(visit.page) == front.best(triangles=limit).solution
 
 
-@pytest.mark.parametrize("measure", ["mean_error", "max_error", "rms_error", "error"])
+def test_every_error_can_be_searched_for_those_that_meshes_are_chosen_by_first(visit):
+    options = visit.page.locator("#measure option")
+    assert [option.get_attribute("value") for option in options.all()] == ERRORS
+    assert options.all_inner_texts() == ["mean error", "max error", "RMS error", "error (sum)"]
+    assert visit.page.locator("#measure").input_value() == "mean_error"
+
+
+def test_the_numbers_begin_with_the_sizes(visit):
+    names = visit.page.locator("#numbers th").all_inner_texts()
+    assert names == [
+        "triangles", "vertices", "error", "mean error", "RMS error", "max error", "uncovered", "solution"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("measure", ERRORS)
 def test_a_search_by_error_finds_the_smallest(visit, front, measure):
     limit = getattr(front[5], measure) * 1.01
     visit.page.select_option("#measure", measure)
