@@ -255,7 +255,7 @@ def test_a_search_with_other_settings_does_not_go_on_from_it(tmp_path, whole, mo
     for options, words in [
         (("--seed", "7"), "seed 1, not 7"),
         (("--evaluations", "500"), "evaluations 400, not 500"),
-        (("--pin", "3"), "pinned vertices"),
+        (("--pin", "3"), "pin None, not [3]"),
         (("--footprint", "hull"), "footprint model, not hull"),
     ]:
         assert simplify(out, *options) == 2
@@ -286,7 +286,7 @@ def test_two_processes_do_not_share_a_folder(tmp_path, monkeypatch, capsys):
     out = stopped(tmp_path / "out", monkeypatch)
     with locked(out):
         assert simplify(out) == 2
-    assert "another process is running" in one_line(capsys)
+    assert "another process is at work there" in one_line(capsys)
     assert (out / CHECKPOINT).exists()
 
 
