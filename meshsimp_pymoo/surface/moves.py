@@ -63,7 +63,8 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
         def choose(ground: Any, *_: Any) -> Any:
             return called if getattr(ground, "instance_class", None) is record else None
 
-        overload(question, strict=False)(choose)
+        # inlined, or every call would hand over some fifty arrays: annealing takes half as long again
+        overload(question, strict=False, jit_options={"forceinline": True, "nogil": True})(choose)
         return function
 
     return register
