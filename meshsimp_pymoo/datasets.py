@@ -29,14 +29,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 
 __all__ = ["describe", "load", "names"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 METRES_PER_DEGREE = 111_200.0  # of latitude, at the latitudes of both terrains (36 and 49 degrees north), to 0.05 %
 SPACING_STEP = (

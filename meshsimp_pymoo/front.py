@@ -17,7 +17,7 @@ import operator
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -25,12 +25,16 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.files import claim_file, new_file
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.search.operators.sampling import NestedSubsets, nested_front
+from meshsimp_pymoo.search.greedy import thinned
+from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
+from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
     even_selection,
@@ -38,8 +42,9 @@ from meshsimp_pymoo.storage import (
     write_front,
     write_solution,
 )
-from meshsimp_pymoo.surface.evaluate import ERROR, TRIANGLES, Quality, Simplified
-from meshsimp_pymoo.surface.refit import Refitted, refit_heights
+from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES, Quality, quality_of
+from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.surface import Refitted, Simplified
 
 if TYPE_CHECKING:
     import pandas
@@ -50,22 +55,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Front", "FrontSolution", "starting_front"]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-
-# What of a run's record says how to make its problem again, with the values that old records leave out.
-SETTINGS: dict[str, Any] = {
-    "up": "auto",
-    "patch": None,
-    "spacing": None,
-    "nodata": None,
-    "window": None,
-    "max_edge": None,
-    "footprint": "model",
-    "outside": "nearest",
-    "objectives": ("error", "triangles"),
-    "weights": None,
-}
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
 # What the front that a search started from is called, and how many of its thousands of points are drawn.
@@ -94,40 +83,10 @@ class FrontSolution:
         self.quality: Quality = front.quality[solution]
         self.kept: BoolArray = front.kept[solution]
 
-    @property
-    def error(self) -> float:
-        """Sum of the deviations at all original vertices [model units]."""
-        return self.quality.error
-
-    @property
-    def triangles(self) -> int:
-        """Number of triangles."""
-        return self.quality.triangles
-
-    @property
-    def vertices(self) -> int:
-        """Number of vertices that the triangles use."""
-        return self.quality.vertices
-
-    @property
-    def mean_error(self) -> float:
-        """Mean deviation over all original vertices [model units]."""
-        return self.quality.mean_error
-
-    @property
-    def rms_error(self) -> float:
-        """Root mean square of the deviations [model units]."""
-        return self.quality.rms_error
-
-    @property
-    def max_error(self) -> float:
-        """Largest deviation [model units]."""
-        return self.quality.max_error
-
-    @property
-    def uncovered(self) -> int:
-        """Number of original vertices that no triangle covers."""
-        return self.quality.uncovered
+    def __getattr__(self, name: str) -> Any:
+        if name in MEASURES:
+            return getattr(self.quality, name)
+        raise AttributeError(f"a solution of a front has no {name!r}; its numbers are {', '.join(MEASURES)}")
 
     @cached_property
     def simplified(self) -> Simplified:
@@ -136,18 +95,17 @@ class FrontSolution:
 
     @cached_property
     def refitted(self) -> Refitted:
-        """The same triangles with the heights that make the error least, computed when first used."""
-        problem = self.front.problem
-        kept = self.kept | problem.pinned
-        return refit_heights(problem.model, kept, footprint=problem.footprint, outside=problem.outside)
+        """The same triangles with vertices where their error is least, computed when first used."""
+        surface = self.front.problem.surface
+        return surface.refit(self.kept | surface.pinned)
 
     @property
     def points(self) -> FloatArray:
-        """The model's vertices (N, 3), upright; ``faces`` are rows of them."""
-        return self.front.problem.model.points
+        """The model's vertices (N, 3), as pictures show them; ``faces`` are rows of them."""
+        return self.front.problem.surface.view.points
 
     @property
-    def faces(self) -> npt.NDArray[np.int32]:
+    def faces(self) -> IntArray:
         """The triangles (M, 3) as rows of the model's vertices."""
         return self.simplified.faces
 
@@ -183,16 +141,16 @@ class FrontSolution:
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
-        from meshsimp_pymoo.report.figures import plot_mesh, relief_exaggeration
+        from meshsimp_pymoo.report.figures import plot_mesh
 
-        return plot_mesh(self, ax, **{"exaggeration": relief_exaggeration(self.front.problem.model)} | kwargs)
+        return plot_mesh(self, ax, **{"exaggeration": self.front.problem.surface.view.exaggeration} | kwargs)
 
     def plot_error(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the deviation at every original vertex; see :func:`meshsimp_pymoo.report.figures.plot_error`."""
         from meshsimp_pymoo.report.figures import plot_error
 
         found = self.simplified
-        return plot_error(self.front.problem.model, found.deviation, ax, **{"covered": found.covered} | kwargs)
+        return plot_error(self.front.problem.surface, found.deviation, ax, **{"covered": found.covered} | kwargs)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FrontSolution):
@@ -382,9 +340,8 @@ class Front(Sequence[FrontSolution]):
             If a file is missing or damaged, or ``model`` is another one.
         """
         stored = read_front(folder)
-        names = [item.name for item in fields(Quality)]
-        columns = [stored.quality[name].tolist() for name in names]
-        quality = [Quality(**dict(zip(names, row, strict=True))) for row in zip(*columns, strict=True)]
+        columns = [stored.quality[name].tolist() for name in MEASURES]
+        quality = [quality_of(zip(MEASURES, row, strict=True)) for row in zip(*columns, strict=True)]
         front = cls(
             quality, stored.kept, run=stored.run, folder=stored.folder, meshes=stored.meshes, series=stored.series
         )
@@ -426,7 +383,7 @@ class Front(Sequence[FrontSolution]):
         """What was minimised; (error, triangles) unless the problem says otherwise."""
         if self._problem is not None:
             return self._problem.objectives
-        return tuple(self._settings()["objectives"])
+        return self._recorded()[2]
 
     @property
     def F(self) -> FloatArray:
@@ -457,50 +414,37 @@ class Front(Sequence[FrontSolution]):
 
     # --------------------------------------------------------------------------------------------------------- choosing
 
-    def best(
-        self,
-        *,
-        triangles: float | None = None,
-        error: float | None = None,
-        mean_error: float | None = None,
-        rms_error: float | None = None,
-        max_error: float | None = None,
-    ) -> FrontSolution:
+    def best(self, **limit: float | None) -> FrontSolution:
         """Return the best solution within one limit.
 
         Parameters
         ----------
         triangles : int
             The most accurate solution of at most that many triangles.
-        error, mean_error, rms_error, max_error : float
-            The smallest solution with at most that error [model units].
+        error, mean_error, rms_error, max_error, ... : float
+            The smallest solution with at most that much of a measure (see `Quality`) [model units].
 
         Raises
         ------
         LookupError
             If no solution meets the limit; the message says how near the front comes.
         TypeError
-            If not exactly one limit is given.
+            If not exactly one limit is given, or it is none of these.
         """
-        given = {
-            "triangles": triangles,
-            "error": error,
-            "mean_error": mean_error,
-            "rms_error": rms_error,
-            "max_error": max_error,
-        }
-        limits = {name: value for name, value in given.items() if value is not None}
+        limits = {name: value for name, value in limit.items() if value is not None}
+        if unknown := [name for name in limits if name not in MEASURES]:
+            raise TypeError(f"best() knows no limit {unknown[0]!r}; it takes {', '.join(MEASURES)}")
         if len(limits) != 1:
             raise TypeError(f"best() takes one limit, such as triangles=500 or max_error=0.1; {len(limits)} are given")
-        ((name, limit),) = limits.items()
+        ((name, most),) = limits.items()
         values = np.array([getattr(q, name) for q in self.quality])
-        fitting = np.flatnonzero(values <= limit)
+        fitting = np.flatnonzero(values <= most)
         what = name.replace("_", " ")
         if not len(fitting):
             raise LookupError(
-                f"no solution of {self.name} has a {what} of at most {limit:g}; the least is {values.min():.6g}"
+                f"no solution of {self.name} has a {what} of at most {most:g}; the least is {values.min():.6g}"
                 if name != "triangles"
-                else f"no solution of {self.name} has at most {limit:g} triangles; the smallest has {values.min()}"
+                else f"no solution of {self.name} has at most {most:g} triangles; the smallest has {values.min()}"
             )
         if name == "triangles":
             accuracy = self.F[fitting, 0]
@@ -549,7 +493,7 @@ class Front(Sequence[FrontSolution]):
             The solution to write as ``chosen.<mesh_format>`` too.
         refit : bool
             Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
-            :func:`~meshsimp_pymoo.surface.refit.refit_heights`.
+            :func:`~meshsimp_pymoo.surface.height.refit_heights`.
         page : bool
             Write ``report.html``, the page on which to look at the solutions and choose one.
         run : mapping, optional
@@ -575,7 +519,7 @@ class Front(Sequence[FrontSolution]):
             F = self.F
             shown = panel_rows([q.triangles for q in self.quality], row, knee(F))
             figure = front_figure(
-                problem.model,
+                problem.surface,
                 F[:, [0, -1]],
                 [(solution, faces(solution)) for solution in shown],
                 knee=knee(F),
@@ -590,10 +534,14 @@ class Front(Sequence[FrontSolution]):
                 write_page(read_front(unfinished), problem, folder=folder, knee=knee(F))
 
         record = self.run | dict(run or {})
-        record["settings"] = problem.settings | dict(record.get("settings") or {})
+        record |= {
+            "options": plain(problem.options),
+            "rules": plain(problem.surface.rules),
+            "objectives": list(problem.objectives),
+        }
         return write_front(
             folder,
-            problem.model,
+            problem.surface,
             self.quality,
             self.kept,
             faces=faces,
@@ -665,11 +613,14 @@ class Front(Sequence[FrontSolution]):
 
     # -------------------------------------------------------------------------------------------- the model, read again
 
-    def _settings(self) -> dict[str, Any]:
-        recorded = self.run.get("settings") or {}
-        return {key: recorded.get(key, default) or default for key, default in SETTINGS.items()} | {
-            "nodata": recorded.get("nodata")  # 0 is a height
-        }
+    def _recorded(self) -> tuple[Options, Rules, tuple[str, ...]]:
+        """Return how the model was read, what counted and what was minimised, as the record has it."""
+        try:
+            options = read_back(Options, self.run.get("options") or {})
+            rules = read_back(Rules, self.run.get("rules") or {})
+            return options, rules, tuple(self.run.get("objectives") or (rules.measure, "triangles"))
+        except (TypeError, ValueError) as problem:
+            raise ResultError(f"{self.folder or 'the front'}: its record cannot be used: {problem}") from None
 
     def _problem_of(self, model: Any) -> MeshProblem:
         """Make the problem again from the record, and check that the model is the same."""
@@ -678,11 +629,8 @@ class Front(Sequence[FrontSolution]):
         way_out = "pass the original (Front.load(folder, model=...), --model FILE) or simplify it again"
         source = model if model is not None else self._model_file()
         try:
-            settings = self._settings()
-            for key in ("spacing", "window"):
-                if isinstance(settings[key], list):
-                    settings[key] = tuple(settings[key])
-            problem = MeshProblem(source, **settings)
+            options, rules, objectives = self._recorded()
+            problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
         except ModelError as trouble:
             if model is not None:
                 raise
@@ -726,7 +674,7 @@ def starting_front(problem: MeshProblem, algorithm: Any) -> dict[str, FloatArray
     sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
     if not isinstance(sampling, NestedSubsets) or problem.n_obj != 2:
         return {}
-    F = nested_front(problem, sampling).F
+    F = thinned(problem.surface).F
     F = non_dominated(F[F[:, 1] > 0])
     F = F[np.argsort(F[:, 1])]
     wanted = np.geomspace(F[0, 1], F[-1, 1], START_POINTS)

@@ -24,8 +24,10 @@ from typing import Any
 
 import moocore
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pymoo.core.indicator import Indicator
+
+from meshsimp_pymoo.arrays import FloatArray
 
 __all__ = [
     "REFERENCE",
@@ -43,7 +45,6 @@ __all__ = [
     "non_dominated",
 ]
 
-FloatArray = NDArray[np.float64]
 
 # The reference point of the hypervolume after normalisation, the same in every objective. At 1 the two ends
 # of the optimal front would not count at all; 1.1 is the usual choice that lets them count a little.

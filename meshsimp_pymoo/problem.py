@@ -7,45 +7,44 @@ import hashlib
 import inspect
 import os
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
 from pymoo.core.problem import ElementwiseProblem, Problem
 
-from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.formats.options import Options, Window
+from meshsimp_pymoo.arrays import BoolArray, FloatArray
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_model
-from meshsimp_pymoo.surface.evaluate import (
-    FOOTPRINTS,
+from meshsimp_pymoo.settings import documentation, settings_of, taken
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import (
+    ERROR,
+    MAXIMUM,
     MEASURES,
-    OUTSIDES,
+    OBJECTIVES,
     REGIONS,
+    SQUARES,
     TRIANGLES,
+    UNCOVERED,
+    VERTICES,
     Quality,
-    Simplified,
     as_quality,
-    evaluate_subsets,
-    simplify,
 )
 from meshsimp_pymoo.surface.model import OpenModel
-from meshsimp_pymoo.surface.orient import Up
-
-BoolArray = npt.NDArray[np.bool_]
-FloatArray = npt.NDArray[np.float64]
+from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.surface import Simplified, Surface
 
 # Chromosomes whose numbers are remembered; each takes about 200 bytes.
 MEMO_SIZE = 100_000
 # Regions in which the error may be kept with each solution and each chromosome remembered.
 MOST_REGIONS = 4096
 # Numbers of each solution that pymoo keeps beside its objectives.
-REPORTED = ("error", "vertices", "mean_error", "rms_error", "max_error", "uncovered")
-# A landmark given by position is the nearest vertex, but not one farther away than this share of the diagonal.
-LANDMARK_REACH = 0.01
+REPORTED = tuple(name for name in MEASURES if name != "triangles")
 
 
 class ThreadRunner:
@@ -72,42 +71,26 @@ class ThreadRunner:
 
 
 class MeshProblem(ElementwiseProblem):
-    """Choose the vertices of an open mesh to keep: minimise (error, triangles), or other measures of the error.
+    """Choose the vertices of a mesh to keep: minimise (error, triangles), or other measures of the error.
 
-    A solution is a bool vector over the vertices in vector order (see :class:`OpenModel`); its mesh is the Delaunay
-    triangulation of the kept vertices in the plane. Pinned vertices belong to every mesh, whether or not the chromosome
-    says so; with ``repair=PinnedCorners()`` it does, which keeps duplicates recognisable.
+    A solution is a bool vector over the vertices in vector order (see :class:`OpenModel`); its mesh is what the
+    problem's surface makes of it: of an open model the Delaunay triangulation of the kept vertices in the plane. Pinned
+    vertices belong to every mesh, whether or not the chromosome says so; with ``repair=PinnedCorners()`` it does, which
+    keeps duplicates recognisable.
 
     Parameters
     ----------
-    model : path, built-in name, trimesh.Trimesh, SourceMesh or OpenModel
-        The original mesh.
-    footprint : {"model", "hull"}
-        Emit only the triangles whose centroid lies inside the original mesh's projection, or all of them (the paper).
-    outside : {"nearest", "ignore"}
-        What a vertex costs that no triangle covers: its distance to the nearest point of the mesh, or nothing (the
-        paper).
-    up : "auto", an axis such as "z" or "-x", or a vector
-        Direction of the height.
-    patch : "front", optional
-        Cut out the front-facing patch of a mesh that is no height field.
-    spacing : (dx, dy), optional
-        Sample distances of a height grid [units].
-    nodata : float, optional
-        Height that means "no sample" in a height grid.
-    window : (column, row, columns, rows), optional
-        The part of a height grid to take.
-    max_edge : float, optional
-        Longest edge in the plane of a triangle of a point cloud [units].
-    pin : "corners", "hull", file rows, positions, or a list of these
-        Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole numbers
-        for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's frame.
-    objectives : tuple of str
+    model : path, built-in name, trimesh.Trimesh, SourceMesh, OpenModel or Surface
+        The original mesh. A surface has its rules already.
+    SETTINGS
+    options : Options, optional
+        How the model is read, in one object; the settings given by name replace its own.
+    rules : Rules, optional
+        What counts, in one object; the settings given by name replace its own.
+    objectives : tuple of str, optional
         What is minimised: one or more of "error" (the sum of w_p d_p), "rms_error" and "max_error" (see
-        :class:`~meshsimp_pymoo.surface.evaluate.Quality`), then "triangles". All come from the same evaluation.
-    weights : str or array, optional
-        How much each vertex counts in the error: one number for each row of the file, or the name of one of its
-        per-vertex attributes; see :meth:`~meshsimp_pymoo.surface.model.OpenModel.with_weights`. 1 by default.
+        :class:`~meshsimp_pymoo.surface.measures.Quality`), then "triangles". All come from the same evaluation. By
+        default the measure of the rules, "error" unless they say otherwise, and "triangles".
     max_triangles : int, optional
         Largest number of triangles, as a pymoo constraint.
     max_error : float, optional
@@ -126,17 +109,18 @@ class MeshProblem(ElementwiseProblem):
 
     Attributes
     ----------
+    surface : Surface
+        What a chromosome means: the model with its rules.
     model : OpenModel
         The original mesh; it holds the weights.
+    options : Options
+        How it was read.
     objectives : tuple of str
         Names of the columns of F.
     regions : int
         In how many regions the error is known; at most N.
     pinned : (N,) bool array
         Vertices that every mesh keeps.
-    settings : dict
-        The arguments that decide what a chromosome's mesh and numbers are; with the same model they make the problem
-        again.
 
     Notes
     -----
@@ -154,19 +138,11 @@ class MeshProblem(ElementwiseProblem):
 
     def __init__(
         self,
-        model: str | Path | trimesh.Trimesh | SourceMesh | OpenModel,
+        model: str | Path | trimesh.Trimesh | SourceMesh | OpenModel | Surface,
         *,
-        footprint: str = "model",
-        outside: str = "nearest",
-        up: Up = "auto",
-        patch: str | None = None,
-        spacing: tuple[float, float] | None = None,
-        nodata: float | None = None,
-        window: Window | None = None,
-        max_edge: float | None = None,
-        pin: str | Sequence[Any] | npt.NDArray[Any] | None = None,
-        objectives: Sequence[str] = ("error", "triangles"),
-        weights: str | npt.ArrayLike | None = None,
+        options: Options | None = None,
+        rules: Rules | None = None,
+        objectives: Sequence[str] | None = None,
         max_triangles: int | None = None,
         max_error: float | None = None,
         n_threads: int | None = None,
@@ -175,50 +151,42 @@ class MeshProblem(ElementwiseProblem):
         elementwise_runner: Callable[..., Any] | None = None,
         **kwargs: Any,
     ) -> None:
-        unknown = sorted(set(kwargs) - set(inspect.signature(Problem).parameters))
-        if unknown:
-            names = [inspect.signature(kind).parameters for kind in (MeshProblem, Problem)]
-            near = difflib.get_close_matches(unknown[0], [*names[0], *names[1]], 1)
-            raise TypeError(
-                f"MeshProblem has no argument {unknown[0]!r}" + (f"; did you mean {near[0]!r}?" if near else "")
-            )
-        if footprint not in FOOTPRINTS or outside not in OUTSIDES:
-            wrong, known = (footprint, FOOTPRINTS) if footprint not in FOOTPRINTS else (outside, OUTSIDES)
-            raise ValueError(f"{wrong!r} is unknown; choose one of {', '.join(map(repr, known))}")
+        self.options = taken(Options, options, kwargs)
+        by_name = [name for name, known in settings_of(Rules).items() if name in kwargs and not known.derived]
+        named = {name: kwargs.pop(name) for name in by_name}
+        _refuse_unknown(kwargs)
         if max_triangles is not None and max_triangles < 1:
             raise ValueError(f"max_triangles={max_triangles} leaves no mesh; give 1 or more")
         if max_error is not None and not max_error >= 0:
             raise ValueError(f"max_error={max_error} is no error; give 0 or more")
         if not 0 <= regions <= MOST_REGIONS:
             raise ValueError(f"regions={regions} is no number of regions; give 0 to {MOST_REGIONS}")
-        self.objectives = _checked_objectives(objectives)
-        self.settings: dict[str, Any] = {
-            "up": up,
-            "patch": patch,
-            "spacing": spacing,
-            "nodata": nodata,
-            "window": window,
-            "max_edge": max_edge,
-            "footprint": footprint,
-            "outside": outside,
-            "pin": pin,
-            "objectives": self.objectives,
-            "weights": weights,
-        }
-        options = Options(up=up, patch=patch, spacing=spacing, nodata=nodata, window=window, max_edge=max_edge)
-        self.model = open_model(model, options)
-        if weights is not None:
-            self.model = self.model.with_weights(weights)
-        self.footprint = footprint
-        self.outside = outside
-        self.pinned = pinned_vertices(self.model, pin)
+        if hasattr(model, "rules"):
+            if named or rules is not None or self.options != Options():
+                raise TypeError(
+                    f"a {type(model).__name__} is a model that was read, with its rules; make another one, or give the "
+                    "model and leave the surface out"
+                )
+            self.surface: Surface = cast("Surface", model)
+            names = objectives if objectives is not None else (self.surface.rules.measure, "triangles")
+            self.objectives = _checked_objectives(names)
+            if self.objectives[0] != self.surface.rules.measure:
+                raise ValueError(
+                    f"the first objective is {self.objectives[0]!r}, and the surface's rules measure "
+                    f"{self.surface.rules.measure!r}; make the surface with Rules(measure={self.objectives[0]!r})"
+                )
+        else:
+            measure = (rules or Rules()).measure
+            self.objectives = _checked_objectives(objectives if objectives is not None else (measure, "triangles"))
+            rules = taken(Rules, rules, named | {"measure": self.objectives[0]})
+            self.surface = HeightSurface(open_model(model, self.options), rules)
         self.max_triangles = max_triangles
         self.max_error = max_error
         self._memo: OrderedDict[bytes, FloatArray] = OrderedDict()
         self._memo_size = memo
-        self.regions = min(regions, self.model.n_vertices)
+        self.regions = min(regions, self.surface.n_vertices)
         super().__init__(
-            n_var=self.model.n_vertices,
+            n_var=self.surface.n_vertices,
             n_obj=len(self.objectives),
             n_ieq_constr=(max_triangles is not None) + (max_error is not None),
             xl=0,
@@ -227,6 +195,16 @@ class MeshProblem(ElementwiseProblem):
             elementwise_runner=elementwise_runner if elementwise_runner is not None else ThreadRunner(n_threads),
             **kwargs,
         )
+
+    @property
+    def model(self) -> Any:
+        """The original mesh."""
+        return self.surface.model
+
+    @property
+    def pinned(self) -> BoolArray:
+        """Vertices that every mesh keeps, (N,)."""
+        return self.surface.pinned
 
     def evaluate(self, X: npt.NDArray[Any], *args: Any, **kwargs: Any) -> Any:
         """Evaluate one chromosome (N,) or many (P, N) as any pymoo problem does; float genomes are refused."""
@@ -239,7 +217,7 @@ class MeshProblem(ElementwiseProblem):
     def evaluate_subsets(self, X: npt.NDArray[Any], *, n_threads: int = 1) -> FloatArray:
         """Evaluate chromosomes (P, N) together, each different one once; return the table (P, 6 + regions).
 
-        See :func:`meshsimp_pymoo.surface.evaluate.evaluate_subsets` for its columns. Pinned vertices are added first.
+        See `meshsimp_pymoo.surface.measures` for its columns. Pinned vertices are added first.
         """
         _require_bool(X)
         X = np.asarray(X) | self.pinned
@@ -267,23 +245,11 @@ class MeshProblem(ElementwiseProblem):
         return np.array([found[key] for key in keys])
 
     def _kernel(self, X: BoolArray, n_threads: int) -> FloatArray:
-        return evaluate_subsets(
-            self.model,
-            X,
-            footprint=self.footprint,
-            outside=self.outside,
-            n_threads=n_threads,
-            regions=self.regions,
-        )
+        return self.surface.evaluate(X, threads=n_threads, regions=self.regions)
 
     def outcome(self, row: FloatArray) -> dict[str, Any]:
         """Turn one row of :meth:`evaluate_subsets` into pymoo's ``out``."""
-        if row[TRIANGLES] == 0:
-            n = self.model.n_vertices
-            worst = self.model.diagonal
-            quality = Quality(self.model.total_weight * worst, 2 * n, 0, worst, worst, worst, n)
-        else:
-            quality = self.as_quality(row)
+        quality = self.as_quality(row if row[TRIANGLES] else self._worst_row())
         out: dict[str, Any] = {name: getattr(quality, name) for name in REPORTED}
         F = [float(getattr(quality, name)) for name in self.objectives]
         out["F"] = F
@@ -301,7 +267,16 @@ class MeshProblem(ElementwiseProblem):
 
     def as_quality(self, row: FloatArray) -> Quality:
         """Name the columns of one row of :meth:`evaluate_subsets`."""
-        return as_quality(row, self.model.total_weight)
+        return as_quality(row, self.surface.total_weight)
+
+    def _worst_row(self) -> FloatArray:
+        """Return the numbers of a mesh that every other one dominates."""
+        surface, row = self.surface, np.empty(REGIONS)
+        row[ERROR] = surface.total_weight * surface.diagonal
+        row[SQUARES] = surface.total_weight * surface.diagonal**2
+        row[MAXIMUM] = surface.diagonal
+        row[TRIANGLES], row[VERTICES], row[UNCOVERED] = 2 * surface.n_vertices, 0, surface.n_vertices
+        return row
 
     @property
     def worst(self) -> tuple[float, ...]:
@@ -309,7 +284,7 @@ class MeshProblem(ElementwiseProblem):
 
         By default (N times the diagonal, 2 N); the mean and the maximum of the error are at worst the diagonal.
         """
-        nothing = np.zeros(6)
+        nothing = np.zeros(REGIONS)
         return tuple(self.outcome(nothing)["F"])
 
     def simplify(self, kept: npt.NDArray[Any]) -> Simplified:
@@ -317,7 +292,7 @@ class MeshProblem(ElementwiseProblem):
         _require_bool(kept)
         if np.shape(kept) != (self.n_var,):
             raise ValueError(f"a subset has shape ({self.n_var},), one entry a vertex, not {np.shape(kept)}")
-        return simplify(self.model, np.asarray(kept) | self.pinned, footprint=self.footprint, outside=self.outside)
+        return self.surface.simplify(np.asarray(kept) | self.pinned)
 
     def quality(self, kept: npt.NDArray[Any]) -> Quality:
         """Return all quality numbers of one chromosome (N,)."""
@@ -352,104 +327,44 @@ class MeshProblem(ElementwiseProblem):
         return self
 
 
+MeshProblem.__doc__ = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+
+
+def _signature() -> inspect.Signature:
+    """Return the signature of MeshProblem with the settings by name, for help() and editors."""
+    own = list(inspect.signature(MeshProblem.__init__).parameters.values())[1:]
+    by_name = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=getattr(kind(), name))
+        for kind in (Options, Rules)
+        for name, known in settings_of(kind).items()
+        if not known.derived
+    ]
+    return inspect.Signature([own[0], *by_name, *own[1:]])
+
+
+MeshProblem.__signature__ = _signature()
+
+
+def _refuse_unknown(kwargs: dict[str, Any]) -> None:
+    unknown = sorted(set(kwargs) - set(inspect.signature(Problem).parameters))
+    if unknown:
+        names = [*inspect.signature(MeshProblem).parameters, *inspect.signature(Problem).parameters]
+        near = difflib.get_close_matches(unknown[0], names, 1)
+        raise TypeError(
+            f"MeshProblem has no argument {unknown[0]!r}" + (f"; did you mean {near[0]!r}?" if near else "")
+        )
+
+
 def _checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
     """Return the objectives as a tuple, or raise a ValueError that says what they must be."""
     names = (objectives,) if isinstance(objectives, str) else tuple(objectives)
     measures = names[:-1]
-    if names[-1:] != ("triangles",) or not measures or set(measures) - set(MEASURES) or len(set(names)) < len(names):
+    if names[-1:] != ("triangles",) or not measures or set(measures) - set(OBJECTIVES) or len(set(names)) < len(names):
         raise ValueError(
-            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, MEASURES))}, each "
+            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, OBJECTIVES))}, each "
             "once, and 'triangles' last, as in ('error', 'triangles')"
         )
     return names
-
-
-def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | npt.NDArray[Any] | None = None) -> BoolArray:
-    """Return which vertices every mesh keeps: the corners, and what ``pin`` names (see :class:`MeshProblem`).
-
-    Raises
-    ------
-    ModelError
-        If a file row does not exist or is not part of the model, or a position has no vertex near.
-    """
-    pinned = np.zeros(model.n_vertices, bool)
-    pinned[model.corners] = True
-    for part in _pin_parts(pin):
-        if isinstance(part, str):
-            if part not in ("corners", "hull"):
-                raise ModelError(f"pin={part!r} is unknown; use 'corners', 'hull', file rows or positions")
-            if part == "hull":
-                pinned[model.hull] = True
-        elif part.ndim == 1:
-            pinned[_rows_of_file(model, part)] = True
-        else:
-            pinned[_vertices_near(model, part)] = True
-    return pinned
-
-
-def _pin_parts(pin: Any) -> list[Any]:
-    """Sort what the user gave into names, an array of file rows and an array of positions."""
-    if pin is None:
-        return []
-    if isinstance(pin, str):
-        return [pin]
-    if isinstance(pin, np.ndarray):
-        pin = [pin] if pin.ndim == 2 else list(pin)
-    elif not isinstance(pin, Iterable):
-        pin = [pin]
-    parts: list[Any] = []
-    rows = []
-    for item in pin:
-        if isinstance(item, str):
-            parts.append(item)
-        elif np.ndim(item) == 0:
-            rows.append(item)
-        else:
-            positions = np.atleast_2d(np.asarray(item))
-            if positions.ndim != 2 or positions.shape[1] not in (2, 3):
-                raise ModelError(
-                    f"pin holds an array of shape {np.shape(item)}; positions have shape (K, 2) or (K, 3), "
-                    "file rows are single whole numbers"
-                )
-            parts.append(positions.astype(float))
-    if rows:
-        parts.append(np.asarray(rows))
-    return parts
-
-
-def _rows_of_file(model: OpenModel, rows: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    if not np.issubdtype(rows.dtype, np.integer):
-        raise ModelError(
-            f"pin holds {rows[0]!r}, which is no row of the file; give whole numbers, or positions as [x, y, z]"
-        )
-    order = np.argsort(model.source_index, kind="stable")
-    place = np.searchsorted(model.source_index[order], rows)
-    found = place < model.n_vertices
-    found[found] = model.source_index[order[place[found]]] == rows[found]
-    if not found.all():
-        raise ModelError(
-            f"pin: row {int(rows[~found][0])} of {model.name} is not among the model's {model.n_vertices} vertices; "
-            "rows count from 0, and vertices that no face uses are left out"
-        )
-    return order[place]
-
-
-def _vertices_near(model: OpenModel, positions: FloatArray) -> npt.NDArray[np.int64]:
-    from scipy.spatial import cKDTree
-
-    if positions.shape[1] == 3:
-        wanted, vertices = positions, model.file_points
-    else:
-        wanted, vertices = positions - model.origin[:2], model.points[:, :2]
-    distance, nearest = cKDTree(vertices).query(wanted)
-    far = np.flatnonzero(distance > LANDMARK_REACH * model.diagonal)
-    if len(far):
-        k = far[0]
-        raise ModelError(
-            f"pin: the vertex of {model.name} nearest to {positions[k].tolist()} is {distance[k]:.6g} away, more than "
-            f"{LANDMARK_REACH:.0%} of the diagonal {model.diagonal:.6g}; give positions on the mesh"
-        )
-    return np.asarray(nearest, np.int64)
 
 
 def _require_bool(X: Any) -> None:

@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
     new_folder,
@@ -45,33 +46,20 @@ from meshsimp_pymoo.files import (
     write_csv,
     write_npz,
 )
-from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
-from meshsimp_pymoo.formats.table import format_of_output, format_to_write, write_mesh
+from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
+from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.evaluate import Quality
     from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.refit import Refitted
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.integer[Any]]
-BoolArray = npt.NDArray[np.bool_]
 
-FRONT_COLUMNS = (
-    "solution",
-    "error",
-    "triangles",
-    "vertices",
-    "mean_error",
-    "rms_error",
-    "max_error",
-    "uncovered",
-    "mesh",
-)
+FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
-INT_COLUMNS = ("solution", "triangles", "vertices", "uncovered")
+INT_COLUMNS = ("solution", *COUNTED)
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
@@ -188,7 +176,7 @@ def _of_unfinished(name: str) -> bool:
 
 def write_front(
     folder: str | os.PathLike[str],
-    model: OpenModel,
+    surface: Surface,
     quality: Sequence[Quality],
     kept: BoolArray,
     *,
@@ -208,8 +196,8 @@ def write_front(
     ----------
     folder : path
         The folder to make; see :func:`claim_output`.
-    model : OpenModel
-        The original mesh.
+    surface : Surface
+        The original mesh and its rules.
     quality : sequence of Quality, length S
         The numbers of each solution, in any order; written sorted by triangles, then error.
     kept : (S, N) bool array
@@ -228,7 +216,7 @@ def write_front(
         Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
     refit : callable, optional
         The best heights for the solution in this row of ``kept`` (see
-        :func:`~meshsimp_pymoo.surface.refit.refit_heights`). Each mesh that is written is then written with them
+        :func:`~meshsimp_pymoo.surface.height.refit_heights`). Each mesh that is written is then written with them
         too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
@@ -252,6 +240,7 @@ def write_front(
     ValueError
         If the front is empty, holds a number that is not finite, or does not fit the model.
     """
+    model = surface.model
     kept = np.asarray(kept, dtype=bool)
     if len(quality) == 0:
         raise ValueError("the front is empty; there is nothing to write")
@@ -292,7 +281,7 @@ def write_front(
                     write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
                 if refit is not None:
                     better = refit(int(row))
-                    raised = (better.vertices(model), *arrays[1:])
+                    raised = (better.vertices, *arrays[1:])
                     fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                     if solution in with_mesh:
                         write_mesh(partial / fitted[1], *raised, **look)
@@ -300,12 +289,12 @@ def write_front(
                         write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **look)
             numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
-        warn_of_shift(kind, model.name, model.diagonal, single)
+        warn_of_shift(kind, model.name, surface.diagonal, single)
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=model.source_index.astype(np.int64))
+        write_npz(partial / "front.npz", F=F[order], kept=packed, **surface.stored_arrays())
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
@@ -313,7 +302,7 @@ def write_front(
                 "hash": model.hash,
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
-                "up": model.up,
+                "up": surface.view.rotation[2],
                 **({"georeference": model.georeference} if model.georeference else {}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
@@ -385,7 +374,8 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
 def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
     """Refuse a record whose parts are not of the kind that others rely on."""
     model, chosen = run.get("model") or {}, run.get("chosen")
-    wrong = [name for name in ("model", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    parts = ("model", "options", "rules", "settings", "versions")
+    wrong = [name for name in parts if not isinstance(run.get(name) or {}, dict)]
     if not wrong:
         wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
@@ -395,13 +385,13 @@ def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
 
 
 def mesh_arrays(
-    model: OpenModel, faces: IntArray
+    model: Original, faces: IntArray
 ) -> tuple[FloatArray, npt.NDArray[np.int64], dict[str, npt.NDArray[Any]]]:
     """Return a simplified mesh in the file's own frame.
 
     Parameters
     ----------
-    model : OpenModel
+    model : Original
         The original mesh.
     faces : (M, 3) int array
         Triangles as indices of the model's vertices in vector order.

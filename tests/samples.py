@@ -11,8 +11,9 @@ import numpy as np
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.storage import write_front
-from meshsimp_pymoo.surface.evaluate import Simplified, simplify
+from meshsimp_pymoo.surface.evaluate import simplify
 from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.surface import Simplified
 
 
 def holey_grid() -> SourceMesh:

@@ -22,7 +22,7 @@ class GridProblem(ElementwiseProblem):
         vertex = np.arange(n).reshape(side, side)
         self.pinned = np.zeros(n, dtype=bool)
         self.pinned[vertex[[0, 0, -1, -1], [0, -1, 0, -1]]] = True
-        self.model = SimpleNamespace(neighbours=grid_neighbours(side))
+        self.surface = SimpleNamespace(neighbours=grid_neighbours(side))
         self.weights = np.random.default_rng(5).integers(1, 1000, size=n).astype(float)
         self.max_triangles = max_triangles
         self.calls = 0
@@ -48,3 +48,11 @@ def grid_neighbours(side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
             rings.append([a * side + b for a, b in around if 0 <= a < side and 0 <= b < side])
     indptr = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])])
     return indptr, np.concatenate(rings)
+
+
+def front_of(problem: GridProblem) -> NDArray[np.float64]:
+    """The true front: keep the heaviest vertices, any number of them."""
+    weights = np.sort(problem.weights[~problem.pinned])
+    n_dropped = np.arange(len(weights) + 1)
+    error = np.concatenate([[0.0], np.cumsum(weights)])
+    return np.column_stack([error, 2.0 * (problem.n_var - n_dropped) - 6])

@@ -159,7 +159,7 @@ def test_a_killed_search_goes_on_and_says_so(tmp_path, whole, monkeypatch, capsy
 def test_a_killed_search_of_every_preset_ends_with_the_same_bytes(tmp_path, monkeypatch, algorithm):
     from meshsimp_pymoo.search.presets import PRESETS
 
-    kind = type(PRESETS[algorithm](pop_size=8))
+    kind = type(PRESETS[algorithm].function(pop_size=8))
     options = ("simplify", "face:60", "--algorithm", algorithm, "--population", "8", "--generations", "5", *PLAIN)
     assert run(*options, "-o", tmp_path / "whole") == 0
     with monkeypatch.context() as patch:
@@ -559,7 +559,7 @@ def test_a_killed_run_goes_on_within_the_run(config, tmp_path, all_runs, monkeyp
 
 
 def test_killed_runs_of_moead_go_on_too(config, tmp_path, all_runs, monkeypatch):
-    from meshsimp_pymoo.search.presets import TchebycheffMOEAD
+    from meshsimp_pymoo.search.moead import TchebycheffMOEAD
 
     begin, count = TchebycheffMOEAD._begin_generation, []
     config = read(config)

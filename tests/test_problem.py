@@ -23,13 +23,17 @@ from meshsimp_pymoo import (
     PinnedCorners,
     RandomSubset,
     Relocation,
+    memetic,
+    moead,
+    nsga2_v1,
+    nsga2_v2,
+    nsga3,
 )
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.problem import ThreadRunner
-from meshsimp_pymoo.search.presets import memetic, moead, nsga2_v1, nsga2_v2, nsga3
 from meshsimp_pymoo.surface import evaluate as error
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.measures import Quality
     from meshsimp_pymoo.surface.model import OpenModel
 
     FloatArray = npt.NDArray[np.float64]

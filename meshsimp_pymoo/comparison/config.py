@@ -9,7 +9,7 @@
       - {name: M1, model: face:922, up: z}
     algorithms:                           # at least one; a bare text is a preset
       - name: NSGA-II v1
-        preset: nsga2_v1                  # a key of algorithms.PRESETS, or instead
+        preset: nsga2_v1                  # a key of presets.PRESETS, or instead
         class: pymoo.algorithms.moo.spea2.SPEA2      # any pymoo algorithm by import path
         parameters: {pop_size: 100}       # its arguments
         operators: {crossover: {name: oax, arrays: L4}}    # keys of operators.OPERATORS, or import paths
@@ -45,11 +45,15 @@ from meshsimp_pymoo import datasets
 from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
 from meshsimp_pymoo.errors import InputError, ModelError
 from meshsimp_pymoo.files import is_there
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.presets import PRESETS
-from meshsimp_pymoo.surface.evaluate import MEASURES
+from meshsimp_pymoo.settings import Kind, Real, Whole, plain, settings_of
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.rules import Rules
 
 if TYPE_CHECKING:
     from pymoo.core.algorithm import Algorithm
@@ -80,13 +84,14 @@ MAX_REAL = 1e300
 # Parameters that decide how much memory and time a trial takes, and the most of them that can be meant.
 MOST = {"pop_size": 5_000, "n_offsprings": 5_000, "ref_dirs": 5_000, "n_neighbors": 5_000, "moves_per_vertex": 1_000}
 
-# Keys of `problem`, all arguments of MeshProblem.
+# Keys of `problem`: how a model is read, what counts, and these arguments of MeshProblem.
+LIMITS: dict[str, Kind] = {"max_triangles": Whole(1), "max_error": Real(0), "regions": Whole(1)}
 PROBLEM_OPTIONS = (
-    "footprint", "outside", "up", "patch", "spacing", "nodata", "window", "max_edge", "pin", "objectives", "weights",
-    "max_triangles", "max_error", "regions",
+    *settings_of(Options),
+    *(name for name, known in settings_of(Rules).items() if not known.derived),
+    "objectives",
+    *LIMITS,
 )
-# Those that say how the file is read: what they do is in the model's content.
-READING_OPTIONS = ("up", "patch", "spacing", "nodata", "window", "max_edge")  # fmt: skip
 # What a pymoo algorithm calls the operator of a kind.
 ARGUMENT_OF_KIND = {kind: "eliminate_duplicates" if kind == "duplicates" else kind for kind in OPERATORS}
 # The operators an algorithm gets by import path where the file names none: the paper's.
@@ -130,27 +135,31 @@ class ProblemConfig:
         What tables call it.
     source : str
         The file or built-in name, as the configuration has it.
-    options : dict
-        Arguments of `MeshProblem` besides the model.
+    options : Options
+        How it is read.
+    rules : Rules
+        What counts; their measure is what is minimised beside the triangles.
+    limits : dict
+        Other arguments of `MeshProblem`; see LIMITS.
     model : OpenModel
-        The model, opened.
+        The model, opened; it holds the weights.
     """
 
     name: str
     source: str
-    options: Mapping[str, Any]
+    options: Options
+    rules: Rules
+    limits: Mapping[str, Any]
     model: OpenModel
 
     def build(self) -> MeshProblem:
         """Return the problem, evaluated by one thread: an experiment's runs are what is done in parallel."""
-        return MeshProblem(self.model, **problem_arguments(self.options), n_threads=1)
+        surface = HeightSurface(self.model, replace(self.rules, weights=None))
+        return MeshProblem(surface, **self.limits, n_threads=1)
 
     def description(self) -> dict[str, Any]:
-        """Return what decides the results: the model's content and the options in effect."""
-        effective = {"footprint": "model", "outside": "nearest"} | {
-            key: value for key, value in self.options.items() if key not in READING_OPTIONS
-        }
-        return {"model": self.model.hash, "options": effective}
+        """Return what decides the results: the model's content, what counts, and the limits."""
+        return {"model": self.model.hash, "rules": plain(self.rules), "limits": dict(self.limits)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -193,7 +202,7 @@ class AlgorithmConfig:
             arguments[self.merged_parameter] = merged_value
         for kind, operator in self.operators.items():
             arguments[ARGUMENT_OF_KIND[kind]] = _class_of(kind, operator.name)(**operator.parameters)
-        target = PRESETS[self.preset] if self.preset else _imported(self.path)
+        target = PRESETS[self.preset].function if self.preset else _imported(self.path)
         return copy.deepcopy(target(**arguments))
 
     def description(self, merged_value: Any = None) -> dict[str, Any]:
@@ -289,11 +298,6 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
     )
 
 
-def problem_arguments(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options as arguments of `MeshProblem`; the model is open already and holds the weights."""
-    return {key: value for key, value in options.items() if key not in (*READING_OPTIONS, "weights")}
-
-
 def settings(part: Any) -> dict[str, Any]:
     """Return the class of an algorithm or operator and its settings in effect, as plain data.
 
@@ -304,7 +308,9 @@ def settings(part: Any) -> dict[str, Any]:
     0.8
     """
     kind = type(part)
-    found: dict[str, Any] = {"class": f"{kind.__module__}.{kind.__qualname__}"}
+    # a class of this package is known by its name, wherever it lives
+    home = "meshsimp_pymoo" if kind.__module__.startswith("meshsimp_pymoo.") else kind.__module__
+    found: dict[str, Any] = {"class": f"{home}.{kind.__qualname__}"}
     for name in sorted((_parameters(kind) or set()) - WITHOUT_EFFECT):
         value: Any = getattr(part, name, None)
         if type(value).__module__ == "pymoo.core.variable":
@@ -346,7 +352,7 @@ def _algorithm(entry: Entry) -> AlgorithmConfig:
         entry.fail("give either 'preset' (one of " + ", ".join(PRESETS) + ") or 'class' (an import path)")
     preset = keys["preset"].choice(PRESETS, "preset") if "preset" in keys else ""
     path = keys["class"].text() if "class" in keys else ""
-    target = PRESETS[preset] if preset else _algorithm_class(keys["class"])
+    target = PRESETS[preset].function if preset else _algorithm_class(keys["class"])
     known = _parameters(target)
     name = keys["name"].name() if "name" in keys else preset or path.rpartition(".")[2]
 
@@ -570,18 +576,20 @@ def _check_inside(entry: Entry, whose: str) -> None:
 
 def _problem(entry: Entry, shared: Mapping[str, Any], models: tuple[Path, Entry | None]) -> ProblemConfig:
     if entry.is_text():
-        model, name, options = entry, None, dict(shared)
+        model, name, given = entry, None, dict(shared)
     else:
         keys = entry.mapping(("name", "model", *PROBLEM_OPTIONS), required=("model",))
         model, name = keys["model"], keys.get("name")
-        options = dict(shared) | {key: _option(key, value) for key, value in keys.items() if key in PROBLEM_OPTIONS}
+        given = dict(shared) | {key: _option(key, value) for key, value in keys.items() if key in PROBLEM_OPTIONS}
     source = model.text()
     where = _model_path(model, source, models)
-    problem = entry.try_to(lambda: MeshProblem(where, **options, n_threads=1), plain=True)
+    problem = entry.try_to(lambda: MeshProblem(where, **given, n_threads=1), plain=True)
     return ProblemConfig(
         name=name.name() if name is not None else Path(source).stem,
         source=source,
-        options=options,
+        options=problem.options,
+        rules=problem.surface.rules,
+        limits={key: value for key, value in given.items() if key in LIMITS},
         model=problem.model,
     )
 
@@ -611,50 +619,22 @@ def _options(entry: Entry, known: Sequence[str]) -> dict[str, Any]:
 
 
 def _option(key: str, entry: Entry) -> Any:
-    """Return an option of `MeshProblem`, as far as it can be checked without the model."""
-    if key == "footprint":
-        return entry.choice(("model", "hull"), key)
-    if key == "outside":
-        return entry.choice(("nearest", "ignore"), key)
-    if key == "patch":
-        return entry.choice(("front",), key)
+    """Return an argument of `MeshProblem`, as far as it can be checked without the model."""
     if key == "objectives":
         names = [item.text() for item in entry.items()]
-        if len(names) != 2 or names[0] not in MEASURES or names[1] != "triangles":
+        if len(names) != 2 or names[0] not in OBJECTIVES or names[1] != "triangles":
             several = "; an experiment compares fronts of two objectives, more are for nsga3() in Python"
             entry.fail(
-                f"expected [one of {', '.join(MEASURES)}, triangles]" + (several if len(names) > 2 else "")
+                f"expected [one of {', '.join(OBJECTIVES)}, triangles]" + (several if len(names) > 2 else "")
             )
         return names
-    if key == "weights":
-        return entry.text()
-    if key in ("max_triangles", "regions"):
-        return entry.whole(1)
-    if key == "max_edge":
-        return entry.real(0, strict=True)
-    if key == "window":
-        window = [item.whole(0) for item in entry.items()]
-        if len(window) != 4:
-            entry.fail("expected [column, row, columns, rows]")
-        return tuple(window)
-    if key in ("nodata", "max_error"):
-        return entry.real(0 if key == "max_error" else None)
-    if key == "spacing":
-        steps = [item.real(0, strict=True) for item in entry.items()] if entry.is_list() else [entry.real(0)]
-        if len(steps) not in (1, 2):
-            entry.fail("expected one number or two, [dx, dy]")
-        return (steps[0], steps[-1])
-    if key == "up":
-        if not entry.is_list():
-            return entry.text()
-        vector = [item.real(None) for item in entry.items()]
-        if len(vector) != 3 or not any(vector):
-            entry.fail("expected an axis such as z or -x, 'auto', or three numbers that are not all 0")
-        return vector
-    pin = entry.plain()
-    if not isinstance(pin, (str, list)):
-        entry.fail("expected corners, hull, or a list of file rows or positions")
-    return pin
+    known = settings_of(Options) | settings_of(Rules)
+    kind = known[key].kind if key in known else LIMITS[key]
+    value = entry.plain()
+    try:
+        return kind.from_plain(value)
+    except ValueError as problem:
+        entry.fail(str(problem))
 
 
 def _distinct(entry: Entry, read: Callable[[Entry], Any], what: str) -> tuple[Any, ...]:

@@ -13,23 +13,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import attainment_surfaces, selected_solutions
 from meshsimp_pymoo.comparison.store import classic_mesh
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.comparison.tables import WEIGHTS_SEED
 from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.report.figures import front_axes, plot_error, plot_mesh, relief_exaggeration
-from meshsimp_pymoo.surface.evaluate import mesh_deviation, simplify
+from meshsimp_pymoo.report.figures import front_axes, plot_error, plot_mesh
+from meshsimp_pymoo.surface.height import HeightSurface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from meshsimp_pymoo.surface.model import OpenModel
 
 __all__ = ["box_figure", "fronts_figure", "meshes_figure", "method_look", "selected_figure"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # Okabe and Ito's colours, told apart by all eyes; methods beyond them are grey.
 COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#6A3D9A", "#8C6D31")
@@ -48,7 +47,7 @@ COLOUR_END = 0.98
 
 
 @dataclass(frozen=True)
-class _Surface:
+class _Shown:
     """A mesh to draw: upright points, faces, and deviation and cover of the original's vertices."""
 
     title: str
@@ -171,28 +170,28 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    model = study.model(case.problem)
-    shown = _meshes(study, case, model)
-    exaggeration = relief_exaggeration(model)
-    flat = model.points * [1.0, 1.0, exaggeration]
+    surface = study.surface(case.problem, case.scoring)
+    shown = _meshes(study, case, surface)
+    points, exaggeration = surface.view.points, surface.view.exaggeration
+    flat = points * [1.0, 1.0, exaggeration]
     n = 1 + len(shown)
     width, depth = np.ptp(flat[:, :2], axis=0)
     figure = Figure(figsize=(2.6 * n + 0.9, 2.6 * (2.0 * depth / width + 0.9)), dpi=110, layout="constrained")
     engine: Any = figure.get_layout_engine()
     engine.set(w_pad=0.02, h_pad=0.02, wspace=0.0, hspace=0.0)
     panels = figure.subplots(3, n, squeeze=False, height_ratios=(depth / width, 0.75, depth / width))
-    end = max(float(np.quantile(surface.deviation, COLOUR_END)) for surface in shown) or 1.0
-    nothing = np.zeros(model.n_vertices)
-    title = f"original\n{len(model.faces):,} triangles"
-    original = _Surface(title, model.points, model.faces, nothing, nothing == 0)
+    end = max(float(np.quantile(mesh.deviation, COLOUR_END)) for mesh in shown) or 1.0
+    nothing = np.zeros(surface.n_vertices)
+    title = f"original\n{len(surface.faces):,} triangles"
+    original = _Shown(title, points, surface.faces, nothing, nothing == 0)
     drawn: Any = None
-    for column, surface in enumerate([original, *shown]):
+    for column, mesh in enumerate([original, *shown]):
         for row, view in enumerate((FRONT, SIDE)):
             panel = panels[row, column]
-            shape = (surface.points, surface.faces)
+            shape = (mesh.points, mesh.faces)
             plot_mesh(shape, panel, view=view, exaggeration=exaggeration, edges=column > 0)
             panel.set(xlim=panels[row, 0].get_xlim(), ylim=panels[row, 0].get_ylim())
-        panels[0, column].set_title(surface.title, fontsize=8.5)
+        panels[0, column].set_title(mesh.title, fontsize=8.5)
         below = panels[2, column]
         below.axis("off")
         below.set_aspect("equal")
@@ -200,7 +199,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
             text = "error at every\nvertex of the original\n\nblue: vertices that\nno triangle covers"
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
-        plot_error(model, surface.deviation, below, covered=surface.covered, largest=end, bar=False)
+        plot_error(surface, mesh.deviation, below, covered=mesh.covered, largest=end, bar=False)
         drawn = below.collections[0]
         below.set(xlim=panels[0, 0].get_xlim(), ylim=panels[0, 0].get_ylim())
     bar = figure.colorbar(drawn, ax=panels[2, :].tolist(), shrink=0.8, pad=0.01, extend="max")
@@ -209,7 +208,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     return figure
 
 
-def _meshes(study: Study, case: Case, model: OpenModel) -> list[_Surface]:
+def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
     """Return the meshes to show."""
     chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
     trade_offs = {method: next(s for s in solutions if s.kind == "trade_off") for method, solutions in chosen.items()}
@@ -222,37 +221,34 @@ def _meshes(study: Study, case: Case, model: OpenModel) -> list[_Surface]:
     for method in picked:
         solution = trade_offs[method]
         found = case.find(method, solution.error, solution.triangles)
-        kept = np.unpackbits(found.run.arrays["kept"][found.row])[: model.n_vertices].astype(bool)
-        mesh = simplify(model, kept, footprint=case.problem.footprint, outside=_outside(case))
+        kept = np.unpackbits(found.run.arrays["kept"][found.row])[: surface.n_vertices].astype(bool)
+        mesh = surface.simplify(kept)
         deviation = np.abs(mesh.deviation)
-        title = _mesh_title(model, method, len(mesh.faces), deviation, mesh.covered)
-        shown.append(_Surface(title, model.points, mesh.faces, deviation, mesh.covered))
+        title = _mesh_title(surface, method, len(mesh.faces), deviation, mesh.covered)
+        shown.append(_Shown(title, surface.view.points, mesh.faces, deviation, mesh.covered))
     for (name, method), run in study.classic_runs.items():
         if name == case.problem.name and method == "quadric_collapse":
             sizes = run.arrays["F"][:, 1]
             row = int(np.argmin(np.abs(np.log(np.maximum(sizes, 0.1) / size))))
             vertices, faces = classic_mesh(run, row)
-            deviation, covered, _ = mesh_deviation(model, vertices, faces, outside=_outside(case))
-            title = _mesh_title(model, CLASSIC_NAMES[method], len(faces), deviation, covered)
+            scored = surface.score(vertices, faces)
+            deviation, covered = scored.deviation, scored.covered
+            title = _mesh_title(surface, CLASSIC_NAMES[method], len(faces), deviation, covered)
             # pictures are centred on the mean of the points: these mirror images, which no face uses, make it
             # the original's, so that all meshes stand in the same place
-            upright = model.to_local(vertices)
-            mirrored = 2 * model.points.mean(axis=0) - upright
-            shown.append(_Surface(title, np.concatenate([upright, mirrored]), faces, deviation, covered))
+            upright = surface.model.to_local(vertices)
+            mirrored = 2 * surface.view.points.mean(axis=0) - upright
+            shown.append(_Shown(title, np.concatenate([upright, mirrored]), faces, deviation, covered))
     return shown
 
 
 def _mesh_title(
-    model: OpenModel, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
+    surface: HeightSurface, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
 ) -> str:
     """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons."""
-    mean = np.average(deviation, weights=model.weights)
+    mean = np.average(deviation, weights=surface.model.weights)
     bare = len(covered) - np.count_nonzero(covered)
     return f"{method}\n{triangles:,} triangles, mean {mean:.3g}\n{bare:,} vertices uncovered"
-
-
-def _outside(case: Case) -> str:
-    return "nearest" if case.scoring == "nearest" else case.problem.outside
 
 
 def method_look(study: Study, case: Case, method: str) -> tuple[str, str]:

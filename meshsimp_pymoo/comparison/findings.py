@@ -345,11 +345,12 @@ def _other_errors(study: Study) -> list[str]:
     """Return what *error* means where it is not the sum of the deviations."""
     names = {"rms_error": "the root mean square of the deviations", "max_error": "the largest deviation"}
     said = []
-    for measure in dict.fromkeys(problem.measure for problem in study.problems if problem.measure != "error"):
-        models = ", ".join(problem.name for problem in study.problems if problem.measure == measure)
+    measures = dict.fromkeys(problem.rules.measure for problem in study.problems)
+    for measure in (name for name in measures if name != "error"):
+        models = ", ".join(problem.name for problem in study.problems if problem.rules.measure == measure)
         said.append(f"On {models} the *error* is {names[measure]}, not their sum.")
-    for weights in dict.fromkeys(problem.weights for problem in study.problems if problem.weights):
-        models = ", ".join(problem.name for problem in study.problems if problem.weights == weights)
+    for weights in dict.fromkeys(problem.rules.weights for problem in study.problems if problem.rules.weights):
+        models = ", ".join(problem.name for problem in study.problems if problem.rules.weights == weights)
         said.append(f"On {models} each vertex counts by its attribute *{weights}*.")
     return said
 

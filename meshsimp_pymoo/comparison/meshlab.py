@@ -29,11 +29,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.evaluate import Quality
-    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.measures import Quality
+    from meshsimp_pymoo.surface.surface import Surface
 
 __all__ = [
     "MESHLAB_METHODS",
@@ -47,8 +49,6 @@ __all__ = [
     "vertex_clustering",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 Mesh = tuple[FloatArray, IntArray]
 
 QUADRIC = "meshing_decimation_quadric_edge_collapse"
@@ -302,11 +302,7 @@ MESHLAB_METHODS: dict[str, Callable[[ArrayLike, ArrayLike, int], Mesh]] = {
 
 
 def meshlab_front(
-    model: OpenModel,
-    triangles: Iterable[int],
-    *,
-    methods: Sequence[str] = tuple(MESHLAB_METHODS),
-    outside: str = "nearest",
+    surface: Surface, triangles: Iterable[int], *, methods: Sequence[str] = tuple(MESHLAB_METHODS)
 ) -> list[BaselineMesh]:
     """Simplify a model by every method to every number of triangles, and score the meshes.
 
@@ -314,14 +310,12 @@ def meshlab_front(
 
     Parameters
     ----------
-    model : OpenModel
-        The model.
+    surface : Surface
+        The model and its rules, by which the meshes are scored.
     triangles : iterable of int
         Numbers of triangles, e.g. from `reductions`; none may exceed the model's own.
     methods : sequence of str
         Keys of `MESHLAB_METHODS`.
-    outside : {"nearest", "ignore"}
-        What a vertex costs that the mesh does not cover, as for every other mesh.
 
     Returns
     -------
@@ -335,8 +329,7 @@ def meshlab_front(
     ValueError
         If a method is unknown or a number of triangles impossible; nothing is computed then.
     """
-    from meshsimp_pymoo.surface.evaluate import mesh_quality
-
+    model = surface.model
     numbers = [int(number) for number in triangles]
     for name in methods:
         if name not in MESHLAB_METHODS:
@@ -350,7 +343,7 @@ def meshlab_front(
             start = time.perf_counter()
             vertices, faces = MESHLAB_METHODS[name](model.file_points, model.faces, number)
             seconds = time.perf_counter() - start
-            quality = mesh_quality(model, vertices, faces, outside=outside, frame="file")
+            quality = surface.score(vertices, faces).quality
             meshes.append(BaselineMesh(name, number, vertices, faces, quality, seconds))
     return meshes
 

@@ -12,19 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison import findings as verdicts
 from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.analysis import attainment_surfaces
 from meshsimp_pymoo.comparison.figures import method_look
-from meshsimp_pymoo.comparison.study import SCORINGS, Case, Study, slug
+from meshsimp_pymoo.comparison.study import SCORINGS, Case, Study
 from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.report.document import html_document
+from meshsimp_pymoo.report.document import html_document, slug
 
 __all__ = ["experiment_page"]
 
-FloatArray = npt.NDArray[np.float64]
 
 SCRIPTS = ("vendor/d3.min.js", "chart.js", "experiment.js")
 # Pictures are as wide as they can be shown on a screen of twice the usual density, and no wider.

@@ -33,12 +33,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.comparison.config import (
     AlgorithmConfig,
     Budget,
     Experiment,
     ProblemConfig,
-    problem_arguments,
     read_experiment_file,
 )
 from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, meshlab_front, reductions
@@ -65,9 +65,11 @@ from meshsimp_pymoo.search.checkpoint import (
     read_checkpoint,
     restore,
 )
+from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import package_versions
-from meshsimp_pymoo.surface.evaluate import TRIANGLES, Quality, evaluate_subsets, measured, mesh_quality
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured, quality_of
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
 
 __all__ = ["Done", "Task", "perform", "plan", "run_experiment"]
@@ -85,7 +87,8 @@ BASELINE_EVALUATIONS = 2000
 # The folder, inside the experiment's, of the state of searches that are not finished.
 CHECKPOINTS = ".checkpoints"
 
-QUALITY_COLUMNS = ("vertices", "mean_error", "rms_error", "max_error", "uncovered")
+# What is stored of each solution beside F.
+QUALITY_COLUMNS = tuple(name for name in MEASURES if name not in ("error", "triangles"))
 
 
 @dataclass(frozen=True)
@@ -280,8 +283,7 @@ def plan(experiment: Experiment) -> list[Task]:
 
 def perform(
     task: Task,
-    model: OpenModel,
-    options: Mapping[str, Any],
+    problem: MeshProblem,
     *,
     checkpoint: Path | None = None,
     interval: float = INTERVAL,
@@ -292,10 +294,8 @@ def perform(
     ----------
     task : Task
         What to do.
-    model : OpenModel
-        The model.
-    options : mapping
-        The options of its problem.
+    problem : MeshProblem
+        What is searched.
     checkpoint : Path, optional
         File for the state of the search. If there is one, the search goes on from there; it is removed at the end.
     interval : float
@@ -310,8 +310,6 @@ def perform(
     from pymoo.termination.max_eval import MaximumFunctionCallTermination
     from pymoo.termination.max_gen import MaximumGenerationTermination
     from pymoo.termination.max_time import TimeBasedTermination
-
-    problem = MeshProblem(model, **problem_arguments(options), n_threads=1)
 
     def set_up() -> Any:
         termination: Any = NoTermination()
@@ -417,7 +415,8 @@ def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[A
     table = problem.evaluate_subsets(kept) if len(kept) else np.zeros((0, 6))
     is_mesh = table[:, TRIANGLES] > 0
     kept, table = kept[is_mesh], table[is_mesh]
-    measure, total = problem.objectives[0], problem.model.total_weight
+    surface = problem.surface
+    measure, total = surface.rules.measure, surface.total_weight
     F = np.column_stack([measured(table, measure, total), table[:, TRIANGLES]])
     if len(F):
         _, first = np.unique(F[:, ::-1], axis=0, return_index=True)
@@ -426,9 +425,9 @@ def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[A
         kept, table, F = kept[rows], table[rows], F[rows]
     quality = [problem.as_quality(row) for row in table]
     nearest = F[:, 0]
-    if problem.outside != "nearest" and len(kept):
-        charged = evaluate_subsets(problem.model, kept, footprint=problem.footprint, outside="nearest")
-        nearest = measured(charged, measure, total)
+    if surface.rules.outside != "nearest" and len(kept):
+        charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))
+        nearest = measured(charged.evaluate(kept), measure, total)
     return {
         "F": F,
         "kept": np.packbits(kept, axis=1),
@@ -438,9 +437,8 @@ def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[A
 
 
 def _quality_arrays(quality: Sequence[Quality]) -> dict[str, npt.NDArray[Any]]:
-    kinds = {"vertices": np.int64, "uncovered": np.int64}
     return {
-        name: np.array([getattr(q, name) for q in quality], dtype=kinds.get(name, np.float64))
+        name: np.array([getattr(q, name) for q in quality], dtype=np.int64 if name in COUNTED else np.float64)
         for name in QUALITY_COLUMNS
     }
 
@@ -464,8 +462,9 @@ def _work(problem: ProblemConfig, algorithm: AlgorithmConfig, budgets: Sequence[
         if budget.kind == "seconds":
             return WORK_PER_SECOND * budget.amount
         one = budget.amount * population if budget.kind == "generations" else budget.amount
-        costly = budget.kind == "generations" and "v2" in algorithm.preset
-        evaluations = max(evaluations, one * (2.1 if costly else 1.0))
+        if budget.kind == "generations" and algorithm.preset:
+            one *= PRESETS[algorithm.preset].evaluations
+        evaluations = max(evaluations, one)
     return evaluations * (problem.model.n_vertices + OVERHEAD_VERTICES)
 
 
@@ -488,7 +487,9 @@ def _content(experiment: Experiment, tasks: Sequence[Task], out: Path) -> dict[s
             {
                 "name": problem.name,
                 "source": problem.source,
-                "options": dict(problem.options),
+                "options": plain(problem.options),
+                "rules": plain(problem.rules),
+                "limits": dict(problem.limits),
                 "stored": write_model(out, problem.model),
                 "hash": problem.model.hash,
                 "vertices": problem.model.n_vertices,
@@ -561,9 +562,9 @@ class _Shown:
 
 @dataclass(frozen=True, eq=False)
 class _Shared:
-    """What every worker has to know: the models with their options, and where runs are written (None: not there)."""
+    """What every worker has to know: the problems, and where runs are written (None: not there)."""
 
-    problems: Mapping[str, tuple[OpenModel, dict[str, Any]]]
+    problems: Mapping[str, ProblemConfig]
     folder: Path | None
     checkpoint: float | None
 
@@ -576,7 +577,7 @@ def _perform_all(
     shown: _Shown,
     checkpoint: float | None,
 ) -> None:
-    problems = {problem.name: (problem.model, dict(problem.options)) for problem in experiment.problems}
+    problems = {problem.name: problem for problem in experiment.problems}
     shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint)
     if shared.folder is not None and checkpoint is not None:
         for task in tasks:  # damage is named here, not by the processes
@@ -600,20 +601,19 @@ def _work_on(task: Task, shared: _Shared) -> list[Any]:
     """Do a task; return the records of its runs, or, where the folder is out of reach, all that is to be written."""
     if shared.folder is not None:
         return list(_perform_and_write(task, shared, shared.folder))
-    model, options = shared.problems[task.problem]
     return [
         (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
-        for k, arrays, facts in perform(task, model, options)
+        for k, arrays, facts in perform(task, shared.problems[task.problem].build())
     ]
 
 
 def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
-    model, options = shared.problems[task.problem]
+    problem = shared.problems[task.problem].build()
     saved: dict[str, Any] = {}
     if shared.checkpoint is not None:
         saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
     paths = []
-    for k, arrays, facts in perform(task, model, options, **saved):
+    for k, arrays, facts in perform(task, problem, **saved):
         label = f"{task.label} / {task.budgets[k].name}"
         paths.append(write_run(folder, label, task.descriptions[k], arrays, facts))
     return paths
@@ -655,11 +655,9 @@ def _classic(
             description = {
                 "meshlab": method,
                 "model": problem.model.hash,
-                "outside": problem.options.get("outside", "nearest"),
+                "rules": plain(problem.rules),
                 "asked": list(asked),
             }
-            if _measure(problem) != "error":
-                description["measure"] = _measure(problem)
             key = fingerprint(description)
             if store.get(key) is None:
                 if not available:
@@ -676,16 +674,11 @@ def _classic(
     if not missing:
         return rows, (), computed
     try:
-        meshlab_front(experiment.problems[0].model, [1])
+        meshlab_front(experiment.problems[0].build().surface, [1])
         reason = "MeshLab's methods cannot be used here"
     except MeshLabUnavailable as problem_of_machine:
         reason = str(problem_of_machine)
     return rows, (f"skipped: {', '.join(missing)}: {reason}",), computed
-
-
-def _measure(problem: ProblemConfig) -> str:
-    """Return the measure of the error that is minimised beside the triangles."""
-    return str(problem.options.get("objectives", ("error",))[0])
 
 
 def _fewest_triangles(problem: ProblemConfig, tasks: Sequence[Task], store: RunStore) -> int | None:
@@ -709,15 +702,18 @@ def _write_classic(
     description: Mapping[str, Any],
 ) -> Path:
     """Let a classic method simplify a model to all sizes, and write what it made."""
-    outside = problem.options.get("outside", "nearest")
-    measure = _measure(problem)
-    model = problem.model
-    none = Quality(np.inf, 0, 0, np.inf, np.inf, np.inf, model.n_vertices)
-    quality, nearest, vertices, faces, notes = [], [], [], [], []
+    surface = problem.build().surface
+    measure = surface.rules.measure
+    charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))
+    none = quality_of((name, 0 if name in COUNTED else np.inf) for name in MEASURES)
+    none = replace(none, uncovered=surface.n_vertices)
+    quality, nearest, notes = [], [], []
+    vertices: list[FloatArray] = []
+    faces: list[IntArray] = []
     start = time.perf_counter()
     for number in asked:
         try:
-            (mesh,) = meshlab_front(model, [number], methods=[method], outside=outside)
+            (mesh,) = meshlab_front(surface, [number], methods=[method])
         except MeshLabUnavailable:
             raise
         except ValueError as nothing:  # too few triangles to have an area, say
@@ -728,14 +724,10 @@ def _write_classic(
             notes.append(f"no mesh: {nothing}")
             continue
         quality.append(mesh.quality)
-        nearest.append(
-            getattr(
-                mesh.quality
-                if outside == "nearest"
-                else mesh_quality(model, mesh.vertices, mesh.faces, outside="nearest"),
-                measure,
-            )
-        )
+        everywhere = mesh.quality
+        if surface.rules.outside != "nearest":
+            everywhere = charged.score(mesh.vertices, mesh.faces).quality
+        nearest.append(getattr(everywhere, measure))
         vertices.append(mesh.vertices)
         faces.append(mesh.faces)
         notes.append(mesh.note)

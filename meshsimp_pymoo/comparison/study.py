@@ -22,13 +22,13 @@ from __future__ import annotations
 
 import itertools
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import (
     Comparison,
     OptimalFront,
@@ -45,7 +45,9 @@ from meshsimp_pymoo.comparison.analysis import (
 from meshsimp_pymoo.comparison.store import RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.settings import read_back
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.rules import Rules
 
 __all__ = [
     "CLASSIC_NAMES",
@@ -55,10 +57,8 @@ __all__ = [
     "Picked",
     "Problem",
     "Study",
-    "slug",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 SCORINGS = {"searched": "as searched", "nearest": "every vertex"}
 """The scorings by key: what they are called."""
@@ -85,12 +85,9 @@ class Problem:
     source: str
     vertices: int
     triangles: int
-    outside: str
-    footprint: str
+    rules: Rules
     stored: str
     hash: str
-    measure: str = "error"
-    weights: str = ""
 
 
 @dataclass(frozen=True)
@@ -258,12 +255,9 @@ class Study:
                 source=item["source"],
                 vertices=item["vertices"],
                 triangles=item["triangles"],
-                outside=item["options"].get("outside", "nearest"),
-                footprint=item["options"].get("footprint", "model"),
+                rules=read_back(Rules, item["rules"]),
                 stored=item["stored"],
                 hash=item["hash"],
-                measure=item["options"].get("objectives", ("error",))[0],
-                weights=item["options"].get("weights", ""),
             )
             for item in self.content["problems"]
         ]
@@ -307,7 +301,7 @@ class Study:
     @property
     def scorings(self) -> list[str]:
         """Keys of `SCORINGS` that this study needs."""
-        charged = all(problem.outside == "nearest" for problem in self.problems)
+        charged = all(problem.rules.outside == "nearest" for problem in self.problems)
         return ["nearest"] if charged else ["searched", "nearest"]
 
     @cached_property
@@ -337,9 +331,12 @@ class Study:
         wanted = [(problem.name, budget, scoring) for problem in self.problems]
         return [self.cases[key] for key in wanted if key in self.cases]
 
-    def model(self, problem: Problem) -> OpenModel:
-        """Return the stored model of a problem."""
-        return read_model(self.out, problem.stored, problem.hash)
+    def surface(self, problem: Problem, scoring: str = "searched") -> HeightSurface:
+        """Return the stored model of a problem with its rules, or with those of a scoring."""
+        outside = "nearest" if scoring == "nearest" else problem.rules.outside
+        model = read_model(self.out, problem.stored, problem.hash)
+        # the model holds the weights; pins are in every subset that was stored
+        return HeightSurface(model, replace(problem.rules, outside=outside, weights=None, pin=None))
 
     def comparisons(self, budget: str, scoring: str, indicator: str) -> list[Comparison]:
         """Compare every two methods with chance on all models; Holm's correction is over all of these."""
@@ -416,15 +413,3 @@ def scored(run: StoredRun, scoring: str) -> FloatArray:
     if scoring == "searched":
         return F
     return np.column_stack([run.arrays["error_nearest"], F[:, 1]]) if len(F) else F.reshape(0, 2)
-
-
-def slug(name: str) -> str:
-    """Return a name as a file name.
-
-    Examples
-    --------
-    >>> slug("50 generations"), slug("M1: Laurana/2")
-    ('50-generations', 'M1-Laurana-2')
-    """
-    spelled = "".join(c if c.isascii() and (c.isalnum() or c in "._") else " " for c in name)
-    return "-".join(spelled.split()) or "unnamed"

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.formats.table import Format, OutMesh, Upright, register
+from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.table import Format, Held, register
 
 NAMESPACE = "http://www.landxml.org/schema/LandXML-1.2"
 # LandXML demands a date and a time; one that never changes keeps equal meshes equal.
@@ -29,14 +30,15 @@ MEASURES = {
 }  # fmt: skip
 
 
-def _refuse(model: Upright) -> None:
-    """Refuse a model whose heights are not along the z of its file."""
+def _refuse(model: Held) -> None:
+    """Refuse a mesh with faces that do not look up along the z of its file."""
     a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    if model.up[2] <= 0 or (area < 0).any():
+    if (area < 0).any() or not (area > 0).any():
+        wrong = int((area < 0).sum()) or len(area)
         raise ResultError(
-            f"{model.name}: a LandXML surface has its heights along z, and this one has them along "
-            f"{model.up.round(6).tolist()}; write another format, such as ply"
+            f"{model.name}: a LandXML surface has its heights along z, and {wrong:,} of {len(area):,} faces of this "
+            "one do not look up along it; write another format, such as ply"
         )
 
 

@@ -19,13 +19,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.surface.measures import MEASURES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.surface import Surface
 
 __all__ = [
     "error_figure",
@@ -36,11 +37,8 @@ __all__ = [
     "plot_error",
     "plot_front",
     "plot_mesh",
-    "relief_exaggeration",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.integer[Any]]
 View = Literal["above", "side"] | tuple[float, float]
 
 VIEWS = {
@@ -60,9 +58,6 @@ ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: roun
 # From this many triangles on, edges are not outlined: in a panel of some 400 pixels they would cover the
 # shading.
 OUTLINED_TRIANGLES = 2500
-# A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to
-# hundreds of metres.
-LEAST_RELIEF = 0.12
 
 
 def plot_front(
@@ -134,7 +129,7 @@ def plot_front(
             bbox={"boxstyle": "circle,pad=0.2", "facecolor": MARK if full else "white", "edgecolor": MARK},
             zorder=5,
         )
-    what = "mean error per vertex" if as_mean else measure.replace("_", " ")
+    what = "mean error per vertex" if as_mean else MEASURES[measure].label
     front_axes(ax, np.vstack(drawn), label=f"{what} [model units]")
     if knee is not None or chosen is not None or series:
         for handle in ax.legend(frameon=False).get_lines():
@@ -197,13 +192,13 @@ def plot_mesh(
 
     Parameters
     ----------
-    mesh : OpenModel, solution of a front, trimesh.Trimesh, or (points, faces)
+    mesh : MeshProblem, Surface, OpenModel, solution of a front, trimesh.Trimesh, or (points, faces)
         Vertices (V, 3), height along z, and triangles (M, 3), counter-clockwise from above. A ``Trimesh`` is
-        drawn in its own frame; a model and a solution stand upright.
+        drawn in its own frame; a problem, a surface, a model and a solution stand upright.
     ax : matplotlib axes, optional
         Where to draw, by default in a new figure; its frame and ticks are removed.
     kept : (N,) bool array, optional
-        With an OpenModel: draw the mesh of these vertices instead of the whole model.
+        With a problem or a surface, which know the rules: draw the mesh of these vertices instead of the model.
     view : "above", "side" or (elevation, turn)
         Where it is seen from; as a pair, the elevation above the (x, y) plane and the turn about z, in
         degrees.
@@ -221,7 +216,7 @@ def plot_mesh(
     """
     from matplotlib.collections import PolyCollection
 
-    points, faces, own = _surface(mesh, kept)
+    points, faces, own = _shape(mesh, kept)
     colour = own if colour is None else np.asarray(colour)
     ax = ax if ax is not None else _new_axes((6.4, 6.4))
     elevation, turn = VIEWS[view] if isinstance(view, str) else view
@@ -255,7 +250,7 @@ def plot_mesh(
 
 
 def plot_error(
-    model: OpenModel,
+    surface: Surface,
     deviation: npt.ArrayLike,
     ax: Axes | None = None,
     *,
@@ -267,8 +262,8 @@ def plot_error(
 
     Parameters
     ----------
-    model : OpenModel
-        The original mesh.
+    surface : Surface
+        What the mesh is one of: ``problem.surface``.
     deviation : (N,) float array
         Deviation at each vertex in vector order [model units]; its size is drawn, not its sign.
     ax : matplotlib axes, optional
@@ -286,14 +281,15 @@ def plot_error(
         The axes.
     """
     size = np.abs(np.asarray(deviation, dtype=np.float64))
-    if size.shape != (model.n_vertices,):
-        raise ValueError(f"deviation has the shape {size.shape}; the model has {model.n_vertices} vertices")
+    if size.shape != (surface.n_vertices,):
+        raise ValueError(f"deviation has the shape {size.shape}; the model has {surface.n_vertices} vertices")
     ax = ax if ax is not None else _new_axes((7.0, 6.0))
     greatest = float(size.max())
     end = greatest if largest is None else largest
-    x, y = (model.points - model.points.mean(axis=0))[:, :2].T  # as plot_mesh places them
+    points = surface.view.points
+    x, y = (points - points.mean(axis=0))[:, :2].T  # as plot_mesh places them
     drawn = ax.tripcolor(
-        x, y, model.faces, size, shading="gouraud", cmap="magma_r", vmin=0.0, vmax=end or 1.0, rasterized=True
+        x, y, surface.faces, size, shading="gouraud", cmap="magma_r", vmin=0.0, vmax=end or 1.0, rasterized=True
     )
     if covered is not None:
         bare = ~np.asarray(covered, dtype=bool)
@@ -307,7 +303,7 @@ def plot_error(
 
 
 def front_figure(
-    model: OpenModel,
+    surface: Surface,
     F: npt.ArrayLike,
     meshes: Sequence[tuple[int, IntArray]],
     *,
@@ -321,8 +317,8 @@ def front_figure(
 
     Parameters
     ----------
-    model : OpenModel
-        The original mesh.
+    surface : Surface
+        What the solutions are meshes of.
     F : (S, 2) float array
         The front: error [model units] and triangles.
     meshes : sequence of (row of F, (M, 3) faces in vector order)
@@ -342,7 +338,8 @@ def front_figure(
     from matplotlib.figure import Figure
 
     F = np.asarray(F, dtype=np.float64)
-    width, depth = np.ptp(model.points[:, :2], axis=0)
+    model, view = surface.model, surface.view
+    width, depth = np.ptp(view.points[:, :2], axis=0)
     tall = depth > 1.15 * width  # a face: its panels stand side by side; a terrain: two by two
     figure = Figure(figsize=(15.0, 5.6) if tall else (14.0, 6.6), dpi=110, layout="constrained")
     halves = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.8 if tall else 1.35), wspace=0.02)
@@ -350,19 +347,19 @@ def front_figure(
     front = left.subplots()
     letters = [row for row, _ in meshes]
     marks: dict[str, Any] = {"knee": knee, "chosen": chosen, "marked": letters}
-    plot_front(F, front, **marks, n_points=model.total_weight, measure=measure, series=series)
+    plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
     front.set_title(title or f"{PurePath(model.name).name}: {size}", loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
-    look: dict[str, Any] = {"exaggeration": relief_exaggeration(model), "colour": model.attributes.get("color")}
-    plot_mesh(model, panels[0], **look)
+    look: dict[str, Any] = {"exaggeration": view.exaggeration, "colour": model.attributes.get("color")}
+    plot_mesh((view.points, model.faces), panels[0], **look)
     panels[0].set_title(f"original\n{len(model.faces):,} triangles", fontsize=10)
     for letter, panel, (row, faces) in zip("abc", panels[1:], meshes, strict=False):
-        plot_mesh((model.points, faces), panel, **look)
-        error = f"mean error {F[row, 0] / model.total_weight:.3g}"
+        plot_mesh((view.points, faces), panel, **look)
+        error = f"mean error {F[row, 0] / surface.total_weight:.3g}"
         if measure != "error":
-            error = f"{measure.replace('_', ' ')} {F[row, 0]:.3g}"
+            error = f"{MEASURES[measure].label} {F[row, 0]:.3g}"
         names = [name for name, marked in (("knee", knee), ("chosen", chosen)) if marked == row]
         label = f" ({', '.join(names)})" if names else ""
         size = f"{int(F[row, 1]):,} triangle{'' if F[row, 1] == 1 else 's'}"
@@ -401,16 +398,16 @@ def panel_rows(triangles: npt.ArrayLike, *wanted: int | None) -> list[int]:
 
 
 def error_figure(
-    model: OpenModel, deviation: npt.ArrayLike, covered: npt.ArrayLike, *, title: str | None = None
+    surface: Surface, deviation: npt.ArrayLike, covered: npt.ArrayLike, *, title: str | None = None
 ) -> Figure:
     """Draw the error of one mesh at every vertex of the model, with its largest values and uncovered vertices.
 
     Parameters
     ----------
-    model : OpenModel
-        The original mesh.
+    surface : Surface
+        What the mesh was measured against.
     deviation, covered : (N,) arrays
-        Of :func:`meshsimp_pymoo.surface.evaluate.mesh_deviation`.
+        Of ``surface.score(points, faces)``.
     title : str, optional
         What stands above the map.
 
@@ -421,22 +418,16 @@ def error_figure(
     """
     from matplotlib.figure import Figure
 
-    width, depth = np.ptp(model.points[:, :2], axis=0)
+    width, depth = np.ptp(surface.view.points[:, :2], axis=0)
     share = float(np.clip(depth / width, 0.4, 1.6)) if width > 0 else 1.0
     figure = Figure(figsize=(7.2, 6.0 * share + 0.9), dpi=110, layout="constrained")
     ax = figure.subplots()
     size = np.abs(np.asarray(deviation, dtype=np.float64))
     # a few spikes shall not pale all the rest
-    plot_error(model, size, ax, covered=covered, largest=float(np.quantile(size, 0.995)) or None)
+    plot_error(surface, size, ax, covered=covered, largest=float(np.quantile(size, 0.995)) or None)
     bare = int((~np.asarray(covered, dtype=bool)).sum())
     ax.set_title("\n".join(filter(None, [title, f"blue: {bare:,} uncovered vertices" if bare else ""])), fontsize=10)
     return figure
-
-
-def relief_exaggeration(model: OpenModel) -> float:
-    """Return the factor by which heights are drawn higher, so that a flat terrain shows its relief."""
-    width, depth, height = np.ptp(model.points, axis=0)
-    return max(1.0, LEAST_RELIEF * float(max(width, depth)) / float(height)) if height > 0 else 1.0
 
 
 def hillshade(triangles: FloatArray) -> FloatArray:
@@ -483,12 +474,17 @@ def _new_axes(size: tuple[float, float]) -> Axes:
     return pyplot.subplots(figsize=size, layout="constrained")[1]
 
 
-def _surface(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:
+def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:
     """Return points, faces and vertex colours of whatever is a mesh."""
+    surface = getattr(mesh, "surface", mesh)
+    if hasattr(surface, "view"):  # a problem or its surface
+        faces = surface.faces if kept is None else surface.simplify(np.asarray(kept) | surface.pinned).faces
+        return surface.view.points, faces, surface.model.attributes.get("color")
     if kept is not None:
-        if not hasattr(mesh, "kernel_arguments"):
-            raise TypeError(f"kept chooses vertices of an OpenModel, not of a {type(mesh).__name__}")
-        return mesh.points, simplify(mesh, np.asarray(kept)).faces, mesh.attributes.get("color")
+        raise TypeError(
+            f"kept chooses vertices by a problem's rules, which a {type(mesh).__name__} does not have; give the "
+            "problem or problem.surface"
+        )
     if isinstance(mesh, tuple):
         return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1]), None
     if hasattr(mesh, "points") and hasattr(mesh, "faces"):  # a model, or a solution of a front
@@ -497,7 +493,9 @@ def _surface(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArra
         visual: Any = getattr(mesh, "visual", None)
         own = np.asarray(visual.vertex_colors) if getattr(visual, "kind", None) == "vertex" else None
         return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces), own
-    raise TypeError(f"a {type(mesh).__name__} is no mesh; give an OpenModel, a trimesh.Trimesh or (points, faces)")
+    raise TypeError(
+        f"a {type(mesh).__name__} is no mesh; give a MeshProblem, an OpenModel, a trimesh.Trimesh or (points, faces)"
+    )
 
 
 def _turned(points: FloatArray, elevation: float, turn: float) -> FloatArray:

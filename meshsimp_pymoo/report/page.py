@@ -15,23 +15,21 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from meshsimp_pymoo.comparison.study import slug
+from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import new_file
-from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma
-from meshsimp_pymoo.report.figures import UNCOVERED, relief_exaggeration
+from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
+from meshsimp_pymoo.report.figures import UNCOVERED
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
+from meshsimp_pymoo.surface.measures import MEASURES, Measure
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
-    from meshsimp_pymoo.surface.evaluate import Simplified
-    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.surface import Original, Simplified
 
 __all__ = ["PAGE_BYTES", "simplification_page", "write_page"]
 
-IntArray = npt.NDArray[np.integer[Any]]
 
 SCRIPTS = (
     "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "simplification.js",
@@ -127,7 +125,8 @@ def simplification_page(
     ResultError
         If the numbers are not those of the problem's meshes: then it is another model, or has other settings.
     """
-    model, chosen = problem.model, front.run.get("chosen")
+    surface, chosen = problem.surface, front.run.get("chosen")
+    model, view = surface.model, surface.view
     count = len(front.kept)
     whole = model.n_vertices <= DRAWN_VERTICES  # else the largest mesh would take the place of many
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
@@ -137,12 +136,13 @@ def simplification_page(
     if front.refitted_error is not None:
         columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
     paint = model.attributes.get("color")
-    exaggeration = float(f"{relief_exaggeration(model):.2g}")
+    exaggeration = float(f"{view.exaggeration:.2g}")
     source = str(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
         "folder": shlex.quote(os.fspath(folder)),
         "measure": problem.objectives[0],
+        "measures": [{"name": name, **spoken(measure)} for name, measure in MEASURES.items()],
         "columns": columns,
         "meshes": _mesh_files(front, chosen),
         "refitted_meshes": front.refitted_meshes,
@@ -154,10 +154,10 @@ def simplification_page(
         "model": {
             "vertices": model.n_vertices,
             "triangles": len(model.faces),
-            "diagonal": model.diagonal,
-            "relief": float(np.ptp(model.points[:, 2]) / np.ptp(model.points[:, :2], axis=0).max()),
-            "pivot": model.pivot.tolist(),
-            "rotation": model.rotation.tolist(),
+            "diagonal": surface.diagonal,
+            "relief": float(np.ptp(view.points[:, 2]) / np.ptp(view.points[:, :2], axis=0).max()),
+            "pivot": view.pivot.tolist(),
+            "rotation": view.rotation.tolist(),
         },
         "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
         "paint": None if paint is None else embedded_array(paint[held.vertices]) | {"channels": paint.shape[1]},
@@ -182,9 +182,15 @@ def simplification_page(
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,
+        errors={name: measure.label for name, measure in MEASURES.items() if measure.unit},
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
+
+
+def spoken(measure: Measure) -> dict[str, str]:
+    """Return what the page says of a measure."""
+    return {"label": measure.label, "meaning": measure.meaning, "unit": measure.unit}
 
 
 def _embedded(problem: MeshProblem, front: StoredFront, order: Sequence[int], knee: int, limit: int) -> _Embedded:
@@ -242,7 +248,7 @@ def _checked(problem: MeshProblem, front: StoredFront, row: int) -> Simplified:
     mesh = problem.simplify(front.kept[row])
     triangles, error, found = front.quality["triangles"][row], front.quality["error"][row], mesh.quality
     if found.triangles != triangles or not np.isclose(
-        found.error, error, rtol=1e-6, atol=1e-12 * problem.model.diagonal
+        found.error, error, rtol=1e-6, atol=1e-12 * problem.surface.diagonal
     ):
         raise ResultError(
             f"{front.folder}: solution {row} is said to have {triangles} triangles and the error {error:.9g}, but its "
@@ -276,7 +282,7 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     return files
 
 
-def _what_is_thinned(model: OpenModel, held: _Embedded, missing: int) -> Iterator[str]:
+def _what_is_thinned(model: Original, held: _Embedded, missing: int) -> Iterator[str]:
     if missing:
         yield (
             f"To keep this page small, {len(held.solutions) - missing} of {len(held.solutions)} meshes are in it, an "
@@ -293,7 +299,8 @@ def _settings(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what is known of how the front was made, as rows of a table."""
     rows = [("model", run["model"]["name"]), ("hash of the model", run["model"]["hash"])]
     rows += [(key, str(run[key])) for key in RECORDED if run.get(key) is not None]
-    for key, value in (run.get("settings") or {}).items():
+    said = [part for name in ("options", "rules", "settings") for part in (run.get(name) or {}).items()]
+    for key, value in said:
         if value not in (None, False) and key not in (*run, "threads"):  # which change no result
             rows.append((key.replace("_", " "), ", ".join(map(str, value)) if isinstance(value, list) else str(value)))
     version = (run.get("versions") or {}).get("meshsimp-pymoo")

@@ -21,12 +21,12 @@ from pymoo.util.display.column import Column
 from pymoo.util.display.multi import NumberOfNondominatedSolutions
 from pymoo.util.display.output import Output
 
+from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.indicators import hypervolume_ratio
 from meshsimp_pymoo.problem import MeshProblem
 
 __all__ = ["FrontOutput", "errors_at", "usual_sizes"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # Shares of the original's triangles at which the error is shown.
 SHARES = (0.02, 0.05, 0.1, 0.2)

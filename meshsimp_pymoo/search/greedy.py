@@ -17,34 +17,26 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numba import njit
 
+from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.plane.borrow import borrowed
-from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
-from meshsimp_pymoo.surface.live import (
-    EMITTED,
-    END,
-    N_EMITTED,
-    Ground,
-    Live,
-    build,
-    deviation_in,
-    insert,
-    lent_live,
-    make_ground,
-    remove,
-    summed_error,
+from meshsimp_pymoo.surface.moves import (
+    cells_around,
+    exchange,
+    n_cells,
+    n_triangles,
+    site_mask,
+    sites_around,
     total_cost,
-    triangles_around,
-    try_remove,
-    weighed_cost,
+    try_exchange,
+    worst_in,
 )
-
-if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
 
 
 @dataclass(frozen=True)
@@ -90,131 +82,116 @@ class NestedFront:
 
 
 def thinning(
-    model: OpenModel,
-    pinned: np.ndarray | None = None,
-    *,
-    kept: np.ndarray | None = None,
-    footprint: str = "model",
-    outside: str = "nearest",
-    measure: str = "error",
-    least: int = 0,
+    surface: Surface, pinned: BoolArray | None = None, *, kept: BoolArray | None = None, least: int = 0
 ) -> NestedFront:
     """Remove the vertex whose removal adds the least error, until only the pinned ones are left.
 
     Parameters
     ----------
-    model : OpenModel
-        The original mesh of N vertices.
+    surface : Surface
+        The original mesh of N vertices and its rules, whose measure is what counts: w_p d_p, or w_p times the square of
+        d_p; it is also what the front's ``error`` is in.
     pinned : (N,) bool array, optional
-        Vertices never removed; the corners by default.
+        Vertices never removed, besides those that the surface pins.
     kept : (N,) bool array, optional
         The subset to start from; all vertices by default (of several at one position, the first).
-    footprint, outside : str
-        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
-    measure : {"error", "rms_error"}
-        What counts: w_p d_p, or w_p times the square of d_p; also what the front's ``error`` is.
     least : int
         Stop once there are this many triangles or fewer.
 
     Returns
     -------
     NestedFront
+
+    Raises
+    ------
+    TypeError
+        If this is a model, not a surface.
+    ValueError
+        If the surface's measure is no sum, or it has no compiled moves.
     """
-    fixed = _pinned(model, pinned)
-    start = np.ones(model.n_vertices, bool) if kept is None else kept | fixed
-    sites = _sites(model, start, fixed)
-    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
-    live = lent_live(model.n_vertices)
-    build(ground, live, model, sites)
-    n = int((~fixed[sites]).sum())
-    removed = np.empty(n, np.int64)
-    error = np.empty(n + 1)
-    triangles = np.empty(n + 1, np.int64)
-    n_removed = thin_live(ground, live, sites, fixed, least, np.inf, removed, error, triangles)
-    base = np.setdiff1d(sites, removed[:n_removed])
+    ground = movable_ground(surface, "thinning and insertion")
+    fixed = _fixed(surface, pinned)
+    n_all = surface.n_vertices
+    with surface.books(np.ones(n_all, bool) if kept is None else kept | fixed, fixed=fixed) as books:
+        sites = site_mask(ground, books, n_all)
+        n = int((sites & ~fixed).sum())
+        removed, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
+        n_removed = thin(ground, books, n_all, fixed, least, np.inf, removed, error, triangles)
+    sites[removed[:n_removed]] = False
     return NestedFront(
-        base,
+        np.flatnonzero(sites),
         removed[:n_removed][::-1].copy(),
-        summed_error(error[: n_removed + 1][::-1].copy(), ground, model),
+        error_of(surface, error[: n_removed + 1][::-1].copy()),
         triangles[: n_removed + 1][::-1].copy(),
-        model.n_vertices,
+        n_all,
     )
 
 
+def thinned(surface: Surface) -> NestedFront:
+    """Return the thinning of a surface, computed once as long as the surface is there."""
+    front = _THINNED.get(surface)
+    if front is None:
+        front = _THINNED[surface] = thinning(surface)
+    return front
+
+
+_THINNED: WeakKeyDictionary[Any, NestedFront] = WeakKeyDictionary()
+
+
 def greedy_insertion(
-    model: OpenModel,
-    pinned: np.ndarray | None = None,
-    *,
-    choose: str = "point",
-    most: int | None = None,
-    footprint: str = "model",
-    outside: str = "nearest",
-    measure: str = "error",
+    surface: Surface, pinned: BoolArray | None = None, *, choose: str = "point", most: int | None = None
 ) -> NestedFront:
     """Insert the worst vertex, starting from the pinned ones.
 
     Parameters
     ----------
-    model : OpenModel
-        The original mesh of N vertices.
+    surface : Surface
+        The original mesh of N vertices and its rules; see :func:`thinning`.
     pinned : (N,) bool array, optional
-        Vertices to start from; the corners by default. They must span a triangle of the mesh.
+        Vertices to start from, besides those that the surface pins. They must span a triangle of the mesh.
     choose : {"point", "triangle"}
         The vertex with the largest cost of all, or that of the triangle with the largest sum of costs.
     most : int, optional
         Number of vertices to insert; all by default.
-    footprint, outside : str
-        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
-    measure : {"error", "rms_error"}
-        What counts: w_p d_p, or w_p times the square of d_p; also what the front's ``error`` is.
 
     Returns
     -------
     NestedFront
         Ends where no triangle has a vertex left that deviates.
+
+    Raises
+    ------
+    TypeError
+        If this is a model, not a surface.
+    ValueError
+        If an argument makes no sense, the surface's measure is no sum, or it has no compiled moves.
     """
+    ground = movable_ground(surface, "thinning and insertion")
     if choose not in ("point", "triangle"):
         raise ValueError(f"choose={choose!r} is unknown; use 'point' or 'triangle'")
     if most is not None and most < 0:
         raise ValueError(f"most={most} is no number of vertices; give 0 or more")
-    fixed = _pinned(model, pinned)
-    sites = _sites(model, fixed, fixed)
-    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
-    live = lent_live(model.n_vertices)
-    build(ground, live, model, sites)
-    n = model.n_vertices - len(sites) if most is None else min(most, model.n_vertices - len(sites))
-    inserted = np.empty(n, np.int64)
-    error = np.empty(n + 1)
-    triangles = np.empty(n + 1, np.int64)
-    n_inserted = _grow(ground, live, choose == "point", inserted, error, triangles)
+    fixed = _fixed(surface, pinned)
+    n_all = surface.n_vertices
+    with surface.books(fixed, fixed=fixed) as books:
+        sites = np.flatnonzero(site_mask(ground, books, n_all))
+        n = n_all - len(sites) if most is None else min(most, n_all - len(sites))
+        inserted, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
+        n_inserted = _grow(ground, books, n_all, choose == "point", inserted, error, triangles)
     return NestedFront(
         sites,
         inserted[:n_inserted],
-        summed_error(error[: n_inserted + 1], ground, model),
+        error_of(surface, error[: n_inserted + 1]),
         triangles[: n_inserted + 1],
-        model.n_vertices,
+        n_all,
     )
 
 
-def _pinned(model: OpenModel, pinned: np.ndarray | None) -> np.ndarray:
-    if pinned is not None and (pinned.dtype != np.bool_ or pinned.shape != (model.n_vertices,)):
-        raise ValueError(
-            f"pinned is a bool array of shape ({model.n_vertices},), not {pinned.dtype} of shape {pinned.shape}"
-        )
-    fixed = np.zeros(model.n_vertices, bool)
-    fixed[model.corners] = True
-    return fixed if pinned is None else fixed | pinned
-
-
-def _sites(model: OpenModel, kept: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """Rows of the kept vertices, one for each position: a pinned one where there is one, else the first."""
-    rows = np.flatnonzero(kept)
-    if not model.kernel_arguments[3]:
-        return rows
-    group = np.cumsum(np.r_[True, (model.xy[1:] != model.xy[:-1]).any(axis=1)])[rows]
-    order = np.lexsort((~fixed[rows], group))
-    first = np.r_[True, group[order][1:] != group[order][:-1]]
-    return np.sort(rows[order[first]])
+def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:
+    n = surface.n_vertices
+    if pinned is not None and (pinned.dtype != np.bool_ or pinned.shape != (n,)):
+        raise ValueError(f"pinned is a bool array of shape ({n},), not {pinned.dtype} of shape {pinned.shape}")
+    return surface.pinned.copy() if pinned is None else surface.pinned | pinned
 
 
 # ------------------------------------------------------------------------------------------------- a heap of keys
@@ -259,10 +236,10 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
 
 
 @njit(cache=True, nogil=True)
-def thin_live(
-    g: Ground,
-    live: Live,
-    sites: np.ndarray,
+def thin(
+    ground: Any,
+    books: Any,
+    n_all: int,
     fixed: np.ndarray,
     least: int,
     limit: float,
@@ -270,27 +247,43 @@ def thin_live(
     error: np.ndarray,
     triangles: np.ndarray,
 ) -> int:
-    """Remove the vertex that adds the least error while that is at most ``limit`` and triangles exceed ``least``."""
-    g = borrowed(g)
-    live = borrowed(live)
-    n_all = len(g.z)
+    """Remove the vertex that adds the least cost while that is at most ``limit`` and triangles exceed ``least``.
+
+    Parameters
+    ----------
+    ground, books : records
+        Of a surface of ``n_all`` vertices; the books end at the last mesh.
+    fixed : (n_all,) bool array
+        Sites that stay.
+    removed : (n,) int array
+        Filled with the vertices removed, in their order; n is the number of sites that are not fixed.
+    error, triangles : (n + 1,) arrays
+        Filled with the cost and the number of triangles before the first removal and after each.
+
+    Returns
+    -------
+    int
+        How many were removed.
+    """
+    g = borrowed(ground)
+    live = borrowed(books)
+    sites = site_mask(g, live, n_all)
     key = np.full(n_all, np.inf)
-    heap = np.empty(len(sites), np.int32)
+    heap = np.empty(n_all, np.int32)
     at = np.full(n_all, -1, np.int32)
     n = 0
-    for k in range(len(sites)):
-        v = sites[k]
-        if not fixed[v]:
-            key[v], _ = try_remove(g, live, v)
+    for v in range(n_all):
+        if sites[v] and not fixed[v]:
+            key[v], _ = try_exchange(g, live, v, -1, np.inf)
             heap[n] = v
             at[v] = n
             n += 1
     for k in range(n // 2 - 1, -1, -1):
         _sift_down(heap, at, key, k, n)
-    error[0] = total_cost(live)
-    triangles[0] = live.tally[N_EMITTED]
+    error[0] = total_cost(g, live)
+    triangles[0] = n_triangles(g, live)
     n_removed = 0
-    around = np.empty(len(live.ring), np.int64)
+    around = np.empty(2 * n_all + 8, np.int64)
     while n > 0 and key[heap[0]] < np.inf and key[heap[0]] <= limit and triangles[n_removed] > least:
         v = heap[0]
         n -= 1
@@ -299,25 +292,23 @@ def thin_live(
         at[v] = -1
         if n > 0:
             _sift_down(heap, at, key, 0, n)
-        m = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
-        for k in range(m):
-            around[k] = np.int64(live.ring[k])
-        if not remove(g, live, v):
+        m = sites_around(g, live, v, around)
+        if not exchange(g, live, v, -1):
             continue
         removed[n_removed] = v
         n_removed += 1
-        error[n_removed] = total_cost(live)
-        triangles[n_removed] = live.tally[N_EMITTED]
+        error[n_removed] = total_cost(g, live)
+        triangles[n_removed] = n_triangles(g, live)
         if triangles[n_removed] == 0:
             # The last mesh was the smallest one there is.
             n_removed -= 1
             break
         for k in range(m):
             w = around[k]
-            if w > LAST_INDEX or at[w] < 0:
+            if at[w] < 0:
                 continue
             old = key[w]
-            key[w], _ = try_remove(g, live, w)
+            key[w], _ = try_exchange(g, live, w, -1, np.inf)
             if key[w] < old:
                 _sift_up(heap, at, key, at[w])
             else:
@@ -326,74 +317,36 @@ def thin_live(
 
 
 @njit(cache=True, nogil=True)
-def _at_a_corner(xy: np.ndarray, mesh: np.ndarray, t: int, i: int) -> bool:
-    """Whether vertex i has the position of a corner of triangle t, where there is no room for it."""
-    for k in range(3):
-        v = mesh[t + k]
-        if v <= LAST_INDEX and xy[2 * v] == xy[2 * i] and xy[2 * v + 1] == xy[2 * i + 1]:
-            return True
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _candidate(g: Ground, live: Live, t: int) -> tuple[int, float]:
-    """Return the vertex of triangle t that deviates most, and by how much (-1: none deviates)."""
-    mesh = live.mesh
-    worst = -1
-    most = 0.0
-    i = live.head[t >> 3]
-    emitted = (live.kind[t >> 3] & EMITTED) != 0
-    while i >= 0:
-        if _at_a_corner(g.xy, mesh, t, i):
-            i = live.following[i]
-            continue
-        d = live.cost[i]
-        if emitted:
-            d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
-            if g.weighed:
-                d = weighed_cost(g, d, i)
-        elif live.bare_segment[i] < 0:
-            d = 1.0  # there is no mesh yet; any vertex will do
-        if d > most or (d == most and worst >= 0 and i < worst):
-            most = d
-            worst = i
-        i = live.following[i]
-    return worst, most
-
-
-@njit(cache=True, nogil=True)
 def _grow(
-    g: Ground, live: Live, by_point: bool, inserted: np.ndarray, error: np.ndarray, triangles: np.ndarray
+    ground: Any,
+    books: Any,
+    n_all: int,
+    by_point: bool,
+    inserted: np.ndarray,
+    error: np.ndarray,
+    triangles: np.ndarray,
 ) -> int:
-    g = borrowed(g)
-    live = borrowed(live)
-    n_records = len(live.kind)
-    key = np.full(n_records, np.inf)  # minus what makes a triangle urgent
-    best = np.full(n_records, -1, np.int32)
-    heap = np.empty(n_records, np.int32)
-    at = np.full(n_records, -1, np.int32)
+    """Insert the worst vertex of all, or of the worst cell; fill what :func:`thin` fills and return their number."""
+    g = borrowed(ground)
+    live = borrowed(books)
+    most_cells = 2 * n_all + 8
+    key = np.full(most_cells, np.inf)  # minus what makes a cell urgent
+    best = np.full(most_cells, -1, np.int32)
+    heap = np.empty(most_cells, np.int32)
+    at = np.full(most_cells, -1, np.int32)
     n = 0
-    changed = np.empty(len(live.ring), np.int64)
-    n_changed = live.tally[END] // RECORD
+    changed = np.empty(most_cells, np.int64)
+    n_changed = n_cells(g, live)
     for r in range(n_changed):
         changed[r] = r
-    error[0] = total_cost(live)
-    triangles[0] = live.tally[N_EMITTED]
+    error[0] = total_cost(g, live)
+    triangles[0] = n_triangles(g, live)
     n_inserted = 0
     while True:
         for k in range(n_changed):
             r = changed[k]
-            best[r], most = _candidate(g, live, r * RECORD)
-            urgency = most
-            if not by_point:
-                urgency = live.subtotal[r]
-                if (live.kind[r] & EMITTED) == 0:
-                    urgency = 0.0
-                    i = live.head[r]
-                    while i >= 0:
-                        urgency += live.cost[i] if live.bare_segment[i] >= 0 else 1.0
-                        i = live.following[i]
-            key[r] = -urgency if best[r] >= 0 else np.inf
+            best[r], most, whole = worst_in(g, live, r)
+            key[r] = -(most if by_point else whole) if best[r] >= 0 else np.inf
             if at[r] < 0:
                 heap[n] = r
                 at[r] = n
@@ -403,11 +356,9 @@ def _grow(
         if n_inserted == len(inserted) or n == 0 or key[heap[0]] == np.inf:
             return n_inserted
         v = best[heap[0]]
-        insert(g, live, v)
+        exchange(g, live, -1, v)
         inserted[n_inserted] = v
         n_inserted += 1
-        error[n_inserted] = total_cost(live)
-        triangles[n_inserted] = live.tally[N_EMITTED]
-        n_changed = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
-        for k in range(n_changed):
-            changed[k] = np.int64(live.cavity[k]) // RECORD
+        error[n_inserted] = total_cost(g, live)
+        triangles[n_inserted] = n_triangles(g, live)
+        n_changed = cells_around(g, live, v, changed)

@@ -7,31 +7,28 @@ The change of the error is exact and looks at the triangles touched only, so a m
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.plane.borrow import borrowed
-from meshsimp_pymoo.search.greedy import thin_live
-from meshsimp_pymoo.search.requirements import summed_measure
-from meshsimp_pymoo.surface.live import (
-    N_EMITTED,
-    N_SITES,
-    Ground,
-    Live,
-    build,
+from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.surface.moves import (
     exchange,
-    lent_live,
-    make_ground,
+    is_site,
+    is_taken,
+    n_sites,
+    n_triangles,
+    site_mask,
     total_cost,
     try_exchange,
+    urgency,
 )
+from meshsimp_pymoo.surface.surface import Surface, movable_ground
 from meshsimp_pymoo.workers import thread_pool
-
-if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.model import OpenModel
 
 
 class MoveShares(NamedTuple):
@@ -85,28 +82,14 @@ def _unit(state: np.ndarray) -> float:
 
 
 @njit(cache=True, nogil=True)
-def _taken(xy: np.ndarray, site: np.ndarray, w: int) -> bool:
-    """Whether some site has the position of vertex w; those at one position follow each other."""
-    if site[w]:
-        return True
-    for step in (-1, 1):
-        i = w + step
-        while 0 <= i < len(site) and xy[2 * i] == xy[2 * w] and xy[2 * i + 1] == xy[2 * w + 1]:
-            if site[i]:
-                return True
-            i += step
-    return False
-
-
-@njit(cache=True, nogil=True)
-def _urgent(g: Ground, live: Live, n: int, state: np.ndarray) -> int:
+def _urgent(g: Any, live: Any, n: int, state: np.ndarray) -> int:
     """Draw a vertex that is no site, from the triangle with the largest error of a few; -1 if none was met."""
     best = -1
     most = -1.0
     for _ in range(FAR_TRIES):
         i = _below(state, n)
-        if not live.site[i]:
-            amount = live.subtotal[live.place[i] >> 3] if live.bare_at[i] < 0 else live.cost[i]
+        if not is_site(g, live, i):
+            amount = urgency(g, live, i)
             if amount > most:
                 most = amount
                 best = i
@@ -115,8 +98,9 @@ def _urgent(g: Ground, live: Live, n: int, state: np.ndarray) -> int:
 
 @njit(cache=True, nogil=True)
 def _anneal(
-    g: Ground,
-    live: Live,
+    ground: Any,
+    books: Any,
+    n: int,
     movable: np.ndarray,
     n_movable: int,
     border: np.ndarray,
@@ -132,18 +116,15 @@ def _anneal(
     best_movable: np.ndarray,
 ) -> int:
     """Walk among the subsets of at most ``most`` triangles; return the number of entries of ``best_movable``."""
-    g = borrowed(g)
-    live = borrowed(live)
+    g = borrowed(ground)
+    live = borrowed(books)
     movable = borrowed(movable)
     border = borrowed(border)
     indptr = borrowed(indptr)
     indices = borrowed(indices)
     state = borrowed(state)
-    n = len(g.z)
     near, fill, on_border, drop = shares
-    site = live.site
-    count = live.tally
-    now = total_cost(live)
+    now = total_cost(g, live)
     best = now
     n_best = n_movable
     best_movable[:n_best] = movable[:n_best]
@@ -154,7 +135,7 @@ def _anneal(
             temperature = hot * cooling ** (step / moves)
             if stop[0]:
                 break
-        slack = most - count[N_EMITTED]
+        slack = most - n_triangles(g, live)
         kind = _unit(state)
         q = _below(state, n_movable) if n_movable > 0 else 0
         v = np.int64(-1)
@@ -176,7 +157,7 @@ def _anneal(
                     w = _urgent(g, live, n, state)
                 if w < 0:
                     continue
-        if w >= 0 and _taken(g.xy, site, w):
+        if w >= 0 and is_taken(g, live, w):
             continue
         if v < 0 and w < 0:
             continue
@@ -198,7 +179,7 @@ def _anneal(
         else:
             n_movable -= 1
             movable[q] = movable[n_movable]
-        now = total_cost(live)
+        now = total_cost(g, live)
         if now < best:
             best = now
             kept_best = False
@@ -209,15 +190,18 @@ def _anneal(
 
 
 @njit(cache=True, nogil=True)
-def _fit(g: Ground, live: Live, fixed: np.ndarray, which: int, wanted: int, state: np.ndarray) -> None:
-    """Drop or add vertices, each the best of a few drawn, until ``tally[which]`` is ``wanted`` or just below it."""
-    g = borrowed(g)
-    live = borrowed(live)
-    n = len(g.z)
-    count = live.tally
+def _fit(
+    ground: Any, books: Any, n: int, fixed: np.ndarray, by_triangles: bool, wanted: int, state: np.ndarray
+) -> None:
+    """Drop or add vertices, each the best of a few drawn, to ``wanted`` triangles or sites, or just below."""
+    g = borrowed(ground)
+    live = borrowed(books)
     failures = 0
-    while count[which] != wanted and failures < FIT_FAILURES:
-        shrink = count[which] > wanted
+    while failures < FIT_FAILURES:
+        size = n_triangles(g, live) if by_triangles else n_sites(g, live)
+        if size == wanted:
+            break
+        shrink = size > wanted
         best_v = np.int64(-1)
         best_w = np.int64(-1)
         least = np.inf
@@ -229,17 +213,17 @@ def _fit(g: Ground, live: Live, fixed: np.ndarray, which: int, wanted: int, stat
                 # The vertex drawn or the next site along the curve.
                 for _step in range(n):
                     i = i + 1 if i + 1 < n else 0
-                    if live.site[i] and not fixed[i]:
+                    if is_site(g, live, i) and not fixed[i]:
                         v = i
                         break
                 if v < 0:
                     break
             else:
                 w = np.int64(_urgent(g, live, n, state))
-                if w < 0 or _taken(g.xy, live.site, w):
+                if w < 0 or is_taken(g, live, w):
                     continue
             change, triangles = try_exchange(g, live, v, w, np.inf)
-            if not shrink and which == N_EMITTED and count[N_EMITTED] + triangles > wanted:
+            if not shrink and by_triangles and size + triangles > wanted:
                 continue
             if change < least:
                 least = change
@@ -249,19 +233,23 @@ def _fit(g: Ground, live: Live, fixed: np.ndarray, which: int, wanted: int, stat
             failures += 1
 
 
-def _thin_to(ground: Ground, live: Live, pinned: NDArray[np.bool_], triangles: int) -> None:
+@njit(cache=True, nogil=True)
+def _state(ground: Any, books: Any) -> tuple[float, int]:
+    return total_cost(ground, books), n_triangles(ground, books)
+
+
+def _thin_to(ground: Any, books: Any, pinned: BoolArray, triangles: int) -> None:
     """Remove the vertices that add the least error until there are at most so many triangles."""
-    if live.tally[N_EMITTED] > triangles:
-        sites = np.flatnonzero(live.site[: len(pinned)])
-        n = len(sites) + 1
-        removed, error, counts = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
-        thin_live(ground, live, sites, pinned, triangles, np.inf, removed, error, counts)
+    if _state(ground, books)[1] <= triangles:
+        return
+    n = len(pinned) + 1
+    removed, error, counts = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
+    thin(ground, books, len(pinned), pinned, triangles, np.inf, removed, error, counts)
 
 
 def relocate(
-    model: OpenModel,
-    kept: NDArray[np.bool_],
-    pinned: NDArray[np.bool_],
+    surface: Surface,
+    kept: BoolArray,
     *,
     moves: int,
     seed: int,
@@ -270,21 +258,17 @@ def relocate(
     temperature: float = 0.3,
     cooling: float = 0.03,
     shares: MoveShares = USUAL_MOVES,
-    footprint: str = "model",
-    outside: str = "nearest",
-    measure: str = "error",
-    stop: NDArray[np.bool_] | None = None,
-) -> NDArray[np.bool_]:
+    stop: BoolArray | None = None,
+) -> BoolArray:
     """Return a subset of no more triangles with less error, or ``kept`` itself: annealed moves, the best state seen.
 
     Parameters
     ----------
-    model : OpenModel
-        The original mesh of N vertices.
+    surface : Surface
+        The original mesh of N vertices and its rules, whose measure is what is lowered: the sum of w_p d_p, or of w_p
+        times the square of d_p.
     kept : (N,) bool array
-        Where to start; must span a triangle of the mesh.
-    pinned : (N,) bool array
-        Vertices that stay.
+        Where to start; with what the surface pins it must span a triangle of the mesh.
     moves : int
         Number of moves to try, a microsecond or two each.
     seed : int
@@ -300,10 +284,6 @@ def relocate(
         Share of the temperature that is left in the end; in between it falls geometrically.
     shares : MoveShares
         How often each kind of move is tried.
-    footprint, outside : str
-        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
-    measure : {"error", "rms_error"}
-        What is lowered: the sum of w_p d_p, or of w_p times the square of d_p.
     stop : (1,) bool array, optional
         The moves end soon after another thread has set it.
 
@@ -311,82 +291,91 @@ def relocate(
     -------
     (N,) bool array
         Kept vertices at the position of another kept one are left out: they are in no mesh.
+
+    Raises
+    ------
+    TypeError
+        If this is a model, not a surface.
+    ValueError
+        If the surface's measure is no sum, or it has no compiled moves.
     """
-    n = model.n_vertices
-    live = lent_live(n)
-    ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
-    kept = kept | pinned
-    sites = np.flatnonzero(kept)
-    if model.kernel_arguments[3]:
-        sites = sites[np.r_[True, (model.xy[sites[1:]] != model.xy[sites[:-1]]).any(axis=1)]]
-    build(ground, live, model, sites)
+    ground = movable_ground(surface, "thinning and relocation")
+    n, pinned = surface.n_vertices, surface.pinned
     state = np.array([seed], np.uint64)
-    if size is not None:
-        _fit(ground, live, pinned, N_SITES, size, state)
-    if triangles is not None:
-        _thin_to(ground, live, pinned, triangles)
-        _fit(ground, live, pinned, N_EMITTED, triangles, state)
-    result = live.site[:n] == 1
-    rows = np.flatnonzero(result & ~pinned)
-    total = max(float(total_cost(live)), 0.0)
-    if moves > 0 and np.isfinite(total):
-        movable = np.empty(n, np.int64)
-        movable[: len(rows)] = rows
-        best = np.empty(n, np.int64)
-        n_best = _anneal(
-            ground,
-            live,
-            movable,
-            len(rows),
-            model.border,
-            *model.neighbours,
-            moves,
-            temperature * total / max(len(rows), 1),
-            cooling,
-            int(live.tally[N_EMITTED]) if triangles is None else triangles,
-            tuple(map(float, shares)),
-            state,
-            np.zeros(1, np.bool_) if stop is None else stop,
-            best,
-        )
-        result &= pinned
-        result[best[:n_best]] = True
+    with surface.books(kept | pinned) as books:
+        if size is not None:
+            _fit(ground, books, n, pinned, False, size, state)
+        if triangles is not None:
+            _thin_to(ground, books, pinned, triangles)
+            _fit(ground, books, n, pinned, True, triangles, state)
+        result: BoolArray = site_mask(ground, books, n)
+        rows = np.flatnonzero(result & ~pinned)
+        total, n_now = _state(ground, books)
+        if moves > 0 and np.isfinite(total):
+            movable = np.empty(n, np.int64)
+            movable[: len(rows)] = rows
+            best = np.empty(n, np.int64)
+            n_best = _anneal(
+                ground,
+                books,
+                n,
+                movable,
+                len(rows),
+                surface.border,
+                *surface.neighbours,
+                moves,
+                temperature * max(float(total), 0.0) / max(len(rows), 1),
+                cooling,
+                int(n_now) if triangles is None else triangles,
+                tuple(map(float, shares)),
+                state,
+                np.zeros(1, np.bool_) if stop is None else stop,
+                best,
+            )
+            result &= pinned
+            result[best[:n_best]] = True
     return result
 
 
 def relocate_all(
-    problem: Any,
-    X: NDArray[np.bool_],
+    surface: Surface,
+    X: BoolArray,
     moves: NDArray[np.integer],
     random_state: np.random.Generator,
     *,
     sizes: NDArray[np.integer] | None = None,
     triangles: NDArray[np.integer] | None = None,
-    temperature: float = 0.3,
-    cooling: float = 0.03,
-    shares: MoveShares = USUAL_MOVES,
-) -> NDArray[np.bool_]:
-    """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number."""
-    measure = summed_measure(problem)
+    **how: Any,
+) -> BoolArray:
+    """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number.
+
+    Parameters
+    ----------
+    surface : Surface
+        What they are subsets of.
+    X : (P, N) bool array
+        The subsets.
+    moves, sizes, triangles : (P,) int arrays
+        Those arguments of :func:`relocate` for each row.
+    random_state : numpy.random.Generator
+        Source of randomness.
+    **how
+        Its other arguments, the same for all rows.
+    """
+    movable_ground(surface, "thinning and relocation")
     stop = np.zeros(1, np.bool_)
     seeds = random_state.integers(1, 2**63 - 1, size=len(X))
 
-    def one(k: int) -> NDArray[np.bool_]:
+    def one(k: int) -> BoolArray:
         return relocate(
-            problem.model,
+            surface,
             X[k],
-            problem.pinned,
             moves=int(moves[k]),
             seed=int(seeds[k]),
             size=None if sizes is None else int(sizes[k]),
             triangles=None if triangles is None else int(triangles[k]),
-            temperature=temperature,
-            cooling=cooling,
-            shares=shares,
-            footprint=problem.footprint,
-            outside=problem.outside,
-            measure=measure,
             stop=stop,
+            **how,
         )
 
     try:

@@ -25,11 +25,11 @@ from pymoo.termination.max_time import TimeBasedTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 from pymoo.util.optimum import filter_optimum
 
-from meshsimp_pymoo.search.greedy import NestedFront, thinning
+from meshsimp_pymoo.search.greedy import NestedFront, thinned, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
-from meshsimp_pymoo.search.operators.sampling import nested_front
-from meshsimp_pymoo.search.requirements import summed_measure
+from meshsimp_pymoo.search.requirements import surface_of
+from meshsimp_pymoo.surface.surface import Surface, movable_ground
 from meshsimp_pymoo.workers import thread_pool
 
 # Rungs that get a child in the same generation.
@@ -166,7 +166,7 @@ class DownTheLadder(Mating):
         moves = np.ceil(self._pace(problem, algorithm, work.sum(), left) * work[turn]).astype(int)
         begun = time.perf_counter()
         children = relocate_all(
-            problem,
+            problem.surface,
             X[parents],
             moves,
             random_state,
@@ -229,6 +229,7 @@ class MemeticSearch(GeneticAlgorithm):
     def _setup(self, problem: Any, **kwargs: Any) -> None:
         if problem.n_obj != 2:
             raise ValueError(f"memetic() is for two objectives and the problem has {problem.n_obj}; use nsga3()")
+        movable_ground(surface_of(problem, self), "the memetic search and its thinning")
         super()._setup(problem, **kwargs)
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
@@ -268,8 +269,8 @@ class MemeticSearch(GeneticAlgorithm):
     def _finalize(self) -> None:
         """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
         pop = self.pop
-        thinned = nested_front(self.problem, self)
-        X = between_the_rungs(self.problem, pop.get("X"), pop.get("F"), thinned, most=self.survival.rungs[-1])
+        surface = self.problem.surface
+        X = between_the_rungs(surface, pop.get("X"), pop.get("F"), most=self.survival.rungs[-1])
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
             self.evaluator.eval(self.problem, extra, algorithm=self)
@@ -277,7 +278,7 @@ class MemeticSearch(GeneticAlgorithm):
 
 
 def between_the_rungs(
-    problem: Any, X: NDArray[np.bool_], F: NDArray[np.float64], thinned: NestedFront, *, most: float
+    surface: Surface, X: NDArray[np.bool_], F: NDArray[np.float64], *, most: float
 ) -> NDArray[np.bool_]:
     """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
 
@@ -285,33 +286,23 @@ def between_the_rungs(
     those of the thinned model that are better, of at most ``most`` triangles.
     """
     order = np.argsort(F[:, 1], kind="stable")
-    measure = summed_measure(problem)
+    whole = thinned(surface)
     most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
 
     def one(k: int) -> list[NDArray[np.bool_]]:
         low, high = F[order[k - 1], 1], F[order[k], 1]
         ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
-        by_thinning = _best_of(thinned, high)[0]
+        by_thinning = _best_of(whole, high)[0]
         step = STEP if F[order[k], 0] < (1.0 - 2.0 * STEP) * by_thinning else SMALL_STEP
         n_rows = min(max(int(np.log(max(ratio, 1.0)) / step), 1), BETWEEN, most_rows)
         wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
         wanted = wanted[(wanted > low) & (wanted < high)]
         if not len(wanted):
             return []
-        fronts = [thinned]
+        fronts = [whole]
         if F[order[k], 0] < by_thinning:
             # The rung is better than the thinned model: so may be what it is thinned to.
-            fronts.append(
-                thinning(
-                    problem.model,
-                    problem.pinned,
-                    kept=X[order[k]],
-                    footprint=problem.footprint,
-                    outside=problem.outside,
-                    measure=measure,
-                    least=int(low),
-                )
-            )
+            fronts.append(thinning(surface, kept=X[order[k]], least=int(low)))
         rows = []
         for size in wanted:
             best = min((_best_of(front, size) for front in fronts), key=lambda choice: choice[0])
@@ -320,11 +311,11 @@ def between_the_rungs(
         return rows
 
     found = [kept for rows in thread_pool().map(one, range(1, len(order))) for kept in rows]
-    better = np.flatnonzero((thinned.error < F[:, 0].min()) & (thinned.triangles <= most))
+    better = np.flatnonzero((whole.error < F[:, 0].min()) & (whole.triangles <= most))
     if len(better):
-        best = better[np.argmin(thinned.error[better])]
+        best = better[np.argmin(whole.error[better])]
         better = better[better <= best]
-        found += [thinned.kept(int(k)) for k in better[np.linspace(0, len(better) - 1, BETWEEN).astype(int)]]
+        found += [whole.kept(int(k)) for k in better[np.linspace(0, len(better) - 1, BETWEEN).astype(int)]]
     return np.array(found).reshape(-1, X.shape[1]).astype(bool)
 
 

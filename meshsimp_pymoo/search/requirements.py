@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshsimp_pymoo.surface.surface import Surface
+
 
 def pinned_vertices(problem: Any, operator: object) -> NDArray[np.bool_]:
     """Return ``problem.pinned``, the (N,) bool array of the vertices that every solution keeps.
@@ -24,53 +26,19 @@ def pinned_vertices(problem: Any, operator: object) -> NDArray[np.bool_]:
     return np.asarray(pinned)
 
 
-def mesh_neighbours(problem: Any, operator: object) -> tuple[NDArray[np.integer], NDArray[np.integer]]:
-    """Return ``problem.model.neighbours``: the one-rings as CSR arrays ``indptr`` (N + 1,) and ``indices``.
+def surface_of(problem: Any, operator: object) -> Surface:
+    """Return ``problem.surface``: what a chromosome means, with the model's neighbours and places.
 
     Raises
     ------
     TypeError
-        If the problem has no mesh model.
+        If the problem has none: it is not a ``MeshProblem`` (or a wrapper that shows its ``surface``).
     """
     try:
-        indptr, indices = problem.model.neighbours
+        surface: Surface = problem.surface
     except AttributeError:
-        raise TypeError(_not_a_mesh_problem(problem, operator, "model.neighbours")) from None
-    return indptr, indices
-
-
-def plane_coordinates(problem: Any, operator: object) -> NDArray[np.float64]:
-    """Return ``problem.model.xy``, the (N, 2) positions of the vertices in the plane.
-
-    Raises
-    ------
-    TypeError
-        If the problem has no mesh model.
-    """
-    pinned_vertices(problem, operator)
-    try:
-        xy: NDArray[np.float64] = problem.model.xy
-    except AttributeError:
-        raise TypeError(_not_a_mesh_problem(problem, operator, "model.xy")) from None
-    return xy
-
-
-def summed_measure(problem: Any) -> str:
-    """Return the first objective's measure, which local search and thinning lower: "error" or "rms_error".
-
-    Raises
-    ------
-    ValueError
-        If it is the maximum, which is no sum over the vertices.
-    """
-    measure = str(problem.objectives[0])
-    if measure == "max_error":
-        raise ValueError(
-            "thinning and relocation lower a sum over the vertices, and the first objective is the maximum, "
-            "'max_error'; use objectives=('error', ...) or ('rms_error', ...), or operators that only evaluate, "
-            "as in nsga2_v1() and nsga2_v2()"
-        )
-    return measure
+        raise TypeError(_not_a_mesh_problem(problem, operator, "surface")) from None
+    return surface
 
 
 def require_bool(X: NDArray[Any], operator: object) -> None:

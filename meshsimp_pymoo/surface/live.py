@@ -20,20 +20,23 @@ References
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.plane.emission import is_sliver, sum_of_three
 from meshsimp_pymoo.plane.footprint import inside
 from meshsimp_pymoo.plane.predicates import circle_sign, orient_sign
 from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
-from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE, checked_rules, is_sliver, require_measure, sum_of_three
-
-if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface import moves
+from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
+from meshsimp_pymoo.surface.ground import Ground
+from meshsimp_pymoo.surface.moves import answers
 
 NONE = 0xFFFFFFFF
 
@@ -62,26 +65,6 @@ MOST = 48
 ) = range(13)
 # Entries of ``amount``.
 COVERED_ERROR, BARE_ERROR = range(2)
-
-
-class Ground(NamedTuple):
-    """What does not change: the model's arrays and the rules, as the compiled functions want them."""
-
-    xy: np.ndarray
-    z: np.ndarray
-    unit: float
-    min_height: float
-    exact_area: float
-    exact_lift: float
-    side: int
-    state: np.ndarray
-    start: np.ndarray
-    items: np.ndarray
-    faces: np.ndarray
-    nearest: bool
-    weighed: bool  # whether the cost of a vertex is not d_p itself, but what weighed_cost makes of it
-    weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
-    squared: bool  # whether the cost is the square of d_p
 
 
 class Live(NamedTuple):
@@ -322,13 +305,6 @@ def deviation_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) 
     wb = dx * vy - dy * vx
     wc = dy * ux - dx * uy
     return abs(((area - wb - wc) * z[a] + wb * z[b] + wc * z[c]) / area - z[i])
-
-
-@njit(cache=True, nogil=True, forceinline=True)
-def _side_area(xy: np.ndarray, a: int, b: int, i: int) -> float:
-    x = xy[2 * i]
-    y = xy[2 * i + 1]
-    return (xy[2 * a] - x) * (xy[2 * b + 1] - y) - (xy[2 * a + 1] - y) * (xy[2 * b] - x)
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -844,25 +820,13 @@ def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
 
 
 @njit(cache=True, nogil=True, forceinline=True)
-def total_cost(live: Live) -> float:
-    """Sum of the costs; inf where there is no mesh."""
+def _total(live: Live) -> float:
     if live.tally[N_EMITTED] == 0:
         return np.inf
     return live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
 
 
-@njit(cache=True, nogil=True, forceinline=True)
-def insert(g: Ground, live: Live, p: int) -> None:
-    """Insert vertex p, which is no site; its position must be free."""
-    _insert(g, live, p, False)
-
-
-@njit(cache=True, nogil=True, forceinline=True)
-def remove(g: Ground, live: Live, p: int) -> bool:
-    """Remove site p; return False, with nothing changed, if the others would span no triangle."""
-    return _remove(g, live, p, False)
-
-
+@answers(moves.exchange, Ground)
 @njit(cache=True, nogil=True, forceinline=True)
 def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
     """Remove site v and insert vertex w, either of them -1 for none; return False if v cannot go, with nothing changed.
@@ -878,19 +842,20 @@ def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
-    before = total_cost(live)
+    before = _total(live)
     n = live.tally[N_EMITTED]
     if not exchange(g, live, v, w):
         return np.inf, 0
-    change = total_cost(live) - before
+    change = _total(live) - before
     n = live.tally[N_EMITTED] - n
     exchange(g, live, w, v)
     return change, n
 
 
+@answers(moves.try_exchange, Ground)
 @njit(cache=True, nogil=True, forceinline=True)
 def try_exchange(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, int]:
-    """Return the change of error and of the number of triangles if site v went and vertex w came; -1 means none.
+    """Return the change of cost and of the number of triangles if site v went and vertex w came; -1 means none.
 
     Infinite where v cannot go, and where the change is found to exceed ``limit`` before it is known.
     """
@@ -898,18 +863,6 @@ def try_exchange(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[f
     if np.isnan(change):
         return _done_and_undone(g, live, v, w)
     return change, triangles
-
-
-@njit(cache=True, nogil=True, forceinline=True)
-def try_insert(g: Ground, live: Live, p: int) -> tuple[float, int]:
-    """Return the change of error and of the number of triangles if vertex p, no site, were inserted."""
-    return try_exchange(g, live, -1, p, np.inf)
-
-
-@njit(cache=True, nogil=True, forceinline=True)
-def try_remove(g: Ground, live: Live, p: int) -> tuple[float, int]:
-    """Return the change of error and of the number of triangles if site p were removed; inf where it cannot be."""
-    return try_exchange(g, live, p, -1, np.inf)
 
 
 @njit(cache=True, nogil=True)
@@ -1171,233 +1124,125 @@ def _build(
     return True
 
 
-class LiveTriangulation:
-    """The triangulation of a subset that can be changed vertex by vertex, with its error always at hand.
-
-    Parameters
-    ----------
-    model : OpenModel
-        The original mesh of N vertices.
-    kept : (N,) bool array
-        The subset to begin with; it must span a triangle.
-    footprint, outside : str
-        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
-    measure : {"error", "rms_error"}
-        What ``error`` and all changes of it are: the sum of w_p d_p or the root mean square of d_p.
-
-    Raises
-    ------
-    ValueError
-        If ``kept`` has the wrong shape or spans no triangle, or the measure is no sum.
-
-    Examples
-    --------
-    >>> from meshsimp_pymoo.datasets import load
-    >>> from meshsimp_pymoo.surface.model import build_model
-    >>> roof = build_model(load("roof:3"))
-    >>> live = LiveTriangulation(roof, np.isin(np.arange(9), roof.corners))
-    >>> live.error, live.triangles
-    (3.0, 2)
-    >>> ridge = np.flatnonzero(roof.points[:, 2] == 1.0)
-    >>> live.try_insert(ridge[1])          # one end of the ridge, and half of its middle, and one triangle more
-    (-1.5, 1)
-    """
-
-    def __init__(
-        self,
-        model: OpenModel,
-        kept: np.ndarray,
-        *,
-        footprint: str = "model",
-        outside: str = "nearest",
-        measure: str = "error",
-    ) -> None:
-        kept = np.asarray(kept)
-        if kept.shape != (model.n_vertices,) or kept.dtype != np.bool_:
-            raise ValueError(
-                f"a subset of {model.name} is a bool array of shape ({model.n_vertices},), "
-                f"not {kept.dtype} of shape {kept.shape}"
-            )
-        self.model = model
-        self.ground = make_ground(model, footprint=footprint, outside=outside, measure=measure)
-        self.live = make_live(model.n_vertices)
-        self._kept = kept.copy()
-        # Of several vertices at one position the first kept one is the site; `_group` numbers the positions.
-        self._has_twins = bool(model.kernel_arguments[3])
-        xy = model.xy
-        self._group = np.cumsum(np.r_[True, (xy[1:] != xy[:-1]).any(axis=1)]) - 1 if self._has_twins else None
-        build(self.ground, self.live, model, self._sites())
-
-    def _sites(self) -> np.ndarray:
-        rows = np.flatnonzero(self._kept)
-        if self._group is not None:
-            _, first = np.unique(self._group[rows], return_index=True)
-            rows = rows[first]
-        return rows
-
-    @property
-    def kept(self) -> np.ndarray:
-        """The subset, as a new bool array (N,)."""
-        return self._kept.copy()
-
-    @property
-    def error(self) -> float:
-        """The error in the chosen measure [model units]."""
-        return float(summed_error(total_cost(self.live), self.ground, self.model))
-
-    @property
-    def triangles(self) -> int:
-        """The number of emitted triangles."""
-        return int(self.live.tally[N_EMITTED])
-
-    @property
-    def faces(self) -> np.ndarray:
-        """The emitted triangles (M, 3) as rows of ``model.points``, the least row first, sorted."""
-        end = int(self.live.tally[END])
-        records = self.live.mesh[:end].reshape(-1, RECORD)[:, :3].astype(np.int64)
-        records = records[(self.live.kind[: end // RECORD] & EMITTED) != 0]
-        turn = records.argmin(axis=1)
-        faces = np.stack([records[np.arange(len(records)), (turn + k) % 3] for k in range(3)], axis=1)
-        return faces[np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))]
-
-    def insert(self, vertex: int) -> float:
-        """Keep a vertex that is not kept; return the change of the error."""
-        v = self._index(vertex, kept=False)
-        before = self.error
-        held = self._site_at(v)
-        self._kept[v] = True
-        if held is None:
-            insert(self.ground, self.live, v)
-        elif v < held:
-            self._replace(held, v)
-        return self.error - before
-
-    def remove(self, vertex: int) -> float:
-        """Drop a kept vertex; return the change of the error."""
-        v = self._index(vertex, kept=True)
-        before = self.error
-        if self.live.site[v]:
-            self._kept[v] = False
-            heir = self._site_at(v, kept=True)
-            if heir is not None:
-                self._replace(v, heir)
-            elif not remove(self.ground, self.live, v):
-                self._kept[v] = True
-                raise ValueError(f"without vertex {v} the kept vertices of {self.model.name} span no triangle")
-        self._kept[v] = False
-        return self.error - before
-
-    def move(self, vertex: int, to: int) -> float:
-        """Drop one vertex and keep another instead; return the change of the error."""
-        self._index(to, kept=False)
-        change = self.remove(vertex)
-        return change + self.insert(to)
-
-    def try_insert(self, vertex: int) -> tuple[float, int]:
-        """Return the change of the error and of the number of triangles if the vertex were kept."""
-        v = self._index(vertex, kept=False)
-        if self._site_at(v) is not None:
-            return self._tried(lambda: self.insert(v), lambda: self.remove(v))
-        return self._measured(*try_insert(self.ground, self.live, v))
-
-    def try_remove(self, vertex: int) -> tuple[float, int]:
-        """Return the change of the error and of the number of triangles if the vertex were dropped (inf: it cannot)."""
-        v = self._index(vertex, kept=True)
-        if self._has_twins:
-            return self._tried(lambda: self.remove(v), lambda: self.insert(v))
-        return self._measured(*try_remove(self.ground, self.live, v))
-
-    def try_move(self, vertex: int, to: int) -> tuple[float, int]:
-        """Return the change of the error and of the number of triangles if one vertex were dropped for another."""
-        if self._has_twins:
-            return self._tried(lambda: self.move(vertex, to), lambda: self.move(to, vertex))
-        v, w = self._index(vertex, kept=True), self._index(to, kept=False)
-        return self._measured(*try_exchange(self.ground, self.live, v, w, np.inf))
-
-    def _measured(self, change: float, triangles: int) -> tuple[float, int]:
-        """Turn a change of the sum of costs into one of the error."""
-        if self.ground.squared:
-            change = summed_error(total_cost(self.live) + change, self.ground, self.model) - self.error
-        return float(change), int(triangles)
-
-    def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
-        before, triangles = self.error, self.triangles
-        do()
-        result = self.error - before, self.triangles - triangles
-        undo()
-        return result
-
-    def _replace(self, old: int, new: int) -> None:
-        if not remove(self.ground, self.live, old):
-            # With three sites left the triangulation is built anew.
-            build(self.ground, self.live, self.model, self._sites())
-            return
-        insert(self.ground, self.live, new)
-
-    def _site_at(self, v: int, *, kept: bool = False) -> int | None:
-        """Return the site (or with ``kept`` the first kept vertex) at the position of v, if there is one."""
-        if self._group is None:
-            return None
-        low, high = np.searchsorted(self._group, [self._group[v], self._group[v] + 1])
-        rows = np.arange(low, high)
-        rows = rows[self._kept[rows] if kept else self.live.site[rows] == 1]
-        return int(rows[0]) if len(rows) else None
-
-    def _index(self, vertex: int, *, kept: bool) -> int:
-        v = int(vertex)
-        if not 0 <= v < self.model.n_vertices:
-            raise ValueError(f"vertex {v} is none of the {self.model.n_vertices} of {self.model.name}")
-        if self._kept[v] != kept:
-            raise ValueError(f"vertex {v} of {self.model.name} is {'not kept' if kept else 'kept already'}")
-        return v
+# ------------------------------------------------------------------------------ answers to the questions of the search
 
 
-def make_ground(
-    model: OpenModel, *, footprint: str = "model", outside: str = "nearest", measure: str = "error"
-) -> Ground:
-    """Return the arrays and rules of a model for the compiled functions of this module.
-
-    The live triangulation adds costs up: w_p d_p for ``measure="error"``, and for ``"rms_error"`` w_p times the square
-    of d_p, which has the same order; a maximum is no sum.
-
-    Raises
-    ------
-    ValueError
-        If the measure is unknown or the maximum.
-    """
-    use_footprint, nearest = checked_rules(footprint, outside)
-    require_measure(measure)
-    if measure == "max_error":
-        raise ValueError(
-            "measure='max_error' is no sum over the vertices, which thinning, insertion and relocation need; "
-            "use 'error' or 'rms_error' for them"
-        )
-    xy, z, _, _, unit, min_height, exact_area, exact_lift, side, state, start, items, faces, weight = (
-        model.kernel_arguments
-    )
-    return Ground(
-        xy,
-        z,
-        unit,
-        min_height,
-        exact_area,
-        exact_lift,
-        side if use_footprint else 0,
-        state,
-        start,
-        items,
-        faces,
-        nearest,
-        measure == "rms_error" or len(weight) > 0,
-        weight,
-        measure == "rms_error",
-    )
+@answers(moves.total_cost, Ground)
+@njit(cache=True, nogil=True, forceinline=True)
+def total_cost(g: Ground, live: Live) -> float:
+    """Sum of the costs; inf where there is no mesh."""
+    return _total(live)
 
 
-def summed_error(cost: Any, ground: Ground, model: OpenModel) -> Any:
-    """Return the error for sums of costs: the sum itself, or the root of their weighted mean where they are squares."""
-    # Sums that live can end a little below 0, where nothing deviates.
-    return np.sqrt(np.maximum(cost, 0.0) / model.total_weight) if ground.squared else cost
+@answers(moves.n_triangles, Ground)
+@njit(cache=True, nogil=True, forceinline=True)
+def _n_triangles(g: Ground, live: Live) -> int:
+    return live.tally[N_EMITTED]
+
+
+@answers(moves.n_sites, Ground)
+@njit(cache=True, nogil=True, forceinline=True)
+def _n_sites(g: Ground, live: Live) -> int:
+    return live.tally[N_SITES]
+
+
+@answers(moves.is_site, Ground)
+@njit(cache=True, nogil=True, forceinline=True)
+def _is_site(g: Ground, live: Live, v: int) -> bool:
+    return live.site[v] != 0
+
+
+@answers(moves.is_taken, Ground)
+@njit(cache=True, nogil=True)
+def _is_taken(g: Ground, live: Live, w: int) -> bool:
+    """Whether some site has the position of vertex w; those at one position follow each other."""
+    xy = g.xy
+    site = live.site
+    if site[w]:
+        return True
+    for step in (-1, 1):
+        i = w + step
+        while 0 <= i < len(g.z) and xy[2 * i] == xy[2 * w] and xy[2 * i + 1] == xy[2 * w + 1]:
+            if site[i]:
+                return True
+            i += step
+    return False
+
+
+@answers(moves.urgency, Ground)
+@njit(cache=True, nogil=True, forceinline=True)
+def _urgency(g: Ground, live: Live, v: int) -> float:
+    return live.subtotal[live.place[v] >> 3] if live.bare_at[v] < 0 else live.cost[v]
+
+
+@answers(moves.sites_around, Ground)
+@njit(cache=True, nogil=True)
+def _sites_around(g: Ground, live: Live, v: int, found: np.ndarray) -> int:
+    m = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
+    n = 0
+    for k in range(m):
+        if live.ring[k] <= LAST_INDEX:
+            found[n] = np.int64(live.ring[k])
+            n += 1
+    return n
+
+
+@answers(moves.n_cells, Ground)
+@njit(cache=True, nogil=True, forceinline=True)
+def _n_cells(g: Ground, live: Live) -> int:
+    return live.tally[END] // RECORD
+
+
+@answers(moves.cells_around, Ground)
+@njit(cache=True, nogil=True)
+def _cells_around(g: Ground, live: Live, v: int, found: np.ndarray) -> int:
+    m = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
+    for k in range(m):
+        found[k] = np.int64(live.cavity[k]) // RECORD
+    return m
+
+
+@njit(cache=True, nogil=True)
+def _at_a_corner(xy: np.ndarray, mesh: np.ndarray, t: int, i: int) -> bool:
+    """Whether vertex i has the position of a corner of triangle t, where there is no room for it."""
+    for k in range(3):
+        v = mesh[t + k]
+        if v <= LAST_INDEX and xy[2 * v] == xy[2 * i] and xy[2 * v + 1] == xy[2 * i + 1]:
+            return True
+    return False
+
+
+@answers(moves.worst_in, Ground)
+@njit(cache=True, nogil=True)
+def _worst_in(g: Ground, live: Live, cell: int) -> tuple[int, float, float]:
+    mesh = live.mesh
+    t = cell * RECORD
+    worst = -1
+    most = 0.0
+    emitted = (live.kind[cell] & EMITTED) != 0
+    whole = live.subtotal[cell] if emitted else 0.0
+    i = live.head[cell]
+    while i >= 0:
+        if not emitted:
+            whole += live.cost[i] if live.bare_segment[i] >= 0 else 1.0
+        if _at_a_corner(g.xy, mesh, t, i):
+            i = live.following[i]
+            continue
+        d = live.cost[i]
+        if emitted:
+            d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            if g.weighed:
+                d = weighed_cost(g, d, i)
+        elif live.bare_segment[i] < 0:
+            d = 1.0  # there is no mesh yet; any vertex will do
+        if d > most or (d == most and worst >= 0 and i < worst):
+            most = d
+            worst = i
+        i = live.following[i]
+    return worst, most, whole
+
+
+# ------------------------------------------------------------------------------------------------------------ the books
 
 
 def make_live(n_vertices: int) -> Live:
@@ -1446,20 +1291,33 @@ def make_live(n_vertices: int) -> Live:
 _local = threading.local()
 
 
-def lent_live(n_vertices: int) -> Live:
-    """Return this thread's books for a model of that size, with anything in them; to be used until the next call."""
+@contextmanager
+def lent_live(n_vertices: int) -> Iterator[Live]:
+    """Lend books for a model of that size, with anything in them, to this thread until the context ends.
+
+    Each thread keeps the books that it had last; whoever asks while they are lent gets others.
+    """
     held = getattr(_local, "live", None)
+    _local.live = None
     if held is None or held[0] != n_vertices:
         held = (n_vertices, make_live(n_vertices))
+    try:
+        yield held[1]
+    finally:
         _local.live = held
-    return held[1]
 
 
-def build(ground: Ground, live: Live, model: OpenModel, sites: np.ndarray) -> None:
-    """Fill the books with the triangulation of the sites (rows, ascending, at different positions)."""
+def build(ground: Ground, live: Live, sites: IntArray, name: str) -> None:
+    """Fill the books with the triangulation of the sites (rows, ascending, at different positions).
+
+    Raises
+    ------
+    ValueError
+        If they span no triangle; ``name`` is what the message calls the model.
+    """
     sites = np.ascontiguousarray(sites, np.int64)
-    first = np.searchsorted(sites, model.corners)
-    first = np.where((first < len(sites)) & np.isin(model.corners, sites), first, -1).astype(np.int64)
-    site_xy = np.ascontiguousarray(model.xy[sites]).ravel()
+    first = np.searchsorted(sites, ground.corners)
+    first = np.where((first < len(sites)) & np.isin(ground.corners, sites), first, -1).astype(np.int64)
+    site_xy = np.ascontiguousarray(ground.xy.reshape(-1, 2)[sites]).ravel()
     if len(sites) < 3 or not _build(ground, live, sites, site_xy, first, np.empty(len(sites), np.uint8)):
-        raise ValueError(f"{len(sites)} kept vertices of {model.name} span no triangle; keep more, the corners first")
+        raise ValueError(f"{len(sites)} kept vertices of {name} span no triangle; keep more, the corners first")

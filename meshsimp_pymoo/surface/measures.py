@@ -10,7 +10,7 @@ Nothing heavy is imported here: the shell command's ``--help`` is made of the ta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -139,10 +139,15 @@ OBJECTIVES: dict[str, Measure] = {name: measure for name, measure in MEASURES.it
 COUNTED = tuple(item.name for item in fields(Quality) if item.type == "int")
 
 
+def quality_of(values: Iterable[tuple[str, Any]]) -> Quality:
+    """Return the quality with these (name, value) pairs, whole numbers as such."""
+    numbers: dict[str, Any] = {name: int(value) if name in COUNTED else float(value) for name, value in values}
+    return Quality(**numbers)
+
+
 def as_quality(row: Any, total_weight: float) -> Quality:
     """Name the columns of one row (6,) that evaluation filled; ``total_weight`` is that of the model, N without any."""
-    values = {name: measure.of(row, total_weight) for name, measure in MEASURES.items()}
-    return Quality(**{name: int(value) if name in COUNTED else float(value) for name, value in values.items()})
+    return quality_of((name, measure.of(row, total_weight)) for name, measure in MEASURES.items())
 
 
 def measured(table: Any, measure: str, total_weight: float) -> Any:

@@ -12,19 +12,18 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
-from scipy.spatial import ConvexHull, QhullError
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import Csr, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
-from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.plane.square import SLIVER_HEIGHT, find_corners, unit_square, vector_order
+from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
+from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
 from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
 
 # Lazy attributes of a model that do not depend on its weights.
-GEOMETRY_ONLY = ("neighbours", "footprint", "hull")
+GEOMETRY_ONLY = ("neighbours", "border", "footprint", "hull")
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,51 +120,25 @@ class OpenModel:
         return digest.hexdigest()
 
     @cached_property
-    def neighbours(self) -> tuple[IntArray, npt.NDArray[np.int32]]:
+    def neighbours(self) -> Csr:
         """Mesh one-rings in CSR form: those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``, ascending."""
-        return _one_rings(self.faces, self.n_vertices)
+        return one_rings(self.faces, self.n_vertices)
 
     @cached_property
     def hull(self) -> IntArray:
         """Vertices on the convex hull in the plane, those inside its edges included, ascending."""
-        return _on_hull(self.xy)
+        return on_hull(self.xy)
 
     @cached_property
     def border(self) -> IntArray:
         """Vertices at edges of one face only, ascending."""
-        faces = self.faces.astype(np.int64)
-        edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-        edges.sort(axis=1)
-        key, count = np.unique(edges[:, 0] * self.n_vertices + edges[:, 1], return_counts=True)
-        return np.unique(np.stack(np.divmod(key[count == 1], self.n_vertices)))
+        return border_vertices(self.faces)
 
     @cached_property
     def footprint(self) -> Footprint:
         """The projection of the original faces, for ``footprint="model"``."""
-        outline = _outline_edges(self.xy, self.faces)
-        return make_footprint(self.xy, self.faces, outline, convex=_all_on_hull(self.xy, outline))
-
-    @cached_property
-    def kernel_arguments(self) -> tuple[Any, ...]:
-        """What the compiled evaluation needs of a model, in its order."""
-        xy = np.ascontiguousarray(self.xy)
-        extent = np.ptp(xy, axis=0)
-        area, lift = exact_ranges(xy)
-        has_twins = bool((xy[1:] == xy[:-1]).all(axis=1).any())
-        height = np.ascontiguousarray(self.points[:, 2])
-        diagonal = float(np.hypot(extent[0], extent[1]))
-        return (
-            xy.ravel(),
-            height,
-            np.ascontiguousarray(self.corners, np.int64),
-            has_twins,
-            float(self.unit),
-            SLIVER_HEIGHT * diagonal,
-            area,
-            lift,
-            *self.footprint,
-            np.empty(0) if self.weights is None else self.weights,
-        )
+        outline = outline_edges(self.xy, self.faces)
+        return make_footprint(self.xy, self.faces, outline, convex=is_convex(self.xy, outline))
 
     def with_weights(self, weights: str | npt.ArrayLike) -> OpenModel:
         """Return the same model with another weight for each vertex: its share in the error.
@@ -234,7 +207,7 @@ class OpenModel:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        lazy = (*GEOMETRY_ONLY, "kernel_arguments", "hash")
+        lazy = (*GEOMETRY_ONLY, "hash")
         return {name: value for name, value in self.__dict__.items() if name not in lazy}
 
 
@@ -285,88 +258,3 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
 
 def _take(attributes: Mapping[str, npt.NDArray[Any]], rows: IntArray) -> dict[str, npt.NDArray[Any]]:
     return {name: values[rows] for name, values in attributes.items()}
-
-
-def _on_hull(xy: FloatArray) -> IntArray:
-    """Vertices within the sliver height of the convex hull's edges."""
-    try:
-        hull = ConvexHull(xy)
-    except QhullError as error:  # build_model has refused models without area
-        raise ModelError(f"the convex hull of {len(xy)} vertices has no area") from error
-    tolerance = SLIVER_HEIGHT * float(np.hypot(*np.ptp(xy, axis=0)))
-    on = np.zeros(len(xy), bool)
-    on[hull.vertices] = True
-    normals = np.unique(hull.equations, axis=0)
-    candidates = np.flatnonzero(~on)
-    for normal in normals:
-        distance = xy[candidates] @ normal[:2] + normal[2]
-        on[candidates[np.abs(distance) <= tolerance]] = True
-    return np.flatnonzero(on)
-
-
-def _outline_edges(xy: FloatArray, faces: npt.NDArray[np.int32]) -> IntArray:
-    """Edges that may bound the projection: borders and folds."""
-    a, b, c = (xy[faces[:, k]] for k in range(3))
-    double = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    up = double > 0
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    edges.sort(axis=1)
-    side = np.tile(up, 3)
-    key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
-    order = np.argsort(key, kind="stable")
-    key, side, edges = key[order], side[order], edges[order]
-    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]])
-    count = np.diff(np.r_[first, len(key)])
-    facing = np.add.reduceat(side.astype(np.int64), first)
-    bounding = (count == 1) | ((facing > 0) & (facing < count)) | (facing == 0)
-    return edges[first[bounding]]
-
-
-def _all_on_hull(xy: FloatArray, outline: IntArray) -> bool:
-    """Whether the outline is the convex hull and nothing else: then the footprint is all of it."""
-    ends = xy[outline]
-    points = np.concatenate([ends[:, 0], ends[:, 1], ends.mean(axis=1)])
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        return False
-    tolerance = SLIVER_HEIGHT * float(np.hypot(*np.ptp(xy, axis=0)))
-    away = np.full(len(points), np.inf)
-    for a, b, c in np.unique(hull.equations, axis=0):
-        np.minimum(away, np.abs(points[:, 0] * a + points[:, 1] * b + c), out=away)
-        if len(hull.equations) > 5000:  # an oval of so many sides: not worth the time, and never a mistake
-            return False
-    return bool((away <= tolerance).all())
-
-
-@njit(cache=True)
-def _ring_lists(faces: np.ndarray, indptr: np.ndarray, raw: np.ndarray) -> None:
-    for f in range(len(faces)):
-        for k in range(3):
-            a = faces[f, k]
-            raw[indptr[a]] = faces[f, (k + 1) % 3]
-            raw[indptr[a] + 1] = faces[f, (k + 2) % 3]
-            indptr[a] += 2
-
-
-@njit(cache=True)
-def _unique_rings(start: np.ndarray, raw: np.ndarray, indptr: np.ndarray, indices: np.ndarray) -> None:
-    m = 0
-    for i in range(len(start) - 1):
-        ring = np.sort(raw[start[i] : start[i + 1]])
-        for k in range(len(ring)):
-            if k == 0 or ring[k] != ring[k - 1]:
-                indices[m] = ring[k]
-                m += 1
-        indptr[i + 1] = m
-
-
-def _one_rings(faces: npt.NDArray[np.int32], n: int) -> tuple[IntArray, npt.NDArray[np.int32]]:
-    start = np.zeros(n + 1, np.int64)
-    np.cumsum(2 * np.bincount(faces.ravel(), minlength=n), out=start[1:])
-    raw = np.empty(start[-1], np.int32)
-    _ring_lists(faces, start.copy(), raw)
-    indptr = np.zeros(n + 1, np.int64)
-    indices = np.empty(len(raw), np.int32)
-    _unique_rings(start, raw, indptr, indices)
-    return indptr, indices[: indptr[-1]].copy()

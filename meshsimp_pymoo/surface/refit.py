@@ -25,17 +25,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
-
-from meshsimp_pymoo.surface.evaluate import mesh_quality, mesh_samples, simplify
-
-if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.model import OpenModel
 
 # The search ends where the error is proved to be within this share of the least possible; the true excess, measured
 # against linear programming, is then below 1e-4 (see tests/benchmarks/refit.py).
@@ -46,115 +38,6 @@ MAX_STEPS = 60
 TO_THE_BOUND = 0.99
 # Epsilon in relation to the gap that is left, both per vertex.
 SMOOTHING = 0.1
-# A kept vertex of weight 0 counts this share of the mean all the same, so that its height has a value.
-LEAST_WEIGHT = 1e-9
-
-
-@dataclass(frozen=True)
-class Refitted:
-    """A simplified mesh whose vertices have moved up or down.
-
-    Attributes
-    ----------
-    faces : (M, 3) int32 array
-        Triangles as rows of ``model.points``; those of :func:`~meshsimp_pymoo.surface.evaluate.simplify`.
-    rows : (V,) int array
-        The rows that the triangles use, ascending.
-    heights : (V,) float array
-        Their new heights, in the frame of ``model.points`` [model units].
-    error : float
-        Error of the mesh with the new heights; never above ``before`` [model units].
-    before : float
-        Error with the original heights [model units].
-    bound : float
-        No heights have an error below this, up to rounding [model units].
-    """
-
-    faces: np.ndarray
-    rows: np.ndarray
-    heights: np.ndarray
-    error: float
-    before: float
-    bound: float
-
-    def vertices(self, model: OpenModel) -> np.ndarray:
-        """Return the vertices (V, 3) in the frame of the model's file; those that did not move are exactly its own."""
-        return _raised(model, self.rows, self.heights)
-
-
-def refit_heights(
-    model: OpenModel,
-    kept: np.ndarray,
-    *,
-    footprint: str = "model",
-    outside: str = "nearest",
-    tolerance: float = TOLERANCE,
-) -> Refitted:
-    """Move the kept vertices up or down so that the error of their mesh is least; (x, y) and triangles stay.
-
-    What is minimised is the package's error itself: the sum of w_p d_p over all original vertices, the uncovered ones
-    included (their distance in space to the nearest point of the outline depends on its height too), whatever other
-    measure a search minimised. Pinned vertices stay in place but may change their height, too. The result is no subset
-    of the original vertices any more.
-
-    Parameters
-    ----------
-    model : OpenModel
-        The original mesh of N vertices.
-    kept : (N,) bool array
-        The vertices that stay, in vector order.
-    footprint, outside : str
-        As in :func:`~meshsimp_pymoo.surface.evaluate.evaluate_subsets`.
-    tolerance : float
-        The search ends where the error is at most this share above the proved bound.
-
-    Returns
-    -------
-    Refitted
-
-    Raises
-    ------
-    ValueError
-        If the subset spans no triangle, or the tolerance is not positive.
-
-    Examples
-    --------
-    Two triangles over a roof cannot have a ridge, but they can lie higher; three vertices on the ridge and six at the
-    eaves, at a height of 1 and 0, are then all the same as before:
-
-    >>> from meshsimp_pymoo.datasets import load
-    >>> from meshsimp_pymoo.surface.model import build_model
-    >>> roof = build_model(load("roof:3"))
-    >>> refit_heights(roof, np.isin(np.arange(9), roof.corners)).error
-    3.0
-    """
-    if not tolerance > 0:
-        raise ValueError(f"tolerance={tolerance} is not positive; give a small share of the error such as {TOLERANCE}")
-    mesh = simplify(model, kept, footprint=footprint, outside=outside)
-    rows, compact = np.unique(mesh.faces, return_inverse=True)
-    compact = compact.reshape(-1, 3)
-    before = mesh.quality.error
-    original = model.points[rows, 2]
-    if before == 0.0:
-        return Refitted(mesh.faces, rows, original, before, before, before)
-    samples = mesh_samples(model, model.points[rows], compact, outside=outside, frame="local")
-    weights = np.ones(model.n_vertices) if model.weights is None else model.weights.copy()
-    if not weights.all():
-        weights[rows] = np.maximum(weights[rows], LEAST_WEIGHT * weights.mean())
-    counts = np.flatnonzero((weights > 0) & samples.shares.any(axis=1))
-    n = len(counts)
-    A = sparse.csr_matrix(
-        (samples.shares[counts].ravel(), samples.sites[counts].ravel(), np.arange(0, 3 * n + 1, 3)),
-        shape=(n, len(rows)),
-    )
-    A.sum_duplicates()
-    heights, bound = least_error(
-        A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance
-    )
-    error = mesh_quality(model, _raised(model, rows, heights), compact, outside=outside).error
-    if error >= before:
-        heights, error = original, before
-    return Refitted(mesh.faces, rows, heights, error, before, min(bound, error))
 
 
 def least_error(
@@ -177,7 +60,7 @@ def least_error(
     start : (V,) float array
         Where to begin.
     tolerance : float
-        As in :func:`refit_heights`.
+        The search ends where the sum is at most this share above the proved bound.
 
     Returns
     -------
@@ -240,10 +123,3 @@ def least_error(
 def smoothed(r: np.ndarray, g: np.ndarray, w: np.ndarray, epsilon: float) -> float:
     """Return the sum of w sqrt(r^2 + g^2 + epsilon^2)."""
     return float((w * np.sqrt(r * r + g * g + epsilon * epsilon)).sum())
-
-
-def _raised(model: OpenModel, rows: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Move vertices along the model's upward direction, in the frame of its file."""
-    rise = heights - model.points[rows, 2]
-    vertices: np.ndarray = model.file_points[rows] + rise[:, None] * model.rotation[2]
-    return vertices

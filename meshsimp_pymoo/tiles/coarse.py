@@ -14,7 +14,10 @@ import numpy as np
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.search.local_search import relocate
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.tiles.grid import HeightGrid
 
 #: The most triangles of a mesh whose vertices are moved.
@@ -83,23 +86,15 @@ class CoarseGrid:
 
 def move(task: Coarse) -> IntArray:
     """Move the vertices of a mesh while that lowers its error; return its rows of ``task.points``, ascending."""
-    from meshsimp_pymoo.search.local_search import relocate
-
     faces = grid_source(task.points[:, 2].reshape(task.shape)).faces
     model = build_model(SourceMesh(task.points, faces, {}, "coarse grid", up="z"))
-    kept = np.isin(model.source_index, task.kept)
-    pinned = np.zeros(model.n_vertices, bool)
-    pinned[model.corners] = True
     moved = relocate(
-        model,
-        kept,
-        pinned,
+        HeightSurface(model, Rules(footprint="hull", outside="ignore")),
+        np.isin(model.source_index, task.kept),
         moves=MOVES * len(task.kept),
         seed=task.triangles,
         triangles=task.triangles,
         temperature=TEMPERATURE,
-        footprint="hull",
-        outside="ignore",
     )
     return np.sort(model.source_index[moved])
 

@@ -26,7 +26,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import new_file
-from meshsimp_pymoo.surface.evaluate import Quality
+from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
 from meshsimp_pymoo.tiles.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
 from meshsimp_pymoo.tiles.grid import HeightGrid
 from meshsimp_pymoo.tiles.thin import Tile, thin_tile
@@ -607,11 +607,9 @@ class _Work:
             stored = self.store.get(name)
             if stored is None:
                 q = measure(self.grid, weld(self.grid, kept), n_threads=threads)
-                numbers = (q.error, q.triangles, q.vertices, q.mean_error, q.rms_error, q.max_error, q.uncovered)
-                self.store.put(name, numbers=np.array(numbers, np.float64))
+                self.store.put(name, numbers=np.array(list(asdict(q).values()), np.float64))
             else:
-                error, triangles, vertices, mean, rms, most, uncovered = stored["numbers"].tolist()
-                q = Quality(error, int(triangles), int(vertices), mean, rms, most, int(uncovered))
+                q = quality_of(zip(MEASURES, stored["numbers"].tolist(), strict=True))
             quality.append(q)
             self.progress(0.8 + 0.2 * (k + 1) / len(solutions), f"solution {k + 1} of {len(solutions)} measured")
         return quality

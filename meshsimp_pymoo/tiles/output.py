@@ -33,8 +33,15 @@ from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
-from meshsimp_pymoo.formats.table import Format, format_of_output, format_to_write, write_mesh
+from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.table import (
+    Format,
+    format_of_output,
+    format_to_write,
+    shared_frame,
+    warn_of_shift,
+    write_mesh,
+)
 from meshsimp_pymoo.storage import (
     FRONT_COLUMNS,
     MESHES_BY_DEFAULT,
@@ -225,7 +232,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     ResultError
         If a file is missing or damaged, or the grid is another one.
     """
-    from meshsimp_pymoo.surface.evaluate import Quality
+    from meshsimp_pymoo.surface.measures import Quality
 
     folder = Path(folder)
     columns = read_front_csv(folder / "front.csv")[0]

@@ -19,17 +19,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.plane.square import vector_order
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
-from meshsimp_pymoo.search.greedy import thin_live
-from meshsimp_pymoo.surface.live import END, build, lent_live, make_ground
+from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.live import END
 from meshsimp_pymoo.surface.model import OpenModel
-
-BoolArray = npt.NDArray[np.bool_]
+from meshsimp_pymoo.surface.rules import Rules
 
 # Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
 FORESIGHT = 3.0
@@ -106,19 +105,17 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     box = np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
     corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
     model = _model(tile, number, xy, z, None if weight is None else weight[order], corners)
-    sites = np.flatnonzero(is_site)
-    ground = make_ground(model, footprint="hull", outside="ignore")
-    live = lent_live(len(z))
-    build(ground, live, model, sites)
+    surface = HeightSurface(model, Rules(footprint="hull", outside="ignore"))
+    ground = surface.ground()
     fixed = np.isin(number, tile.corners) | ~is_ours
     # beyond the whole grid there is nothing that a circle could hold
     open_sides = np.where(box == tile.domain, np.array([-np.inf, np.inf, -np.inf, np.inf]), box)
-    _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
-    n = int((~fixed[sites]).sum())
-    removed = np.empty(n, np.int64)
-    error = np.empty(n + 1)
-    triangles = np.empty(n + 1, np.int64)
-    n_removed = thin_live(ground, live, sites, fixed, 0, FORESIGHT * 2.0 * tile.limit, removed, error, triangles)
+    with surface.books(is_site) as live:
+        _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
+        n = int((is_site & ~fixed).sum())
+        removed, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
+        limit = FORESIGHT * 2.0 * tile.limit
+        n_removed = thin(ground, live, len(z), fixed, 0, limit, removed, error, triangles)
     level = hull_levels(triangles[0] - triangles[: n_removed + 1], error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
     return number[removed[:n_wanted]], level[:n_wanted]
@@ -275,7 +272,10 @@ def _fix_foreign(
             reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
             reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
             known = (
-                sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
+                sx - reach_x >= box[0]
+                and sx + reach_x <= box[1]
+                and sy - reach_y >= box[2]
+                and sy + reach_y <= box[3]
             )
         if not known:
             fixed[a] = True

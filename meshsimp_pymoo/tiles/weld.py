@@ -16,9 +16,20 @@ import numpy.typing as npt
 from numba import njit
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.plane.square import vector_order
+from meshsimp_pymoo.plane.faces import canonical_faces
+from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate
-from meshsimp_pymoo.surface.evaluate import Quality
+from meshsimp_pymoo.surface.measures import (
+    ERROR,
+    MAXIMUM,
+    REGIONS,
+    SQUARES,
+    TRIANGLES,
+    UNCOVERED,
+    VERTICES,
+    Quality,
+    as_quality,
+)
 from meshsimp_pymoo.tiles.grid import HeightGrid
 
 
@@ -46,10 +57,7 @@ class WeldedMesh:
         """The triangles (M, 3) as rows of ``samples``, counter-clockwise from above, the least row first, sorted."""
         corners = self.records.reshape(-1, RECORD)[:, :3]
         faces = corners[corners.max(axis=1) <= LAST_INDEX].astype(np.int64)
-        turn = faces.argmin(axis=1)
-        rows = np.arange(len(faces))
-        faces = np.stack([faces[rows, (turn + k) % 3] for k in range(3)], axis=1)
-        return faces[np.lexsort((faces[:, 2], faces[:, 1], faces[:, 0]))]
+        return canonical_faces(faces)
 
     @property
     def n_triangles(self) -> int:
@@ -111,17 +119,10 @@ def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Qualit
     else:
         with ThreadPoolExecutor(n_threads) as pool:
             list(pool.map(do, range(n_threads)))
-    n = grid.n_samples
-    error, squares, maximum = float(table[:, 0].sum()), float(table[:, 1].sum()), float(table[:, 2].max())
-    return Quality(
-        error=error,
-        triangles=mesh.n_triangles,
-        vertices=len(mesh.samples),
-        mean_error=error / n,
-        rms_error=float(np.sqrt(squares / n)),
-        max_error=maximum,
-        uncovered=0,
-    )
+    row = np.empty(REGIONS)
+    row[ERROR], row[SQUARES], row[MAXIMUM] = table[:, 0].sum(), table[:, 1].sum(), table[:, 2].max()
+    row[TRIANGLES], row[VERTICES], row[UNCOVERED] = mesh.n_triangles, len(mesh.samples), 0
+    return as_quality(row, grid.n_samples)
 
 
 def pieces(grid: HeightGrid, mesh: WeldedMesh, size: int) -> Iterator[tuple[int, int, IntArray, IntArray]]:
@@ -155,38 +156,6 @@ def pieces(grid: HeightGrid, mesh: WeldedMesh, size: int) -> Iterator[tuple[int,
     for group in np.split(order, starts[1:]):
         used, compact = np.unique(faces[group], return_inverse=True)
         yield int(tile_row[group[0]]), int(tile_column[group[0]]), mesh.samples[used], compact.reshape(-1, 3)
-
-
-def find_cracks(vertices: FloatArray, faces: IntArray) -> int:
-    """Count the edges that break a mesh of a rectangle: not in two triangles, or in one and not on a side.
-
-    Parameters
-    ----------
-    vertices : (V, 2) or (V, 3) float array
-        Positions.
-    faces : (M, 3) int array
-        Triangles.
-
-    Returns
-    -------
-    int
-        0 where the mesh covers the rectangle without a crack.
-
-    Examples
-    --------
-    >>> square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
-    >>> find_cracks(square, np.array([[0, 1, 2], [0, 2, 3]]))
-    0
-    >>> find_cracks(square, np.array([[0, 1, 2], [0, 4, 3], [4, 2, 3]]))      # the diagonal has a vertex on one side
-    3
-    """
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
-    edges.sort(axis=1)
-    _, first, count = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_index=True, return_counts=True)
-    ends = vertices[edges[first[count == 1]]][:, :, :2]
-    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
-    on_side = ((ends == low).all(axis=1) | (ends == high).all(axis=1)).any(axis=1)
-    return int((count > 2).sum() + (~on_side).sum())
 
 
 @njit(cache=True, nogil=True)

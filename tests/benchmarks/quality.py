@@ -64,7 +64,8 @@ from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import DownTheLadder, SizeLadder
-from meshsimp_pymoo.surface.evaluate import Quality, mesh_quality
+from meshsimp_pymoo.surface.measures import Quality
+from meshsimp_pymoo.surface.score import mesh_quality
 
 BUILT_IN = ("jacksboro:11", "face:1000", "jacksboro:4", "topobathy", "jacksboro")
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

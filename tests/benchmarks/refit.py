@@ -17,7 +17,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from meshsimp_pymoo import MeshProblem, refit_heights, thinning
-from meshsimp_pymoo.surface.evaluate import mesh_samples
+from meshsimp_pymoo.surface.score import mesh_samples
 
 MODELS = ("jacksboro:11", "face:1000", "jacksboro:4", "face:10000", "jacksboro:1")
 SHARES = (0.02, 0.05, 0.2, 0.5)

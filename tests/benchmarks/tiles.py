@@ -21,6 +21,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from cracks import find_cracks
 from numba import njit
 from rich.console import Console
 from rich.table import Table
@@ -31,7 +32,6 @@ from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED
 from meshsimp_pymoo.tiles.front import tiled_front
 from meshsimp_pymoo.tiles.grid import open_grid
-from meshsimp_pymoo.tiles.weld import find_cracks
 
 CONSOLE = Console(width=110)
 PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -118,7 +118,7 @@ def big(side, tile, jobs, folder):
     if not path.exists():
         np.save(path, fractal(side))
     out = folder / f"front_{side}"
-    command = [sys.executable, "-m", "meshsimp_pymoo.cli", "simplify", str(path), "-o", str(out), "--tile", str(tile)]
+    command = [sys.executable, "-m", "meshsimp_pymoo", "simplify", str(path), "-o", str(out), "--tile", str(tile)]
     command += ["--jobs", str(jobs), "--overwrite", "--meshes", "12", "--json"]
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

@@ -287,7 +287,7 @@ def test_runs_of_several_weights_make_one_front(reference):
     for seed in (1, 2, 3):
         single = [run.arrays["F"] for run in case.sources["G1"][seed]]
         assert [len(F) for F in single] == [1, 1, 1]
-        np.testing.assert_array_equal(case.runs["G1"][seed], analysis.merged_front(dict(enumerate(single))))
+        np.testing.assert_array_equal(case.runs["G1"][seed], non_dominated(np.vstack(single)))
 
 
 def test_ctrl_c_leaves_the_finished_runs(config, tmp_path, reference):
@@ -358,7 +358,7 @@ def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(conf
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a POSIX signal")
 def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(config, tmp_path, reference):
     out = tmp_path / "out"
-    call = [sys.executable, "-m", "meshsimp_pymoo.cli", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
+    call = [sys.executable, "-m", "meshsimp_pymoo", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
     config.write_text(CONFIG.replace("seeds: [1, 2, 3]", f"seeds: {list(range(1, 60))}"), encoding="utf-8")
     parent = subprocess.Popen(call, start_new_session=True)
     deadline = time.monotonic() + 60
@@ -443,7 +443,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     assert run.arrays["paper"].sum() == 10
     model = study.model(problem)
     from meshsimp_pymoo.comparison.store import classic_mesh
-    from meshsimp_pymoo.surface.evaluate import mesh_quality
+    from meshsimp_pymoo.surface.score import mesh_quality
 
     for row in range(len(run.arrays["asked"])):
         vertices, faces = classic_mesh(run, row)

@@ -60,5 +60,5 @@ def test_landxml_is_refused_where_the_height_is_not_z(tmp_path):
     roof = load("roof:5")
     model = build_model(SourceMesh(roof.points[:, [2, 0, 1]], roof.faces, {}, "turned"), up="x")
     kept = np.ones((1, model.n_vertices), dtype=bool)
-    with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .*\[1.0, 0.0, 0.0\]"):
+    with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .* do not look up"):
         write_front(tmp_path / "out", model, [simplify(model, kept[0]).quality], kept, meshes=0, mesh_format="landxml")

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
-from meshsimp_pymoo.plane.square import vector_order
+from meshsimp_pymoo.plane.order import vector_order
 
 SCALE = 2**52
 

@@ -27,7 +27,7 @@ from meshsimp_pymoo.report import page as page_module
 from meshsimp_pymoo.report.document import ASSETS, embedded_array, embedded_faces, html_document
 from meshsimp_pymoo.report.page import FIXED_BYTES, PAGE_BYTES, simplification_page, write_page
 from meshsimp_pymoo.storage import mesh_arrays, read_front
-from meshsimp_pymoo.surface.evaluate import mesh_quality
+from meshsimp_pymoo.surface.score import mesh_quality
 
 SIDE = 24  # samples along a side of the model
 

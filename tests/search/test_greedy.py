@@ -6,8 +6,9 @@ import pytest
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets, mesh_deviation, simplify
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.score import mesh_deviation
 
 METHODS = {
     "thinning": thinning,

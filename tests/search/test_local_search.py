@@ -17,7 +17,7 @@ from meshsimp_pymoo.search.operators import (
     PinnedCorners,
     Relocation,
 )
-from meshsimp_pymoo.search.operators.crossover import half_planes
+from meshsimp_pymoo.search.operators.half_plane_crossover import half_planes
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets
 
 
@@ -74,7 +74,7 @@ def test_the_budget_of_all_rows_is_bounded():
         return X
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("meshsimp_pymoo.search.operators.mutation.relocate_all", spy)
+        patch.setattr("meshsimp_pymoo.search.operators.relocation.relocate_all", spy)
         mutation._do(problem, X, random_state=np.random.default_rng(0))
     assert 40 <= seen[0] <= 50
 

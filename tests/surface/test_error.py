@@ -15,21 +15,12 @@ from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.surface.evaluate import (
-    ERROR,
-    FOOTPRINTS,
-    MEASURES,
-    OUTSIDES,
-    TRIANGLES,
-    UNCOVERED,
-    evaluate_subsets,
-    measured,
-    mesh_deviation,
-    mesh_quality,
-    mesh_samples,
-    simplify,
-)
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
+from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES, UNCOVERED, measured
+from meshsimp_pymoo.surface.measures import OBJECTIVES as MEASURES
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
+from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
 
 RULES = [(f, o) for f in FOOTPRINTS for o in OUTSIDES]
 

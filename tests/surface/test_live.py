@@ -10,9 +10,11 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.surface.evaluate import FOOTPRINTS, OUTSIDES, evaluate_subsets, measured, simplify
-from meshsimp_pymoo.surface.live import LiveTriangulation
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
+from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+from meshsimp_pymoo.surface.measures import measured
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
 
 
 def holey():

@@ -12,7 +12,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
-from meshsimp_pymoo.plane.square import find_corners, vector_order
+from meshsimp_pymoo.plane.order import find_corners, vector_order
 from meshsimp_pymoo.surface.model import build_model
 
 SIDE = 16

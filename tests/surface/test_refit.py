@@ -15,9 +15,12 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.greedy import thinning
-from meshsimp_pymoo.surface.evaluate import FOOTPRINTS, OUTSIDES, mesh_quality, mesh_samples, simplify
+from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import refit_heights
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.surface.refit import TOLERANCE, least_error, refit_heights
+from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
+from meshsimp_pymoo.surface.score import mesh_quality, mesh_samples
 
 MODELS = {
     "terrain": lambda: load("jacksboro:20"),

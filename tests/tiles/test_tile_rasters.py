@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiled as tiled_command
@@ -20,7 +21,6 @@ from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import grid as grid_module
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.output import read_tiled_front
-from meshsimp_pymoo.tiles.weld import find_cracks
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402

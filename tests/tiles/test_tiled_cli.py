@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiled as tiled_command
@@ -20,7 +21,6 @@ from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.grid import open_grid
 from meshsimp_pymoo.tiles.output import read_tiled_front
 from meshsimp_pymoo.tiles.thin import thin_tile
-from meshsimp_pymoo.tiles.weld import find_cracks
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +172,7 @@ def again(path, target):
 
 def test_killed_and_started_again_it_goes_on_and_ends_with_the_same_bytes(out, path, tmp_path, monkeypatch):
     target = tmp_path / "out"
-    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo.cli", *again(path, target)])
+    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo", *again(path, target)])
     deadline = time.monotonic() + 120
     while len(list((target / "tiles").glob("*.npz"))) < 3 and child.poll() is None:
         assert time.monotonic() < deadline

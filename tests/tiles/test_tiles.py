@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from cracks import find_cracks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +21,7 @@ from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_fr
 from meshsimp_pymoo.tiles.front import settings as call_settings
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
-from meshsimp_pymoo.tiles.weld import find_cracks, measure, pieces, weld
+from meshsimp_pymoo.tiles.weld import measure, pieces, weld
 from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))

@@ -15,8 +15,9 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh, build_source, check_points
+from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.plane.square import SLIVER_HEIGHT, find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.triangulation import INFINITE, RECORD, triangulate
 
 

@@ -17,16 +17,13 @@ function describe(row) {
   return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles, mean error ${readable(columns.mean_error[row])}`;
 }
 
-const named = (column) => column.replace("_", " ").replace("rms", "RMS");
+const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
+const named = (column) => measures[column]?.label ?? column.replace("_", " ");
+const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
 const percent = (share) => `${d3.format(share < 0.0995 ? ".2~f" : ".1~f")(100 * share)} %`;
 
 // -------------------------------------------------------------------------------------------------------- picking
 
-const MEASURES = {
-  error: "error: sum over all vertices [model units]",
-  rms_error: "RMS error [model units]",
-  max_error: "max error [model units]",
-};
 const state = { row: null, mesh: null, viewer: null, geometry: null };
 
 const chart = new FrontChart(part("chart"), {
@@ -37,7 +34,7 @@ const chart = new FrontChart(part("chart"), {
     { row: data.knee, mark: "diamond", name: "knee: the best compromise" },
     ...(data.chosen === null ? [] : [{ row: data.chosen, mark: "star", name: "chosen when the front was made" }]),
   ],
-  labels: { x: "triangles", y: MEASURES[data.measure] },
+  labels: { x: "triangles", y: withUnit(data.measure === "error" ? "error: sum over all vertices" : named(data.measure), measures[data.measure].unit) },
   log: { x: part("log-x").checked, y: part("log-y").checked },
   describe,
   onPick: pick,
@@ -97,14 +94,14 @@ function refitted(row) {
 }
 
 function numbers(row) {
+  const notes = {
+    triangles: (value) => `${percent(value / model.triangles)} of ${plainNumber(model.triangles)}`,
+    vertices: (value) => `${percent(value / model.vertices)} of ${plainNumber(model.vertices)} kept`,
+    error: () => withUnit(measures.error.meaning, measures.error.unit),
+    mean_error: (value) => `${percent(value / model.diagonal)} of the model's diagonal`,
+  };
   const rows = [
-    ["triangles", columns.triangles[row], `${percent(columns.triangles[row] / model.triangles)} of ${plainNumber(model.triangles)}`],
-    ["vertices", columns.vertices[row], `${percent(columns.vertices[row] / model.vertices)} of ${plainNumber(model.vertices)} kept`],
-    ["error", columns.error[row], "sum over all original vertices [model units]"],
-    ["mean_error", columns.mean_error[row], `${percent(columns.mean_error[row] / model.diagonal)} of the model's diagonal`],
-    ["rms_error", columns.rms_error[row], "root mean square"],
-    ["max_error", columns.max_error[row], "the largest at any original vertex"],
-    ["uncovered", columns.uncovered[row], "original vertices that no triangle covers"],
+    ...data.measures.map(({ name, meaning }) => [name, columns[name][row], notes[name]?.(columns[name][row]) ?? meaning]),
     ...refitted(row),
     ["solution", columns.solution[row], data.meshes[row] ? `stored as ${data.meshes[row]}` : "not stored as a mesh"],
   ];

@@ -26,11 +26,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from meshsimp_pymoo.search.operators.crossover import OAX, HalfPlaneCrossover, RegionCrossover, SubsetUniformCrossover
-from meshsimp_pymoo.search.operators.duplicates import PackedDuplicates
-from meshsimp_pymoo.search.operators.mutation import NeighbourShift, Relocation, SizeStep
-from meshsimp_pymoo.search.operators.repair import PinnedCorners
-from meshsimp_pymoo.search.operators.sampling import NestedSubsets, RandomSubset
+from meshsimp_pymoo.search.operators.half_plane_crossover import HalfPlaneCrossover
+from meshsimp_pymoo.search.operators.neighbour_shift import NeighbourShift
+from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
+from meshsimp_pymoo.search.operators.oax import OAX
+from meshsimp_pymoo.search.operators.packed_duplicates import PackedDuplicates
+from meshsimp_pymoo.search.operators.pinned_corners import PinnedCorners
+from meshsimp_pymoo.search.operators.random_subset import RandomSubset
+from meshsimp_pymoo.search.operators.region_crossover import RegionCrossover
+from meshsimp_pymoo.search.operators.relocation import Relocation
+from meshsimp_pymoo.search.operators.size_step import SizeStep
+from meshsimp_pymoo.search.operators.subset_uniform_crossover import SubsetUniformCrossover
 
 OPERATORS: dict[str, dict[str, type[Any]]] = {
     "sampling": {"random_subset": RandomSubset, "nested": NestedSubsets},

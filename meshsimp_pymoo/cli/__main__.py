@@ -1,8 +1,0 @@
-"""``python -m meshsimp_pymoo.cli`` is the shell command ``meshsimp``."""
-
-import sys
-
-from meshsimp_pymoo.cli import main
-
-if __name__ == "__main__":
-    sys.exit(main())

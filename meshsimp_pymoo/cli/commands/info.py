@@ -1,0 +1,110 @@
+"""``meshsimp info``: what a model is, and whether it can be simplified."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from meshsimp_pymoo.formats.options import Options
+
+HELP = "say what a model is and whether it can be simplified"
+DESCRIPTION = """\
+Say what MODEL is, whether it is a height field, and what would be refused. Without a
+MODEL: list the built-in models."""
+EXAMPLES = """\
+examples:
+  meshsimp info
+      the built-in models
+  meshsimp info face.ply
+      is it a height field, and seen from where?
+  meshsimp info head.ply --patch front --up y
+      and its front alone?
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_model, add_shown
+    from meshsimp_pymoo.formats.options import Options
+
+    add_model(parser, Options, nargs="?")
+    add_shown(parser, quiet=False)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Describe ``args.model``; without one, list the built-in models."""
+    import json
+
+    from meshsimp_pymoo import datasets
+    from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.terminal import OK
+    from meshsimp_pymoo.formats.options import Options
+
+    if args.model is not None:
+        return _describe(args.model, settings_from(args, Options), as_json=args.json)
+
+    lines = datasets.describe()
+    print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
+    return OK
+
+
+def _describe(model: str, options: Options, *, as_json: bool) -> int:
+    import json
+    from dataclasses import asdict
+
+    import numpy as np
+
+    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
+    from meshsimp_pymoo.errors import ModelError
+    from meshsimp_pymoo.opening import open_source
+    from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
+
+    source = open_source(model, options)
+    used = source.points[np.unique(source.faces)]
+    low, extent = used.min(axis=0), np.ptp(used, axis=0)
+    content: dict[str, Any] = {
+        "name": source.name,
+        "vertices": len(used),
+        "triangles": len(source.faces),
+        "unused_vertices": len(source.points) - len(used),
+        "low": low.tolist(),
+        "extent": extent.tolist(),
+        "attributes": sorted(source.attributes),
+    }
+    rows = {
+        "vertices": f"{len(used):,}",
+        "triangles": f"{len(source.faces):,}",
+        "extent": " x ".join(f"{value:.6g}" for value in extent) + " [file units]",
+        "from": ", ".join(f"{value:.10g}" for value in low),
+        "attributes": ", ".join(sorted(source.attributes)) or "none",
+    }
+    if len(used) < len(source.points):
+        rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
+    try:
+        up = up_direction(source, options.up)
+    except ModelError as problem:
+        refusal: str | None = str(problem)
+    else:
+        facts = surface_facts(source, source.points @ upright_rotation(up).T)
+        refusal = facts.refusal
+        content |= {"up": up.tolist(), "fold_share": facts.fold_share} | asdict(facts)
+        flipped = " (its faces are wound the other way)" if facts.flipped else ""
+        rows |= {
+            "up": ", ".join(f"{value:.6g}" for value in up) + flipped,
+            "seen from there": f"{facts.net_share:.1%} of the area",
+            "parts": f"{facts.components}",
+            "border": f"{facts.border_edges:,} edges, {facts.border_loops} closed loop(s)",
+            "vertical": f"{facts.vertical_faces:,} faces",
+            "folded over": f"{facts.folds + facts.hidden:,} faces ({facts.fold_share:.2%})",
+        }
+    rows["verdict"] = "refused" if refusal else "usable: an open height field"
+    if as_json:
+        print(json.dumps(content | {"refusal": refusal}, indent=2))
+    else:
+        print(source.name)
+        print("\n".join(f"  {label:<16}{text}" for label, text in rows.items()))
+    if refusal:
+        say(refusal)
+        return BAD_INPUT
+    return OK

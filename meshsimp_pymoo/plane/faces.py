@@ -1,0 +1,103 @@
+"""Triangles as rows of vertices: their edges, their neighbours, their one spelling."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from meshsimp_pymoo.arrays import Csr, IntArray
+
+
+def canonical_faces(faces: IntArray) -> IntArray:
+    """Return triangles (M, 3) in their one spelling: the least row first, the turn kept, sorted.
+
+    Examples
+    --------
+    >>> canonical_faces(np.array([[3, 1, 2], [2, 0, 1]])).tolist()
+    [[0, 1, 2], [1, 2, 3]]
+    """
+    turn = faces.argmin(axis=1)
+    rows = np.arange(len(faces))
+    turned = np.stack([faces[rows, (turn + k) % 3] for k in range(3)], axis=1)
+    return turned[np.lexsort((turned[:, 2], turned[:, 1], turned[:, 0]))]
+
+
+class EdgeTable(NamedTuple):
+    """The edges of triangles.
+
+    Attributes
+    ----------
+    ends : (E, 2) int64 array
+        The vertices of each edge, ascending; edges sorted.
+    n_triangles : (E,) int array
+        How many triangles have it.
+    order : (3 M,) int array
+        The sides of all triangles (first all first sides, then all second ones, then all third ones) edge by edge.
+    first : (E,) int array
+        Where each edge's sides begin in ``order``.
+    """
+
+    ends: IntArray
+    n_triangles: IntArray
+    order: IntArray
+    first: IntArray
+
+
+def edge_table(faces: IntArray) -> EdgeTable:
+    """Return the edges of triangles (M, 3).
+
+    Examples
+    --------
+    >>> table = edge_table(np.array([[0, 1, 2], [0, 2, 3]]))
+    >>> table.ends[table.n_triangles == 2].tolist()
+    [[0, 2]]
+    """
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
+    sides.sort(axis=1)
+    key = sides[:, 0] * (int(faces.max(initial=0)) + 1) + sides[:, 1]
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.flatnonzero(np.r_[True, key[1:] != key[:-1]][: len(key)])
+    return EdgeTable(sides[order[first]], np.diff(np.r_[first, len(key)]), order, first)
+
+
+def border_vertices(faces: IntArray) -> IntArray:
+    """Return the vertices at edges of one triangle only, ascending."""
+    table = edge_table(faces)
+    return np.unique(table.ends[table.n_triangles == 1])
+
+
+@njit(cache=True)
+def _ring_lists(faces: np.ndarray, indptr: np.ndarray, raw: np.ndarray) -> None:
+    for f in range(len(faces)):
+        for k in range(3):
+            a = faces[f, k]
+            raw[indptr[a]] = faces[f, (k + 1) % 3]
+            raw[indptr[a] + 1] = faces[f, (k + 2) % 3]
+            indptr[a] += 2
+
+
+@njit(cache=True)
+def _unique_rings(start: np.ndarray, raw: np.ndarray, indptr: np.ndarray, indices: np.ndarray) -> None:
+    m = 0
+    for i in range(len(start) - 1):
+        ring = np.sort(raw[start[i] : start[i + 1]])
+        for k in range(len(ring)):
+            if k == 0 or ring[k] != ring[k - 1]:
+                indices[m] = ring[k]
+                m += 1
+        indptr[i + 1] = m
+
+
+def one_rings(faces: IntArray, n: int) -> Csr:
+    """Return the neighbours of each of n vertices on the edges of faces (T, 3), ascending, in CSR form."""
+    start = np.zeros(n + 1, np.int64)
+    np.cumsum(2 * np.bincount(faces.ravel(), minlength=n), out=start[1:])
+    raw = np.empty(start[-1], np.int32)
+    _ring_lists(faces, start.copy(), raw)
+    indptr = np.zeros(n + 1, np.int64)
+    indices = np.empty(len(raw), np.int32)
+    _unique_rings(start, raw, indptr, indices)
+    return indptr, indices[: indptr[-1]].copy()

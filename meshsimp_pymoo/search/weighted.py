@@ -1,0 +1,244 @@
+"""The paper's single-objective method: an elitist genetic algorithm on the weighted sum of both objectives."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.algorithms.soo.nonconvex.ga import GA
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.operators.selection.tournament import TournamentSelection
+from pymoo.util.display.column import Column
+from pymoo.util.display.output import Output
+
+from meshsimp_pymoo.search.operators import OAX, PackedDuplicates, SubsetUniformCrossover
+from meshsimp_pymoo.search.paper import CROSSOVER_PROBABILITY, GENERATIONS, POP_SIZE, paper_operators
+from meshsimp_pymoo.search.requirements import require_probability
+from meshsimp_pymoo.search.selection import objectives, score_tournament, violations
+
+
+def weighted_ga_v1(w: float, pop_size: int = POP_SIZE, **kwargs: Any) -> WeightedGA:
+    """Elitist GA on the weighted sum with uniform crossover, the paper's single-objective method.
+
+    Parameters
+    ----------
+    w : float
+        Weight of the error, in [0, 1]; the triangles weigh 1 - w. The paper runs 0, 0.1, ..., 1.
+    pop_size : int
+        Individuals in the population.
+    **kwargs
+        Further arguments of `WeightedGA`; they replace the preset's own.
+    """
+    defaults = paper_operators() | {"crossover": SubsetUniformCrossover(CROSSOVER_PROBABILITY)}
+    return WeightedGA(w, pop_size, **(defaults | kwargs))
+
+
+def weighted_ga_v2(w: float, pop_size: int = POP_SIZE, **kwargs: Any) -> WeightedGA:
+    """Elitist GA on the weighted sum with the orthogonal-array crossover over L4, second version.
+
+    The main effects of the crossover are those on the weighted sum.
+
+    Parameters
+    ----------
+    w : float
+        Weight of the error, in [0, 1]; the triangles weigh 1 - w. The paper runs 0, 0.1, ..., 1.
+    pop_size : int
+        Individuals in the population.
+    **kwargs
+        Further arguments of `WeightedGA`; they replace the preset's own.
+    """
+    defaults = paper_operators() | {"crossover": OAX("L4", prob=CROSSOVER_PROBABILITY)}
+    return WeightedGA(w, pop_size, **(defaults | kwargs))
+
+
+def weighted_sum(F: NDArray[np.float64], w: float) -> NDArray[np.float64]:
+    """Weight the error by w and the number of triangles by 1 - w (Eq. 8 of the paper), unscaled.
+
+    Parameters
+    ----------
+    F : (n, 2) or (n, 1) float array
+        Error [file units] and number of triangles; or values that are weighted already, which are returned.
+    w : float
+        Weight of the error.
+
+    Returns
+    -------
+    (n,) float array
+        The sums, minimised.
+
+    Examples
+    --------
+    >>> weighted_sum(np.array([[10.0, 2.0]]), 0.5).tolist()
+    [6.0]
+    """
+    return F[:, 0] if F.shape[1] == 1 else w * F[:, 0] + (1 - w) * F[:, 1]
+
+
+class WeightedSum(Problem):
+    """The weighted sum of a mesh problem's two objectives (Eq. 8) as a problem of its own.
+
+    For single-objective algorithms other than `WeightedGA` (which does not need it). F is w * error + (1 - w)
+    * triangles, raw as in the paper: the error counts in file units, in the measure that the problem minimises.
+    Constraints and all further numbers of the problem are passed on; the error (the sum) and the triangles are kept
+    with each solution: ``result.opt.get("error", "triangles")``. Can be pickled, unlike pymoo's
+    ``MultiToSingleObjective``.
+
+    Parameters
+    ----------
+    problem : MeshProblem
+        A problem with the two objectives error and triangles; stays reachable as ``.problem``.
+    w : float
+        Weight of the error, in [0, 1].
+
+    Raises
+    ------
+    ValueError
+        If ``w`` is not in [0, 1] or the problem has other than two objectives.
+    """
+
+    def __init__(self, problem: Problem, w: float) -> None:
+        if problem.n_obj != 2:
+            raise ValueError(f"WeightedSum weighs two objectives, the problem has {problem.n_obj}")
+        self.w = require_probability("w", w)
+        self.problem = problem
+        super().__init__(
+            n_var=problem.n_var,
+            n_obj=1,
+            n_ieq_constr=problem.n_ieq_constr,
+            n_eq_constr=problem.n_eq_constr,
+            xl=problem.xl,
+            xu=problem.xu,
+            vtype=problem.vtype,
+        )
+
+    @property
+    def pinned(self) -> NDArray[np.bool_]:
+        """The vertices that the inner problem pins, (N,) bool."""
+        return self.problem.pinned
+
+    @property
+    def surface(self) -> Any:
+        """What a chromosome means to the inner problem."""
+        return self.problem.surface
+
+    @property
+    def model(self) -> Any:
+        """The inner problem's model."""
+        return self.problem.model
+
+    def _evaluate(self, X: NDArray[np.bool_], out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        out |= self.problem.evaluate(X, return_as_dictionary=True)
+        error, out["triangles"] = out["F"].T
+        out.setdefault("error", error)
+        out["F"] = weighted_sum(out["F"], self.w)
+
+
+class WeightedOutput(Output):
+    """What ``verbose=True`` prints for a `WeightedGA`: the best and the mean weighted sum."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.best = Column("best")
+        self.mean = Column("mean")
+        self.columns += [self.best, self.mean]
+
+    def update(self, algorithm: WeightedGA) -> None:
+        """Read the numbers of the generation."""
+        super().update(algorithm)
+        self.best.set(float(algorithm.score(algorithm.opt)[0]))
+        self.mean.set(float(algorithm.score(algorithm.pop).mean()))
+
+
+class WeightedGA(GA):
+    """Generational, elitist genetic algorithm on the weighted sum of error and triangles (Eq. 8).
+
+    Takes the two-objective problem itself and weighs inside: every individual keeps both objectives, and the
+    result is the best solution found, ``result.X`` (1, N) and ``result.F`` (1, 2), as from the
+    multi-objective algorithms. The weighted sum is raw as in the paper: with an error in the ten-thousands
+    and triangles in the hundreds, most weights between 0 and 1 mean the error. A problem that is a
+    `WeightedSum` already is accepted too; the result then is pymoo's for one objective, ``result.F`` (1,),
+    and ``result.opt.get("error", "triangles")`` gives the two.
+
+    Parents win a binary tournament; the children replace the population, except that the ``n_elite`` best of
+    the old one compete with them (the worst are dropped): the best solution is never lost. Solutions that
+    violate a constraint come after all that do not.
+
+    Parameters
+    ----------
+    w : float
+        Weight of the error, in [0, 1]; the triangles weigh 1 - w.
+    pop_size : int
+        Individuals in the population.
+    n_elite : int
+        How many of the old population compete with the children; ``pop_size`` makes it pymoo's
+        plus-selection.
+    **kwargs
+        Further arguments of ``pymoo.algorithms.soo.nonconvex.ga.GA``.
+
+    Raises
+    ------
+    ValueError
+        If ``w`` is not in [0, 1] or ``n_elite`` not in 1 ... ``pop_size``, and when set up for a problem with
+        other than two objectives that is not a `WeightedSum` with the same weight.
+    """
+
+    def __init__(self, w: float, pop_size: int = POP_SIZE, *, n_elite: int = 1, **kwargs: Any) -> None:
+        self.w = require_probability("w", w)
+        if not 1 <= n_elite <= pop_size:
+            raise ValueError(f"n_elite = {n_elite} is not in 1 ... pop_size = {pop_size}; one must survive")
+        self.n_elite = n_elite
+        defaults = {
+            "selection": TournamentSelection(func_comp=score_tournament),
+            "eliminate_duplicates": PackedDuplicates(),
+            "output": WeightedOutput(),
+        }
+        super().__init__(pop_size, **(defaults | kwargs))
+        # pymoo's constructor puts its default here whatever is passed.
+        self.termination = kwargs.get("termination", ("n_gen", GENERATIONS))
+
+    def score(self, pop: Any) -> NDArray[np.float64]:
+        """Return the weighted sum of each individual, (n,)."""
+        return weighted_sum(objectives(pop), self.w)
+
+    def _setup(self, problem: Problem, **kwargs: Any) -> None:
+        if isinstance(problem, WeightedSum):
+            if problem.w != self.w:
+                raise ValueError(f"the problem is weighted by w = {problem.w}, the algorithm by w = {self.w}")
+        elif problem.n_obj != 2:
+            raise ValueError(
+                f"the weighted sum needs the two objectives error and triangles, {type(problem).__name__} "
+                f"has {problem.n_obj}; pass a MeshProblem or WeightedSum(problem, {self.w})"
+            )
+
+    def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
+        self.pop = self._best_first(infills)
+
+    def _infill(self) -> Any:
+        off = self.mating.do(
+            self.problem,
+            self.pop,
+            self.n_offsprings,
+            algorithm=self,
+            random_state=self.random_state,
+            score=partial(weighted_sum, w=self.w),
+        )
+        if len(off) == 0:  # every child is a duplicate, again and again: as in pymoo, the end
+            self.termination.force_termination = True
+            return None
+        return off
+
+    def _advance(self, infills: Any = None, **kwargs: Any) -> None:
+        if infills is None:
+            return
+        n_elite = max(self.n_elite, self.pop_size - len(infills))
+        competing = Population.merge(self.pop[:n_elite], infills)
+        self.pop = self._best_first(competing)[: self.pop_size]
+
+    def _best_first(self, pop: Any) -> Any:
+        return pop[np.lexsort([self.score(pop), violations(pop)])]
+
+    def _set_optimum(self) -> None:
+        self.opt = self.pop[:1]

@@ -1,0 +1,64 @@
+"""What does not change while a height surface is searched, in the record that its compiled functions work on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.surface.measures import OBJECTIVES
+from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.rules import Rules
+
+
+class Ground(NamedTuple):
+    """A model's arrays and the rules, as the compiled functions want them; N vertices."""
+
+    xy: np.ndarray  # (2 N,) coordinates in the unit square
+    z: np.ndarray  # (N,) heights [model units]
+    corners: np.ndarray  # (C,) vertices that triangulating begins with
+    has_twins: bool  # whether vertices share a place
+    unit: float  # side of the unit square [model units]
+    min_height: float  # of a triangle at the hull, in the unit square
+    exact_area: float  # up to where double precision is exact, see plane.predicates
+    exact_lift: float
+    side: int  # the footprint, see plane.footprint; 0: all of the hull
+    state: np.ndarray
+    start: np.ndarray
+    items: np.ndarray
+    faces: np.ndarray
+    nearest: bool  # whether an uncovered vertex costs its distance
+    weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
+    weighed: bool  # whether the cost of a vertex in a sum is not d_p itself, but what weighed_cost makes of it
+    squared: bool  # whether the cost is the square of d_p
+
+
+def make_ground(model: OpenModel, rules: Rules) -> Ground:
+    """Return a model's arrays and the rules for the compiled functions; weights are those of the model."""
+    xy = np.ascontiguousarray(model.xy)
+    extent = np.ptp(xy, axis=0)
+    area, lift = exact_ranges(xy)
+    footprint = model.footprint
+    weight = np.empty(0) if model.weights is None else model.weights
+    squared = OBJECTIVES[rules.measure].squared
+    return Ground(
+        xy=xy.ravel(),
+        z=np.ascontiguousarray(model.points[:, 2]),
+        corners=np.ascontiguousarray(model.corners, np.int64),
+        has_twins=bool((xy[1:] == xy[:-1]).all(axis=1).any()),
+        unit=float(model.unit),
+        min_height=SLIVER_HEIGHT * float(np.hypot(extent[0], extent[1])),
+        exact_area=area,
+        exact_lift=lift,
+        side=footprint.side if rules.footprint == "model" else 0,
+        state=footprint.state,
+        start=footprint.start,
+        items=footprint.items,
+        faces=footprint.faces,
+        nearest=rules.outside == "nearest",
+        weight=weight,
+        weighed=squared or len(weight) > 0,
+        squared=squared,
+    )

@@ -1,0 +1,269 @@
+"""The height surface: an open model z = f(x, y), where a subset means its Delaunay triangulation in the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy import sparse
+
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, triangulate_subset
+from meshsimp_pymoo.surface.ground import Ground, make_ground
+from meshsimp_pymoo.surface.live import Live, build, lent_live
+from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
+from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.pins import pinned_vertices
+from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
+from meshsimp_pymoo.surface.rules import DEFAULT, Rules
+from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View
+
+# A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
+# metres.
+LEAST_RELIEF = 0.12
+# A kept vertex of weight 0 counts this share of the mean all the same, so that its refitted height has a value.
+LEAST_WEIGHT = 1e-9
+
+
+class HeightSurface:
+    """An open model and the rules for it; see `surface.Surface` for what its attributes are.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices. Its weights are replaced by those of the rules, if they name some.
+    rules : Rules
+        What counts.
+
+    Raises
+    ------
+    ModelError
+        If the pins or weights of the rules do not fit the model.
+
+    Examples
+    --------
+    >>> from meshsimp_pymoo.datasets import load
+    >>> from meshsimp_pymoo.surface.model import build_model
+    >>> roof = HeightSurface(build_model(load("roof:3")))
+    >>> roof.simplify(roof.pinned).quality.error        # the ridge of 3 vertices falls from height 1 to the ground
+    3.0
+    """
+
+    def __init__(self, model: OpenModel, rules: Rules = DEFAULT) -> None:
+        self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        self.rules = rules
+        self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of original vertices."""
+        return self.model.n_vertices
+
+    @property
+    def points(self) -> FloatArray:
+        """The original vertices (N, 3), upright, height along z [model units]."""
+        return self.model.points
+
+    @property
+    def faces(self) -> IntArray:
+        """The original triangles (T, 3), counter-clockwise from above."""
+        return self.model.faces
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box in space [model units]."""
+        return self.model.diagonal
+
+    @property
+    def total_weight(self) -> float:
+        """Sum of the weights; N without any."""
+        return self.model.total_weight
+
+    @property
+    def neighbours(self) -> Csr:
+        """The one-rings of the original mesh."""
+        return self.model.neighbours
+
+    @property
+    def border(self) -> IntArray:
+        """Vertices at edges of one original face only."""
+        return self.model.border
+
+    @property
+    def places(self) -> FloatArray:
+        """The vertices (N, 2) in the unit square."""
+        return self.model.xy
+
+    @cached_property
+    def view(self) -> View:
+        """The model upright, a flat relief drawn higher."""
+        width, depth, height = np.ptp(self.points, axis=0)
+        least = LEAST_RELIEF * float(max(width, depth))
+        exaggeration = max(1.0, least / float(height)) if height > 0 else 1.0
+        return View(self.points, exaggeration, self.model.rotation, self.model.pivot)
+
+    @cached_property
+    def _ground(self) -> Ground:
+        return make_ground(self.model, self.rules)
+
+    def ground(self) -> Ground:
+        """Return the model's arrays and the rules for compiled functions."""
+        return self._ground
+
+    @contextmanager
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Live]:
+        """Lend the live triangulation of a subset; of several kept vertices at one place, a fixed one is the site."""
+        with lent_live(self.n_vertices) as live:
+            build(self._ground, live, self.sites(kept, fixed), self.model.name)
+            yield live
+
+    def sites(self, kept: BoolArray, fixed: BoolArray | None = None) -> IntArray:
+        """Return the rows of the kept vertices, one for each place: a fixed one where there is one, else the first."""
+        rows = np.flatnonzero(kept)
+        if not self._ground.has_twins:
+            return rows
+        xy = self.model.xy
+        group = np.cumsum(np.r_[True, (xy[1:] != xy[:-1]).any(axis=1)])[rows]
+        order = np.arange(len(rows)) if fixed is None else np.lexsort((~fixed[rows], group))
+        first = np.r_[True, group[order][1:] != group[order][:-1]][: len(rows)]
+        return np.sort(rows[order[first]])
+
+    def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
+        """Return the table (P, 6 + regions) of numbers of subsets (P, N); see :func:`evaluate_subsets`."""
+        return evaluate_subsets(self._ground, kept, n_threads=threads, regions=regions)
+
+    def simplify(self, kept: BoolArray) -> Simplified:
+        """Triangulate the kept vertices and measure the result: the phenotype of one chromosome (N,).
+
+        Raises
+        ------
+        ValueError
+            If no triangle is emitted: fewer than 3 vertices, all on one line, or all triangles outside the footprint.
+        """
+        row = self._checked(kept)
+        faces, numbers, deviation, covered = triangulate_subset(self._ground, row)
+        if numbers[TRIANGLES] == 0:
+            raise ValueError(
+                f"{int(row.sum())} kept vertices of {self.model.name} span no triangle of the mesh; "
+                "keep more of them, the corners first"
+            )
+        return Simplified(faces, as_quality(numbers, self.total_weight), deviation, covered)
+
+    def score(self, points: FloatArray, faces: IntArray) -> Scored:
+        """Measure any mesh by the same error: decimated, folded, with vertices of its own.
+
+        Parameters
+        ----------
+        points : (V, 3) float array
+            Vertices in the frame of the model's file [file units].
+        faces : (M, 3) int array
+            Triangles. Where several of them cover a point, the smallest of the differences counts.
+
+        Raises
+        ------
+        ValueError
+            If there is no face with an area in the plane, or the arrays do not fit together.
+        """
+        points = np.asarray(points, float)
+        local = self.model.to_local(points) if points.ndim == 2 and points.shape[1:] == (3,) else points
+        deviation, covered = mesh_deviation(self._ground, local, faces)
+        quality = mesh_quality(deviation, covered, np.asarray(faces), self.model.weights, self.total_weight)
+        return Scored(quality, deviation, covered)
+
+    def refit(self, kept: BoolArray, *, tolerance: float = TOLERANCE) -> Refitted:
+        """Move the kept vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
+        if not tolerance > 0:
+            raise ValueError(
+                f"tolerance={tolerance} is not positive; give a small share of the error such as {TOLERANCE}"
+            )
+        model, mesh = self.model, self.simplify(kept)
+        rows, compact = np.unique(mesh.faces, return_inverse=True)
+        compact = compact.reshape(-1, 3)
+        before = mesh.quality.error
+        own = model.file_points[rows]
+        if before == 0.0:
+            return Refitted(mesh.faces, rows, own, before, before, before)
+        samples = mesh_samples(self._ground, model.points[rows], compact)
+        weights = np.ones(self.n_vertices) if model.weights is None else model.weights.copy()
+        if not weights.all():
+            weights[rows] = np.maximum(weights[rows], LEAST_WEIGHT * weights.mean())
+        counts = np.flatnonzero((weights > 0) & samples.shares.any(axis=1))
+        n = len(counts)
+        A = sparse.csr_matrix(
+            (samples.shares[counts].ravel(), samples.sites[counts].ravel(), np.arange(0, 3 * n + 1, 3)),
+            shape=(n, len(rows)),
+        )
+        A.sum_duplicates()
+        original = model.points[rows, 2]
+        heights, bound = least_error(
+            A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance
+        )
+        raised = own + (heights - original)[:, None] * model.rotation[2]
+        error = self.score(raised, compact).quality.error
+        if error >= before:
+            raised, error = own, before
+        return Refitted(mesh.faces, rows, raised, error, before, min(bound, error))
+
+    def stored_arrays(self) -> dict[str, AnyArray]:
+        """Return the row of each vertex in the file."""
+        return {"source_index": self.model.source_index.astype(np.int64)}
+
+    def _checked(self, kept: Any) -> BoolArray:
+        row = np.array(kept, order="C")
+        if row.dtype != np.bool_:
+            raise TypeError(f"a subset is a bool array, one entry a vertex, not {row.dtype}")
+        if row.shape != (self.n_vertices,):
+            raise ValueError(
+                f"a subset of {self.model.name} has shape ({self.n_vertices},), one entry a vertex, not {row.shape}"
+            )
+        return row
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> HeightSurface:
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name not in ("_ground", "view")}
+
+
+def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float = TOLERANCE) -> Refitted:
+    """Move the kept vertices up or down so that the error of their mesh is least; (x, y) and triangles stay.
+
+    What is minimised is the package's error itself: the sum of w_p d_p over all original vertices, the uncovered ones
+    included (their distance in space to the nearest point of the outline depends on its height too), whatever other
+    measure a search minimised. Pinned vertices stay in place but may change their height, too. The result is no subset
+    of the original vertices any more.
+
+    Parameters
+    ----------
+    surface : HeightSurface
+        A model of N vertices and its rules; ``problem.surface``.
+    kept : (N,) bool array
+        The vertices that stay, in vector order.
+    tolerance : float
+        The search ends where the error is at most this share above the proved bound.
+
+    Returns
+    -------
+    Refitted
+
+    Raises
+    ------
+    ValueError
+        If the subset spans no triangle, or the tolerance is not positive.
+
+    Examples
+    --------
+    Two triangles over a roof cannot have a ridge, but they can lie higher; three vertices on the ridge and six at the
+    eaves, at a height of 1 and 0, are then all the same as before:
+
+    >>> from meshsimp_pymoo.datasets import load
+    >>> from meshsimp_pymoo.surface.model import build_model
+    >>> roof = HeightSurface(build_model(load("roof:3")))
+    >>> refit_heights(roof, roof.pinned).error
+    3.0
+    """
+    return surface.refit(kept, tolerance=tolerance)

@@ -1,0 +1,145 @@
+"""What the compiled loops of the search ask of a surface: one name for each question, one answer for each record.
+
+Thinning, insertion and annealing are compiled loops over a surface's *ground* (a NamedTuple: what does not change) and
+its *books* (a NamedTuple: the triangulation of a subset that is being changed). They call the functions below, which
+have no body: a surface says with `answers` which compiled function is meant where the ground is of its class, and the
+compiler chooses by that class when it compiles the loop. It costs nothing when the loop runs.
+
+A vertex that is in the triangulation is a *site*. Costs are sums over the vertices, in the measure of the rules; moves
+are of one site v to one vertex w, where -1 for either means none: so removals and insertions are moves too. *Cells*,
+the triangles of a height surface, are what insertion looks through for its next vertex; their numbers are below
+2 N + 8.
+
+Examples
+--------
+>>> from typing import NamedTuple
+>>> from numba import njit
+>>> class Fixed(NamedTuple):
+...     cost: float
+>>> @answers(total_cost, Fixed)
+... @njit
+... def fixed_cost(ground, books):
+...     return ground.cost
+>>> @njit
+... def twice(ground, books):
+...     return 2.0 * total_cost(ground, books)
+>>> twice(Fixed(1.5), 0)
+3.0
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numba import njit
+from numba.extending import overload
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def answers(question: Callable[..., Any], record: type) -> Callable[[Function], Function]:
+    """Return a decorator: the compiled function below it answers one of this module's questions for a class of ground.
+
+    Parameters
+    ----------
+    question : callable
+        A function of this module.
+    record : type
+        The NamedTuple class of the ground.
+    """
+    arity = len(inspect.signature(question).parameters)
+
+    def register(function: Function) -> Function:
+        called = {
+            2: lambda ground, books: function(ground, books),
+            3: lambda ground, books, v: function(ground, books, v),
+            4: lambda ground, books, v, w: function(ground, books, v, w),
+            5: lambda ground, books, v, w, limit: function(ground, books, v, w, limit),
+        }[arity]
+
+        def choose(ground: Any, *_: Any) -> Any:
+            return called if getattr(ground, "instance_class", None) is record else None
+
+        overload(question, strict=False)(choose)
+        return function
+
+    return register
+
+
+def _unanswered() -> Any:
+    raise NotImplementedError("a question of a surface is answered in compiled loops only")
+
+
+def total_cost(ground: Any, books: Any) -> float:
+    """Return the sum of the costs; infinite where there is no mesh."""
+    return float(_unanswered())
+
+
+def n_triangles(ground: Any, books: Any) -> int:
+    """Return the number of triangles of the mesh."""
+    return int(_unanswered())
+
+
+def n_sites(ground: Any, books: Any) -> int:
+    """Return the number of sites."""
+    return int(_unanswered())
+
+
+def is_site(ground: Any, books: Any, v: int) -> bool:
+    """Tell whether vertex v is a site."""
+    return bool(_unanswered())
+
+
+def is_taken(ground: Any, books: Any, w: int) -> bool:
+    """Tell whether there is a site at the place of vertex w, so that w cannot come."""
+    return bool(_unanswered())
+
+
+def urgency(ground: Any, books: Any, v: int) -> float:
+    """Return the cost of the cell in which vertex v, no site, lies, or its own where none covers it."""
+    return float(_unanswered())
+
+
+def try_exchange(ground: Any, books: Any, v: int, w: int, limit: float) -> tuple[float, int]:
+    """Return the change of cost and of the number of triangles if site v went and vertex w came.
+
+    Infinite where v cannot go, and where the change is found to exceed ``limit`` before it is known.
+    """
+    return _unanswered()
+
+
+def exchange(ground: Any, books: Any, v: int, w: int) -> bool:
+    """Let site v go and vertex w come; return False, with nothing changed, where v cannot go."""
+    return bool(_unanswered())
+
+
+def sites_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
+    """List the sites whose removal may cost something else once site v is gone; return their number."""
+    return int(_unanswered())
+
+
+def n_cells(ground: Any, books: Any) -> int:
+    """Return the number of cells there have been: all numbers are below."""
+    return int(_unanswered())
+
+
+def worst_in(ground: Any, books: Any, cell: int) -> tuple[int, float, float]:
+    """Return the vertex of a cell that costs most and could come (-1: none costs anything), its cost, the cell's."""
+    return _unanswered()
+
+
+def cells_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
+    """List the cells at site v, which has just come; return their number."""
+    return int(_unanswered())
+
+
+@njit(cache=True, nogil=True)
+def site_mask(ground: Any, books: Any, n: int) -> np.ndarray:
+    """Return which of n vertices are sites, as a bool array (n,)."""
+    mask = np.zeros(n, np.bool_)
+    for v in range(n):
+        mask[v] = is_site(ground, books, v)
+    return mask

@@ -1,0 +1,104 @@
+"""Which vertices every mesh keeps: the corners, and what the user names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.rules import PINS
+
+# A landmark given by position is the nearest vertex, but not one farther away than this share of the diagonal.
+LANDMARK_REACH = 0.01
+
+
+def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | AnyArray | None = None) -> BoolArray:
+    """Return which vertices every mesh keeps: the corners, and what ``pin`` names (see `Rules`).
+
+    Raises
+    ------
+    ModelError
+        If a file row does not exist or is not part of the model, or a position has no vertex near.
+    """
+    pinned = np.zeros(model.n_vertices, bool)
+    pinned[model.corners] = True
+    for part in _pin_parts(pin):
+        if isinstance(part, str):
+            if part not in PINS:
+                names = ", ".join(map(repr, PINS))
+                raise ModelError(f"pin={part!r} is unknown; use {names}, file rows or positions")
+            if part == "hull":
+                pinned[model.hull] = True
+        elif part.ndim == 1:
+            pinned[_rows_of_file(model, part)] = True
+        else:
+            pinned[_vertices_near(model, part)] = True
+    return pinned
+
+
+def _pin_parts(pin: Any) -> list[Any]:
+    """Sort what the user gave into names, an array of file rows and an array of positions."""
+    if pin is None:
+        return []
+    if isinstance(pin, str):
+        return [pin]
+    if isinstance(pin, np.ndarray):
+        pin = [pin] if pin.ndim == 2 else list(pin)
+    elif not isinstance(pin, Iterable):
+        pin = [pin]
+    parts: list[Any] = []
+    rows = []
+    for item in pin:
+        if isinstance(item, str):
+            parts.append(item)
+        elif np.ndim(item) == 0:
+            rows.append(item)
+        else:
+            positions = np.atleast_2d(np.asarray(item))
+            if positions.ndim != 2 or positions.shape[1] not in (2, 3):
+                raise ModelError(
+                    f"pin holds an array of shape {np.shape(item)}; positions have shape (K, 2) or (K, 3), "
+                    "file rows are single whole numbers"
+                )
+            parts.append(positions.astype(float))
+    if rows:
+        parts.append(np.asarray(rows))
+    return parts
+
+
+def _rows_of_file(model: OpenModel, rows: AnyArray) -> IntArray:
+    if not np.issubdtype(rows.dtype, np.integer):
+        raise ModelError(
+            f"pin holds {rows[0]!r}, which is no row of the file; give whole numbers, or positions as [x, y, z]"
+        )
+    order = np.argsort(model.source_index, kind="stable")
+    place = np.searchsorted(model.source_index[order], rows)
+    found = place < model.n_vertices
+    found[found] = model.source_index[order[place[found]]] == rows[found]
+    if not found.all():
+        raise ModelError(
+            f"pin: row {int(rows[~found][0])} of {model.name} is not among the model's {model.n_vertices} vertices; "
+            "rows count from 0, and vertices that no face uses are left out"
+        )
+    return order[place]
+
+
+def _vertices_near(model: OpenModel, positions: FloatArray) -> IntArray:
+    if positions.shape[1] == 3:
+        wanted, vertices = positions, model.file_points
+    else:
+        wanted, vertices = positions - model.origin[:2], model.points[:, :2]
+    distance, nearest = cKDTree(vertices).query(wanted)
+    far = np.flatnonzero(distance > LANDMARK_REACH * model.diagonal)
+    if len(far):
+        k = far[0]
+        raise ModelError(
+            f"pin: the vertex of {model.name} nearest to {positions[k].tolist()} is {distance[k]:.6g} away, more than "
+            f"{LANDMARK_REACH:.0%} of the diagonal {model.diagonal:.6g}; give positions on the mesh"
+        )
+    return np.asarray(nearest, np.int64)

@@ -1,0 +1,227 @@
+"""How far any mesh is from the original one, by the same error: decimated, folded, with vertices of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.plane.hilbert import hilbert_keys
+from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
+from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
+from meshsimp_pymoo.surface.ground import Ground
+from meshsimp_pymoo.surface.measures import Quality, as_quality
+
+
+def mesh_quality(
+    deviation: FloatArray, covered: BoolArray, faces: IntArray, weights: FloatArray | None, total_weight: float
+) -> Quality:
+    """Return what is said of a mesh with these deviations (N,), cover (N,) and triangles (M, 3)."""
+    w = np.ones(len(deviation)) if weights is None else weights
+    row = np.array(
+        [
+            (w * deviation).sum(),
+            len(faces),
+            len(np.unique(faces)),
+            (w * deviation**2).sum(),
+            deviation[w > 0].max(),
+            len(covered) - covered.sum(),
+        ]
+    )
+    return as_quality(row, total_weight)
+
+
+def mesh_deviation(ground: Ground, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Return d_p (N,) and covered (N,) for any mesh.
+
+    Parameters
+    ----------
+    ground : Ground
+        The model of N vertices and the rules, of which only what an uncovered vertex costs is asked.
+    vertices : (V, 3) float array
+        Vertices in the frame of the model's points [model units].
+    faces : (M, 3) int array
+        Triangles. Where several of them cover a point, the smallest of the differences counts.
+
+    Raises
+    ------
+    ValueError
+        If there is no face with an area in the plane, or the arrays do not fit together.
+    """
+    deviation, covered, _ = _look_at_mesh(ground, vertices, faces, n_recorded=0)
+    return deviation, covered
+
+
+@dataclass(frozen=True)
+class MeshSamples:
+    """What a mesh's heights do to the d_p of each original vertex, with the mesh fixed in the plane.
+
+    With heights h of the mesh's vertices, d_p = sqrt(gap_p^2 + (h[sites_p] . shares_p - z_p)^2).
+
+    Attributes
+    ----------
+    sites : (N, 3) int array
+        The mesh's vertices that carry the surface at each original vertex, or at the point nearest to it.
+    shares : (N, 3) float array
+        Their shares in the height there, which add up to 1; all 0 where a vertex is not covered and costs nothing.
+    gap : (N,) float array
+        Distance in the plane to the mesh [model units]; 0 where it covers the vertex.
+    covered : (N,) bool array
+        Whether a triangle covers it.
+    """
+
+    sites: np.ndarray
+    shares: np.ndarray
+    gap: np.ndarray
+    covered: np.ndarray
+
+
+def mesh_samples(ground: Ground, vertices: FloatArray, faces: IntArray) -> MeshSamples:
+    """Return which vertices of a mesh decide about the deviation at each original one; see :func:`mesh_deviation`."""
+    _, covered, recorded = _look_at_mesh(ground, vertices, faces, n_recorded=len(ground.z))
+    return MeshSamples(*recorded, covered)
+
+
+def _look_at_mesh(
+    ground: Ground, vertices: FloatArray, faces: IntArray, n_recorded: int
+) -> tuple[FloatArray, BoolArray, tuple[IntArray, FloatArray, FloatArray]]:
+    """Check a mesh and return d_p, covered, and as many rows of sites, shares and gaps as are to be recorded."""
+    vertices = np.asarray(vertices, float)
+    faces = np.asarray(faces)
+    for name, array in (("vertices", vertices), ("faces", faces)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ValueError(f"{name} have shape {array.shape}; give (rows, 3), as of a triangle mesh")
+    if len(faces) and not np.issubdtype(faces.dtype, np.integer):
+        raise ValueError(f"faces are {faces.dtype}; give whole numbers, rows of the vertices")
+    faces = np.ascontiguousarray(faces, np.int64)
+    if len(faces) == 0:
+        raise ValueError("a mesh without faces has no error; it needs at least one triangle")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ValueError(f"faces index rows {faces.min()} to {faces.max()} of {len(vertices)} vertices")
+    if not np.isfinite(vertices).all():
+        raise ValueError(
+            f"{int((~np.isfinite(vertices)).any(axis=1).sum())} of {len(vertices)} vertices are not finite"
+        )
+    unit, samples, z = ground.unit, ground.xy, ground.z
+    xy = np.ascontiguousarray(vertices[:, :2] / unit).ravel()
+    height = np.ascontiguousarray(vertices[:, 2])
+    extent = float(np.ptp(samples.reshape(-1, 2), axis=0).max())
+    deviation = np.empty(len(z))
+    covered = np.empty(len(z), np.bool_)
+    recorded = np.zeros((n_recorded, 3), np.int64), np.zeros((n_recorded, 3)), np.zeros(n_recorded)
+    if not _mesh_deviation(samples, z, xy, height, faces, unit, extent, ground.nearest, deviation, covered, *recorded):
+        raise ValueError(f"none of the {len(faces)} faces has an area in the plane")
+    return deviation, covered, recorded
+
+
+# Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are
+# degenerate.
+SOLID_AREA = 1e-14
+
+
+@njit(cache=True, nogil=True)
+def _mesh_deviation(
+    samples: np.ndarray,
+    z: np.ndarray,
+    xy: np.ndarray,
+    height: np.ndarray,
+    faces: np.ndarray,
+    unit: float,
+    extent: float,
+    nearest: bool,
+    deviation: np.ndarray,
+    covered: np.ndarray,
+    sites: np.ndarray,
+    shares: np.ndarray,
+    gap: np.ndarray,
+) -> bool:
+    """Fill d_p, its coverage and, if they have rows, what decides it for any mesh; False if no face is solid."""
+    n = len(z)
+    # Samples by cell of the unit square, about two in each.
+    side = max(int(np.sqrt(n / 2)), 1)
+    start = np.zeros(side * side + 2, np.int64)
+    for i in range(n):
+        column = min(int(samples[2 * i] * side), side - 1)
+        row = min(int(samples[2 * i + 1] * side), side - 1)
+        start[row * side + column + 2] += 1
+    for k in range(2, side * side + 2):
+        start[k] += start[k - 1]
+    items = np.empty(n, np.int64)
+    for i in range(n):
+        column = min(int(samples[2 * i] * side), side - 1)
+        row = min(int(samples[2 * i + 1] * side), side - 1)
+        items[start[row * side + column + 1]] = i
+        start[row * side + column + 1] += 1
+    for i in range(n):
+        deviation[i] = np.inf
+        covered[i] = False
+    ends = np.empty((3 * len(faces), 2), np.int64)
+    key = np.empty(3 * len(faces), np.int64)
+    m = 0
+    for f in range(len(faces)):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        ax, ay, bx, by, cx, cy = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1], xy[2 * c], xy[2 * c + 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(area) <= SOLID_AREA * extent * extent:
+            continue
+        for k in range(3):
+            ends[m, 0] = faces[f, k]
+            ends[m, 1] = faces[f, (k + 1) % 3]
+            key[m] = 3 * f + k
+            m += 1
+        low_x, high_x = min(ax, bx, cx), max(ax, bx, cx)
+        low_y, high_y = min(ay, by, cy), max(ay, by, cy)
+        margin = 1e-9 * (high_x - low_x + high_y - low_y)
+        first_column = max(int((low_x - margin) * side), 0)
+        last_column = min(int((high_x + margin) * side), side - 1) if high_x + margin >= 0.0 else -1
+        first_row = max(int((low_y - margin) * side), 0)
+        last_row = min(int((high_y + margin) * side), side - 1) if high_y + margin >= 0.0 else -1
+        for row in range(first_row, last_row + 1):
+            for column in range(first_column, last_column + 1):
+                cell = row * side + column
+                for q in range(start[cell], start[cell + 1]):
+                    i = items[q]
+                    px = samples[2 * i]
+                    py = samples[2 * i + 1]
+                    wb = ((px - ax) * (cy - ay) - (py - ay) * (cx - ax)) / area
+                    wc = ((py - ay) * (bx - ax) - (px - ax) * (by - ay)) / area
+                    wa = 1.0 - wb - wc
+                    if wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
+                        d = abs(wa * height[a] + wb * height[b] + wc * height[c] - z[i])
+                        if d < deviation[i]:
+                            deviation[i] = d
+                            if len(gap) > 0:
+                                sites[i, 0], sites[i, 1], sites[i, 2] = a, b, c
+                                shares[i, 0], shares[i, 1], shares[i, 2] = wa, wb, wc
+                        covered[i] = True
+    if m == 0:
+        return False
+    boxes = np.empty((0, 4))
+    stack = np.empty(64, np.int64)
+    guess = 0
+    for i in range(n):
+        if covered[i]:
+            continue
+        if not nearest:
+            deviation[i] = 0.0
+            continue
+        if len(boxes) == 0:
+            # Along the curve, so that the tree's boxes are small whatever the order of the faces.
+            middle = np.empty((m, 2))
+            for k in range(m):
+                for axis in range(2):
+                    middle[k, axis] = (xy[2 * ends[k, 0] + axis] + xy[2 * ends[k, 1] + axis]) / 2.0
+            order = np.argsort(hilbert_keys(middle))
+            ends[:m] = ends[order]
+            key[:m] = key[order]
+            boxes = build_tree(xy, ends, m)
+        guess, t, d = nearest_segment(xy, ends, key, m, boxes, stack, samples[2 * i], samples[2 * i + 1], guess)
+        dz = (1.0 - t) * height[ends[guess, 0]] + t * height[ends[guess, 1]] - z[i]
+        deviation[i] = np.sqrt(d * unit * unit + dz * dz)
+        if len(gap) > 0:
+            sites[i, 0], sites[i, 1], sites[i, 2] = ends[guess, 0], ends[guess, 1], ends[guess, 1]
+            shares[i, 0], shares[i, 1] = 1.0 - t, t
+            gap[i] = np.sqrt(d) * unit
+    return True

@@ -1,0 +1,282 @@
+"""What a chromosome means: the protocol between a surface and all that searches, draws and stores its meshes.
+
+A *surface* is a model with its rules. It knows which mesh a subset of the vertices has and what that mesh's error is;
+the problem, the operators, thinning, insertion, annealing, refit, pictures, pages and folders know nothing else. The
+height surface (`surface.height`) is one; a surface of another kind is a class with these attributes and methods, and,
+if it shall be thinned and annealed too, answers to the questions of `surface.moves`.
+"""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality, require_measure
+from meshsimp_pymoo.surface.rules import Rules
+
+
+@dataclass(frozen=True)
+class Simplified:
+    """A simplified mesh in vector order, with its quality.
+
+    Attributes
+    ----------
+    faces : (M, 3) int32 array
+        Triangles as rows of ``surface.points``, the smallest row first, sorted.
+    quality : Quality
+        Its numbers.
+    deviation : (N,) float array
+        d_p at every original vertex [model units].
+    covered : (N,) bool array
+        Whether a triangle covers it.
+    """
+
+    faces: IntArray
+    quality: Quality
+    deviation: FloatArray
+    covered: BoolArray
+
+
+@dataclass(frozen=True)
+class Scored:
+    """What is said of a mesh that is no subset: any tool's.
+
+    Attributes
+    ----------
+    quality : Quality
+        Its numbers.
+    deviation : (N,) float array
+        d_p at every original vertex [model units].
+    covered : (N,) bool array
+        Whether a triangle covers it.
+    """
+
+    quality: Quality
+    deviation: FloatArray
+    covered: BoolArray
+
+
+@dataclass(frozen=True)
+class Refitted:
+    """A simplified mesh whose vertices have moved to where the error of its triangles is least.
+
+    Attributes
+    ----------
+    faces : (M, 3) int32 array
+        Triangles as rows of the surface's points; those of the simplified mesh.
+    rows : (V,) int array
+        The rows that the triangles use, ascending.
+    vertices : (V, 3) float array
+        Where they are now, in the frame of the model's file; those that did not move are exactly its own.
+    error : float
+        Error of the mesh with the vertices there; never above ``before`` [model units].
+    before : float
+        Error with the original vertices [model units].
+    bound : float
+        No such mesh has an error below this, up to rounding [model units].
+    """
+
+    faces: IntArray
+    rows: IntArray
+    vertices: FloatArray
+    error: float
+    before: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class View:
+    """How pictures and the page look at a surface.
+
+    Attributes
+    ----------
+    points : (N, 3) float array
+        The vertices as they are drawn, z to the viewer [model units].
+    exaggeration : float
+        Factor by which z is drawn higher, so that a flat relief shows.
+    rotation : (3, 3) float array
+        Drawn directions are ``rotation @ direction`` of the model's file.
+    pivot : (3,) float array
+        The point of the file's frame that the page turns about.
+    """
+
+    points: FloatArray
+    exaggeration: float
+    rotation: FloatArray
+    pivot: FloatArray
+
+
+class Original(Protocol):
+    """The original mesh, as files and records know it; N vertices in vector order."""
+
+    @property
+    def name(self) -> str:
+        """Where it came from."""
+        ...
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of its vertices."""
+        ...
+
+    @property
+    def faces(self) -> IntArray:
+        """Its triangles (T, 3)."""
+        ...
+
+    @property
+    def file_points(self) -> FloatArray:
+        """Its vertices (N, 3) exactly as in the file [file units]."""
+        ...
+
+    @property
+    def source_index(self) -> IntArray:
+        """Row of each vertex in the file (N,)."""
+        ...
+
+    @property
+    def attributes(self) -> dict[str, AnyArray]:
+        """Colours and whatever else the file says of the vertices, each with N rows."""
+        ...
+
+    @property
+    def georeference(self) -> dict[str, Any]:
+        """Where on Earth it is, as far as the file says."""
+        ...
+
+    @property
+    def hash(self) -> str:
+        """A checksum of all that decides results."""
+        ...
+
+
+class Surface(Protocol):
+    """A model with its rules: what a chromosome (N,) means."""
+
+    @property
+    def model(self) -> Original:
+        """The original mesh."""
+        ...
+
+    @property
+    def rules(self) -> Rules:
+        """What counts."""
+        ...
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of original vertices."""
+        ...
+
+    @property
+    def points(self) -> FloatArray:
+        """The original vertices (N, 3) [model units]."""
+        ...
+
+    @property
+    def faces(self) -> IntArray:
+        """The original triangles (T, 3)."""
+        ...
+
+    @property
+    def pinned(self) -> BoolArray:
+        """Vertices that every mesh keeps (N,)."""
+        ...
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box: no mesh is farther away [model units]."""
+        ...
+
+    @property
+    def total_weight(self) -> float:
+        """Sum of the weights; N without any."""
+        ...
+
+    @property
+    def neighbours(self) -> Csr:
+        """Where each vertex may move."""
+        ...
+
+    @property
+    def border(self) -> IntArray:
+        """Vertices that can come where there is room for one triangle only."""
+        ...
+
+    @property
+    def places(self) -> FloatArray:
+        """Where the vertices are, (N, 2) or (N, 3), for cuts through the surface [any unit]."""
+        ...
+
+    @property
+    def view(self) -> View:
+        """How pictures and the page look at it."""
+        ...
+
+    def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
+        """Return the table (P, 6 + regions) of numbers of subsets (P, N); see `surface.measures` for its columns."""
+        ...
+
+    def simplify(self, kept: BoolArray) -> Simplified:
+        """Return the mesh of one subset (N,); a ValueError if it has none."""
+        ...
+
+    def score(self, points: FloatArray, faces: IntArray) -> Scored:
+        """Measure any mesh in the frame of the model's file by the same error."""
+        ...
+
+    def refit(self, kept: BoolArray) -> Refitted:
+        """Return the mesh of one subset with its vertices moved to where its error is least."""
+        ...
+
+    def stored_arrays(self) -> dict[str, AnyArray]:
+        """Return what a folder of results must hold of the surface, so that its rows are understood."""
+        ...
+
+    def ground(self) -> Any | None:
+        """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
+        ...
+
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> AbstractContextManager[Any]:
+        """Lend the record of the triangulation of a subset, to be changed by moves until the context ends.
+
+        Of several kept vertices at one place, a fixed one is the site, else the first.
+        """
+        ...
+
+
+def movable_ground(surface: Surface, who: str) -> Any:
+    """Return a surface's ground for somebody who moves vertices.
+
+    Raises
+    ------
+    TypeError
+        If this is no surface but a model, which has no rules.
+    ValueError
+        If it has no ground, or its measure is no sum.
+    """
+    if not hasattr(surface, "ground"):
+        raise TypeError(
+            f"{who}: a {type(surface).__name__} has no rules; give a surface, such as problem.surface or "
+            "HeightSurface(model)"
+        )
+    require_measure(surface.rules.measure, summed_for=who)
+    ground = surface.ground()
+    if ground is None:
+        raise ValueError(
+            f"{who} move vertices by compiled moves, which a {type(surface).__name__} does not have; use an algorithm "
+            "that only evaluates, such as nsga2_v1()"
+        )
+    return ground
+
+
+def error_of(surface: Surface, cost: Any) -> Any:
+    """Return the error for sums of costs: the sum itself, or the root of their weighted mean where they are squares."""
+    # Sums that live can end a little below 0, where nothing deviates.
+    if OBJECTIVES[surface.rules.measure].squared:
+        return np.sqrt(np.maximum(cost, 0.0) / surface.total_weight)
+    return cost
