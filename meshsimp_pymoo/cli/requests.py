@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import argparse
+import re
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
+from meshsimp_pymoo.cli.arguments import settings_from, wishes_of
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.search.presets import DEFAULT
+from meshsimp_pymoo.surface.measures import OBJECTIVES
+from meshsimp_pymoo.surface.rules import Rules
 
-Request = TypeVar("Request")
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
@@ -74,14 +80,42 @@ class Tiling:
     dask: str | None = None
 
 
-def requested(kind: type[Request], args: Any, **others: Any) -> Request:
-    """Return an object of one of these classes with what the command line says."""
+@dataclass(frozen=True)
+class Request:
+    """All that a command line of ``meshsimp simplify`` asks for."""
+
+    model: str
+    options: Options
+    rules: Rules
+    search: Search
+    wish: Wish
+    output: Output
+    tiling: Tiling
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        """What of it is worth a place in the record of its results, beside options and rules."""
+        search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
+        shown = {name: getattr(self.output, name) for name in ("format", "meshes", "refit")}
+        return search | self.wish.limits | ({"pick": "knee"} if self.wish.knee else {}) | shown
+
+
+def request_of(args: argparse.Namespace) -> Request:
+    """Return what a command line of ``meshsimp simplify`` asks for; from here on no namespace travels."""
+    folder = args.output or f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
+    measure = next(name for name, known in OBJECTIVES.items() if known.minimised == args.measure)
+    return Request(
+        model=args.model,
+        options=settings_from(args, Options),
+        rules=settings_from(args, Rules, measure=measure),
+        search=_part(Search, args),
+        wish=Wish(wishes_of(args), args.pick == "knee"),
+        output=_part(Output, args, folder=Path(folder)),
+        tiling=_part(Tiling, args),
+    )
+
+
+def _part(kind: type[Part], args: argparse.Namespace, **others: Any) -> Part:
+    """Return a part of a request with what the command line says."""
     names = {item.name for item in fields(kind)} - set(others)  # type: ignore[arg-type]
-    return kind(**{name: getattr(args, name) for name in names if hasattr(args, name)} | others)
-
-
-def recorded(search: Search, wish: Wish, output: Output) -> dict[str, Any]:
-    """Return what of a request is worth a place in the record of its results."""
-    kept = {name: value for name, value in asdict(search).items() if name not in ("seed", "checkpoint")}
-    shown = {name: getattr(output, name) for name in ("format", "meshes", "refit")}
-    return kept | wish.limits | ({"pick": "knee"} if wish.knee else {}) | shown
+    return kind(**{name: getattr(args, name) for name in names} | others)

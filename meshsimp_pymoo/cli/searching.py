@@ -16,7 +16,7 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
 
-from meshsimp_pymoo.cli.requests import Output, Search, Tiling, Wish, recorded
+from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
     INTERRUPTED,
@@ -30,7 +30,6 @@ from meshsimp_pymoo.cli.terminal import (
 from meshsimp_pymoo.cli.tiling import simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
-from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import format_to_write, shared_frame
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
@@ -47,38 +46,36 @@ from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import CHECKPOINT, claim_output, is_unfinished, package_versions
 from meshsimp_pymoo.surface.measures import OBJECTIVES
-from meshsimp_pymoo.surface.rules import Rules
 
 
-def simplify(
-    model: str, options: Options, rules: Rules, search: Search, wish: Wish, output: Output, tiling: Tiling
-) -> int:
+def simplify(request: Request) -> int:
     """Search the front of a model and write it to a new folder; return the exit code."""
-    if wants_tiles(model, options, tiling):
+    search, output = request.search, request.output
+    if wants_tiles(request):
         try:
-            return simplify_tiled(model, options, rules, search, wish, output, tiling)
+            return simplify_tiled(request)
         except NoFullGrid as reason:
-            if tiling.tile is not None:
+            if request.tiling.tile is not None:
                 raise
             # nobody asked for tiles
             if not output.quiet:
                 why = re.split("; only|, and tiles", str(reason))[0]
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     _claim(output, search)
-    if PRESETS[search.algorithm].sums_only and not OBJECTIVES[rules.measure].is_sum:
+    if PRESETS[search.algorithm].sums_only and not OBJECTIVES[request.rules.measure].is_sum:
         raise UsageError(
             "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
             "use --algorithm nsga2_v1 with it, or --measure rms"
         )
-    problem = MeshProblem(model, options=options, rules=rules, n_threads=search.threads)
+    problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
     format_to_write(output.format).check(problem.model)
-    _refuse_impossible(problem, wish)
+    _refuse_impossible(problem, request.wish)
     with Keeper(problem, search, output) as keeper:
         found = _search(problem, keeper, quiet=output.quiet)
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
             return INTERRUPTED
-        return _write(found, search, wish, output, keeper)
+        return _write(found, request, keeper)
 
 
 def _claim(output: Output, search: Search) -> None:
@@ -283,12 +280,13 @@ class Keeper:
 # ---------------------------------------------------------------------------------------------------------- the results
 
 
-def _write(found: _Found, search: Search, wish: Wish, output: Output, keeper: Keeper) -> int:
+def _write(found: _Found, request: Request, keeper: Keeper) -> int:
     """Write what was found, say so, and return the exit code."""
+    search, output = request.search, request.output
     folder, front = output.folder, found.front
-    chosen, missed = wish.of(front)
+    chosen, missed = request.wish.of(front)
     run = {
-        "settings": recorded(search, wish, output) | budget(search),
+        "settings": request.recorded | budget(search),
         "seed": search.seed,
         "generations": found.generations,
         "evaluations": found.evaluations,

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from meshsimp_pymoo.cli.arguments import numbered
-from meshsimp_pymoo.cli.requests import Output, Search, Tiling, Wish, recorded
+from meshsimp_pymoo.cli.requests import Output, Request, Search, Tiling, Wish
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
 from meshsimp_pymoo.files import locked
@@ -47,24 +47,23 @@ UNKNOWN: dict[type[Any], tuple[str, ...]] = {
 }
 
 
-def wants_tiles(model: str, options: Options, tiling: Tiling) -> bool:
+def wants_tiles(request: Request) -> bool:
     """Tell whether the model is to be thinned tile by tile: because it was asked for, or because it is big."""
-    if tiling.tile is None:
-        count = count_samples(model, window=options.window)
+    if request.tiling.tile is None:
+        count = count_samples(request.model, window=request.options.window)
         return count is not None and count >= TILED_FROM
-    return bool(tiling.tile)
+    return bool(request.tiling.tile)
 
 
-def simplify_tiled(
-    model: str, options: Options, rules: Rules, search: Search, wish: Wish, output: Output, tiling: Tiling
-) -> int:
+def simplify_tiled(request: Request) -> int:
     """Thin a height grid tile by tile and write its front to a new folder; return the exit code."""
-    _refuse_unknown(wish, options, rules, search, output)
+    _refuse_unknown(request)
+    wish, output, tiling = request.wish, request.output, request.tiling
     out = output.folder
     restore(out)
     _claim(output)
     start = time.perf_counter()
-    grid = open_grid(model, options)
+    grid = open_grid(request.model, request.options)
     if grid.model is not None:
         format_to_write(output.format).check(grid.model)
     tile = tiling.tile or TILE
@@ -84,16 +83,15 @@ def simplify_tiled(
             clear_up(out)
             if output.overwrite:
                 _forget_other(out / WORK, what)
-            threads = search.threads or os.cpu_count() or 1
+            threads = request.search.threads or os.cpu_count() or 1
             store = Folder(out / WORK, what)
             front = tiled_front(
                 grid, tile=tile, most=what["most"], engine=engine, store=store, threads=threads, progress=show
             )
             front, chosen, missed = _choose(wish, front, threads)
-            settings_used = recorded(search, wish, output) | {"tile": tile, "most": what["most"]}
             run = {
-                "options": plain(options),
-                "settings": settings_used,
+                "options": plain(request.options),
+                "settings": request.recorded | {"tile": tile, "most": what["most"]},
                 "seconds": round(time.perf_counter() - start, 3),
             }
             _claim(output)  # somebody may have put something else there meanwhile, which would be replaced
@@ -150,15 +148,15 @@ def _has_pieces(out: Path) -> bool:
     return any((out / WORK).glob("*.npz"))
 
 
-def _refuse_unknown(wish: Wish, *said: Any) -> None:
-    for part in said:
+def _refuse_unknown(request: Request) -> None:
+    for part in (request.search, request.rules, request.options, request.output):
         for name in UNKNOWN[type(part)]:
             if getattr(part, name) != getattr(type(part), name):
                 raise UsageError(
                     f"--{name.replace('_', '-')} does not go with tiles, which are thinned and not searched; leave it "
                     "out, or do without tiles (--tile none)"
                 )
-    if wish.triangles == 1:
+    if request.wish.triangles == 1:
         raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
 
 

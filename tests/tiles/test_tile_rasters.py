@@ -8,7 +8,7 @@ import pytest
 from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.cli import tiled as tiled_command
+from meshsimp_pymoo.cli import tiling as tiled_command
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats import geotiff as raster_module

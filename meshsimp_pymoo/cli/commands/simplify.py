@@ -136,25 +136,8 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Turn the command line into objects, and search."""
-    import re
-    from pathlib import Path
-
-    from meshsimp_pymoo.cli.arguments import settings_from, wishes_of
-    from meshsimp_pymoo.cli.requests import Output, Search, Tiling, Wish, requested
+    """Search the front of ``args.model`` and write it to a new folder."""
+    from meshsimp_pymoo.cli.requests import request_of
     from meshsimp_pymoo.cli.searching import simplify
-    from meshsimp_pymoo.formats.options import Options
-    from meshsimp_pymoo.surface.measures import OBJECTIVES
-    from meshsimp_pymoo.surface.rules import Rules
 
-    default_folder = f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
-    measure = next(name for name, known in OBJECTIVES.items() if known.minimised == args.measure)
-    return simplify(
-        args.model,
-        settings_from(args, Options),
-        settings_from(args, Rules, measure=measure),
-        requested(Search, args),
-        Wish(wishes_of(args), args.pick == "knee"),
-        requested(Output, args, folder=Path(args.output or default_folder)),
-        requested(Tiling, args),
-    )
+    return simplify(request_of(args))
