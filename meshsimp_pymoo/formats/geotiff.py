@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import threading
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -140,6 +139,8 @@ class RasterHeights:
     ndim = 2
 
     def __init__(self, path: Path, name: str, options: Options) -> None:
+        import threading
+
         import numpy as np
 
         from meshsimp_pymoo.formats.source.heights import check_window, steps_of
