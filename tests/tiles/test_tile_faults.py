@@ -120,7 +120,7 @@ KILLER = """
 import os, random, shutil, signal, sys, time
 from pathlib import Path
 import matplotlib.backends.backend_agg, matplotlib.figure  # all that a call imports, before it is forked
-import meshsimp_pymoo.cli.simplify, meshsimp_pymoo.report.figures
+import meshsimp_pymoo.cli.searching, meshsimp_pymoo.report.figures
 from meshsimp_pymoo.cli import main
 
 folder, seed, moments, call = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:]
@@ -393,7 +393,7 @@ def test_a_damaged_record_of_what_the_tiles_belong_to_is_named(path, whole, tmp_
 LIMITED = """
 import resource, sys
 from pathlib import Path
-import meshsimp_pymoo.cli.simplify
+import meshsimp_pymoo.cli.searching
 from meshsimp_pymoo.cli import main
 used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 limit = used + (int(sys.argv[1]) << 20)
