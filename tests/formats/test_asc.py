@@ -11,6 +11,7 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
 
 ASC = "ncols 4\nnrows 3\nxllcorner 100.5\nyllcorner 200\ncellsize 10\nNODATA_value -1\n"
+ASC += "0 1 2 3\n4 5 6 7\n8 9 10 {}\n"
 
 
 def test_an_esri_grid_lies_where_its_header_says(tmp_path):

@@ -101,12 +101,12 @@ def test_missing_samples_are_no_vertices_whichever_way_the_file_says_it(tiff, dt
     lowest = np.finfo(dtype).min if heights.dtype.kind == "f" else np.iinfo(dtype).max
     marked = np.where(gap, np.array(lowest, dtype), heights)
     expected = np.flatnonzero(~gap)
-    assert_array_equal(read_source(tiff(marked, Options(nodata=lowest))).rows, expected)
+    assert_array_equal(read_source(tiff(marked, nodata=lowest)).rows, expected)
     assert_array_equal(read_source(tiff(marked), Options(nodata=float(lowest))).rows, expected)
     assert_array_equal(read_source(tiff(heights, mask=~gap)).rows, expected)
     if heights.dtype.kind == "f":
         without = np.where(gap, np.nan, heights).astype(dtype)
-        assert_array_equal(read_source(tiff(without, Options(nodata=np.nan))).rows, expected)
+        assert_array_equal(read_source(tiff(without, nodata=np.nan)).rows, expected)
 
 
 def test_a_gap_stays_open_in_the_simplified_mesh(tiff):
@@ -123,7 +123,7 @@ def test_a_gap_stays_open_in_the_simplified_mesh(tiff):
 
 def test_scale_and_offset_of_the_band_are_applied_after_nodata(tiff):
     heights = np.arange(1, 13, dtype=np.int16).reshape(3, 4)
-    source = read_source(tiff(heights, Options(nodata=5, after={"scales": [0.1], "offsets": [100.0]})))
+    source = read_source(tiff(heights, nodata=5, after={"scales": [0.1], "offsets": [100.0]}))
     assert len(source.points) == 11
     assert_allclose(source.points[:4, 2], [100.1, 100.2, 100.3, 100.4])
 
@@ -176,7 +176,7 @@ def test_rasters_that_are_no_heights_are_refused(tiff):
     with pytest.raises(ModelError, match="type complex64"):
         read_source(tiff(np.zeros((5, 5), np.complex64)))
     with pytest.raises(ModelError, match="no cell has three"):
-        read_source(tiff(np.full((5, 5), -1.0, np.float32), Options(nodata=-1)))
+        read_source(tiff(np.full((5, 5), -1.0, np.float32), nodata=-1))
 
 
 def dimensions_changed(content, width, height):

@@ -13,7 +13,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.storage import mesh_arrays, read_front, write_front
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 
 UTM = np.array([500_000.25, 5_400_000.5, 300.125])
@@ -59,6 +59,7 @@ def test_landxml_is_a_tin_of_northing_easting_and_elevation_in_double_precision(
 def test_landxml_is_refused_where_the_height_is_not_z(tmp_path):
     roof = load("roof:5")
     model = build_model(SourceMesh(roof.points[:, [2, 0, 1]], roof.faces, {}, "turned"), up="x")
-    kept = np.ones((1, model.n_vertices), dtype=bool)
+    surface, kept = HeightSurface(model), np.ones((1, model.n_vertices), dtype=bool)
+    quality = [surface.simplify(kept[0]).quality]
     with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .* do not look up"):
-        write_front(tmp_path / "out", model, [simplify(model, kept[0]).quality], kept, meshes=0, mesh_format="landxml")
+        write_front(tmp_path / "out", surface, quality, kept, meshes=0, mesh_format="landxml")

@@ -122,7 +122,7 @@ assert (read_source("knee.toy").points == chosen.points).all()
 assert main(["pick", "out", "--solution", "0", "-o", "first.ply", "--quiet"]) == 0
 assert main(["simplify", "grid.npy", "--tile", "64", "-o", "tiled", "--format", "toy", "--quiet"]) == 0
 assert len(list(Path("tiled/meshes").glob("*.toy"))) > 0
-for argv, said in ((["--help"], ".toy"), (["simplify", "--help"], "toy"), (["pick", "--help"], ".toy")):
+for argv, said in ((["simplify", "--help"], ".toy"), (["pick", "--help"], ".toy")):
     with contextlib.redirect_stdout(io.StringIO()) as shown, contextlib.suppress(SystemExit):
         main(argv)
     assert said in shown.getvalue(), argv
@@ -161,8 +161,10 @@ for sort in ("mesh", "grid", "cloud"):
 assert written_suffixes()
 heavy = {"numpy", "numba", "trimesh", "scipy", "rasterio", "laspy"} & set(sys.modules)
 assert not heavy, heavy
-from meshsimp_pymoo.cli.arguments import make_parser
-make_parser().format_help()
+from contextlib import suppress
+from meshsimp_pymoo.cli import main
+with suppress(SystemExit):
+    main(["simplify", "--help"])
 assert "numpy" not in sys.modules
 """
 
