@@ -201,16 +201,16 @@ def good_front() -> tuple[tuple[str, bytes], ...]:
 
     from meshsimp_pymoo.opening import open_model
     from meshsimp_pymoo.storage import write_front
-    from meshsimp_pymoo.surface.evaluate import simplify
+    from meshsimp_pymoo.surface.height import HeightSurface
 
-    model = open_model("roof:5")
-    kept = np.random.default_rng(1).random((3, model.n_vertices)) < 0.5
-    kept[:, model.corners] = True
-    found = [simplify(model, row) for row in kept]
+    surface = HeightSurface(open_model("roof:5"))
+    kept = np.random.default_rng(1).random((3, surface.n_vertices)) < 0.5
+    kept |= surface.pinned
+    found = [surface.simplify(row) for row in kept]
     with tempfile.TemporaryDirectory() as scratch:
         folder = write_front(
             Path(scratch) / "out",
-            model,
+            surface,
             [s.quality for s in found],
             kept,
             faces=lambda row: found[row].faces,

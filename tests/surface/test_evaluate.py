@@ -427,5 +427,3 @@ def test_subsets_that_are_not_bool_are_refused(dtype):
         surface(plane).evaluate(np.ones((2, 25), dtype))
     with pytest.raises(TypeError, match="bool array"):
         surface(plane).simplify(np.ones(25, dtype))
-
-

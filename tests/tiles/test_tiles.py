@@ -14,7 +14,7 @@ from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import thinning
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED, CoarseGrid, move
 from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_front
@@ -110,7 +110,7 @@ def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
 def test_a_welded_mesh_is_the_triangulation_of_the_whole_with_its_error(share, seed):
     samples = subset(SMALL_GRID, share, seed)
     mesh = weld(SMALL_GRID, samples)
-    whole = simplify(SMALL, as_chromosome(SMALL_GRID, samples))
+    whole = HeightSurface(SMALL).simplify(as_chromosome(SMALL_GRID, samples))
     assert np.array_equal(SMALL_GRID.row_of[mesh.samples][mesh.faces], whole.faces)
     quality = measure(SMALL_GRID, mesh, n_threads=1 + seed % 3)
     for name in ("error", "triangles", "vertices", "mean_error", "rms_error", "max_error"):
@@ -176,7 +176,7 @@ def test_what_tiles_remove_changes_the_error_of_the_whole_by_what_they_say(share
     assert len(np.unique(removed)) == len(removed)
     assert np.isin(removed, kept).all()
     rest = np.setdiff1d(kept, removed)
-    table = evaluate_subsets(MODEL, np.array([as_chromosome(GRID, kept), as_chromosome(GRID, rest)]))
+    table = HeightSurface(MODEL).evaluate(np.array([as_chromosome(GRID, kept), as_chromosome(GRID, rest)]))
     assert table[1, 0] - table[0, 0] == pytest.approx(change, rel=1e-6, abs=1e-6 * table[1, 0])
     if share >= 0.2 and limit == np.inf:
         assert len(removed) > 0.4 * share * GRID.shape[1] * (high - low)
@@ -194,7 +194,7 @@ def test_all_samples_as_sites_are_the_same_tile_as_no_sites_given():
 def test_the_only_tile_of_a_grid_is_thinned_as_the_whole():
     work = _Work(SMALL_GRID, 512, Serial(), Memory(), lambda *_: None)
     gone, _ = thin_tile(work.task((0, SMALL_GRID.shape[0] - 1, 0, SMALL_GRID.shape[1] - 1), 1, np.inf, None))
-    assert SMALL_GRID.row_of[gone].tolist() == thinning(SMALL).order[::-1].tolist()
+    assert SMALL_GRID.row_of[gone].tolist() == thinning(HeightSurface(SMALL)).order[::-1].tolist()
 
 
 @given(st.lists(st.floats(-5, 5), min_size=1, max_size=30), st.floats(-6, 6))
@@ -220,7 +220,7 @@ def test_every_solution_but_the_smallest_is_a_subset_of_the_finer_one_and_all_ha
         if front.moved[row] is None:
             assert np.isin(front.kept(row), front.kept(row - 1)).all() or triangles[row] == 2
     rows = range(0, len(front), 5)
-    table = evaluate_subsets(MODEL, np.array([as_chromosome(GRID, front.kept(row)) for row in rows]))
+    table = HeightSurface(MODEL).evaluate(np.array([as_chromosome(GRID, front.kept(row)) for row in rows]))
     for row, found in zip(rows, table, strict=True):
         assert found[0] == pytest.approx(front.quality[row].error, rel=1e-9)
         assert found[1] == front.quality[row].triangles
@@ -229,7 +229,7 @@ def test_every_solution_but_the_smallest_is_a_subset_of_the_finer_one_and_all_ha
 def test_tiles_lose_at_most_three_percent_against_thinning_in_one_piece():
     """Below some hundred triangles, where thinning is a matter of luck, moved vertices are better by far."""
     model = build_model(load("jacksboro:2"))
-    front, whole = tiled_front(open_grid(model), tile=64), thinning(model)
+    front, whole = tiled_front(open_grid(model), tile=64), thinning(HeightSurface(model))
     excess = front.F[:, 0] / np.interp(front.F[:, 1], whole.triangles, whole.error) - 1
     assert excess.max() < 0.03
     assert excess[(front.F[:, 1] > 2) & (front.F[:, 1] <= SEARCHED)].mean() < -0.05
@@ -247,7 +247,7 @@ def test_any_size_can_be_taken_out_of_the_front(front, wanted):
     again, same_row = more.with_triangles(wanted)
     assert (again is more, same_row) == (True, row)
     kept = as_chromosome(GRID, more.kept(row))
-    assert evaluate_subsets(MODEL, kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
+    assert HeightSurface(MODEL).evaluate(kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
 
 
 def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size(front):
@@ -260,7 +260,7 @@ def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size
     assert np.array_equal(move(task), rows)
     moved = weld(GRID, coarse.samples[rows])
     assert 198 <= moved.n_triangles <= 200
-    whole = thinning(MODEL)
+    whole = thinning(HeightSurface(MODEL))
     assert measure(GRID, moved).error < 0.97 * np.interp(200, whole.triangles, whole.error)
 
 
@@ -274,7 +274,7 @@ def test_a_front_that_begins_with_small_meshes_is_thinned_from_finer_ones(front)
     small = tiled_front(GRID, tile=64, most=300)
     assert 200 < small.quality[0].triangles <= 340
     assert small.quality[0].triangles == pytest.approx(2 * len(small.samples), rel=0.2)
-    whole = thinning(MODEL)
+    whole = thinning(HeightSurface(MODEL))
     assert small.quality[0].error < 1.03 * np.interp(small.quality[0].triangles, whole.triangles, whole.error)
 
 

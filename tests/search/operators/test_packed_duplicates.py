@@ -10,7 +10,7 @@ from pymoo.core.duplicate import DefaultDuplicateElimination
 from pymoo.core.population import Population
 
 from meshsimp_pymoo.search.operators import PackedDuplicates
-from meshsimp_pymoo.search.operators import duplicates as module
+from meshsimp_pymoo.search.operators import packed_duplicates as module
 
 
 def random_population(rng: np.random.Generator, n: int, n_var: int) -> Population:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,56 +9,15 @@ import pytest
 from numpy.testing import assert_array_equal
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.population import Population
-from stand_in_problem import GridProblem
+from stand_in_problem import GridProblem, call, evaluated_pairs, opposite_pairs
 
-from meshsimp_pymoo import MeshProblem, thinning
-from meshsimp_pymoo.search.operators import OAX, RegionCrossover, SubsetUniformCrossover
-from meshsimp_pymoo.search.operators.crossover import (
-    ORTHOGONAL_ARRAYS,
-    cheaper_parent,
-    child_levels,
-    first_objective,
-    orthogonal_array,
-    price_of_a_triangle,
-    random_cuts,
-    region_starts,
-)
+from meshsimp_pymoo.search.operators import OAX
+from meshsimp_pymoo.search.operators.oax import ORTHOGONAL_ARRAYS, child_levels, first_objective, orthogonal_array
+from meshsimp_pymoo.search.operators.segments import random_cuts
 
 # As printed in the public code of Ho's group.
 L4 = ["000", "011", "101", "110"]
 L8 = ["0000000", "0001111", "0110011", "0111100", "1010101", "1011010", "1100110", "1101001"]
-
-
-def evaluated_pairs(problem: GridProblem, n_matings: int, seed: int, equal_genes: float = 0.0) -> Population:
-    """Evaluated random pairs; a share of the genes is the same in both parents of a pair."""
-    rng = np.random.default_rng(seed)
-    parents = rng.random((n_matings, 2, problem.n_var)) < 0.5
-    same = rng.random((n_matings, problem.n_var)) < equal_genes
-    parents[:, 1][same] = parents[:, 0][same]
-    parents |= problem.pinned
-    pop = Population.new("X", parents.reshape(-1, problem.n_var))
-    return Evaluator().eval(problem, pop).reshape(n_matings, 2)
-
-
-def opposite_pairs(problem: GridProblem, n_matings: int, seed: int) -> Population:
-    """Evaluated pairs that differ in every gene, nothing being pinned: no segment on which they agree."""
-    problem.pinned = np.zeros(problem.n_var, dtype=bool)
-    first = np.random.default_rng(seed).random((n_matings, problem.n_var)) < 0.5
-    pop = Population.new("X", np.stack([first, ~first], axis=1).reshape(-1, problem.n_var))
-    return Evaluator().eval(problem, pop).reshape(n_matings, 2)
-
-
-def call(
-    crossover: Any, problem: GridProblem, pairs: Any, seed: int, **algorithm: Any
-) -> tuple[np.ndarray, int]:
-    """Children (n_offsprings, n_matings, N) and the number of evaluations that were counted."""
-    caller = SimpleNamespace(
-        **({"evaluator": Evaluator(), "data": {}, "n_iter": 2, "archive": None} | algorithm)
-    )
-    before, calls = caller.evaluator.n_eval, problem.calls
-    children = crossover(problem, pairs, random_state=np.random.default_rng(seed), algorithm=caller).get("X")
-    assert caller.evaluator.n_eval - before == problem.calls - calls
-    return children.reshape(crossover.n_offsprings, len(pairs), -1), problem.calls - calls
 
 
 @pytest.mark.parametrize(("name", "n_factors"), sorted(ORTHOGONAL_ARRAYS.items()))
@@ -76,17 +34,6 @@ def test_arrays_are_orthogonal(name: str, n_factors: int) -> None:
 @pytest.mark.parametrize("rows", [L4, L8])
 def test_arrays_are_those_of_the_public_code(rows: list[str]) -> None:
     assert ["".join(str(int(b)) for b in row) for row in orthogonal_array(len(rows[0]))] == rows
-
-
-def test_cuts_leave_no_segment_empty_and_are_uniform() -> None:
-    rng = np.random.default_rng(0)
-    cuts = np.array([random_cuts(6, 3, rng) for _ in range(5000)])
-    assert np.all(np.diff(cuts, axis=1) > 0)
-    assert np.all((cuts[:, 0] == 0) & (cuts[:, -1] == 6))
-    counts = np.unique(cuts, axis=0, return_counts=True)[1]
-    assert len(counts) == 10  # 5 over 2
-    assert abs(counts - 500).max() < 4.5 * np.sqrt(500)
-    assert_array_equal(random_cuts(3, 3, rng), [0, 1, 2, 3])
 
 
 def slow_twin(
@@ -315,125 +262,3 @@ def test_impossible_arguments_are_refused_with_their_value() -> None:
     problem = GridProblem(3)
     with pytest.raises(ValueError, match="15 segments, but the model has only 9 vertices"):
         call(OAX("L16", prob=1.0), problem, evaluated_pairs(problem, 2, seed=1), seed=1)
-
-
-def test_uniform_crossover_exchanges_half_of_the_genes_and_loses_none() -> None:
-    problem = GridProblem(20)
-    pairs = evaluated_pairs(problem, 100, seed=1)
-    children, n_eval = call(SubsetUniformCrossover(1.0), problem, pairs, seed=2)
-    first, second = (np.array([pair[i].X for pair in pairs]) for i in (0, 1))
-    assert n_eval == 0
-    assert_array_equal(children[0] ^ children[1], first ^ second)
-    assert_array_equal(children.sum(axis=0), first.astype(int) + second)
-    differ = first ^ second
-    exchanged = (children[0] != first)[differ].mean()
-    assert abs(exchanged - 0.5) < 4 * np.sqrt(0.25 / differ.sum())
-    per_gene = ((children[0] != first) & differ).sum(axis=0)[~problem.pinned] / differ.sum(axis=0)[
-        ~problem.pinned
-    ]
-    assert abs(per_gene - 0.5).max() < 4.5 * np.sqrt(0.25 / 35)
-
-
-def test_with_one_child_it_is_the_first_of_the_two() -> None:
-    problem = GridProblem(8)
-    pairs = evaluated_pairs(problem, 10, seed=1)
-    for operator in (OAX, SubsetUniformCrossover):
-        two, _ = call(operator(prob=1.0), problem, pairs, seed=2)
-        one, _ = call(operator(prob=1.0, n_offsprings=1), problem, pairs, seed=2)
-        assert_array_equal(one[0], two[0])
-
-
-# regions ----------------------------------------------------------------------------------------
-
-
-def region_pairs(problem: MeshProblem, X: np.ndarray) -> Population:
-    """Evaluated pairs (n_matings, 2) of chromosomes (n_matings, 2, N)."""
-    pop = Evaluator().eval(problem, Population.new("X", X.reshape(-1, problem.n_var)))
-    return pop.reshape(-1, 2)
-
-
-@pytest.mark.parametrize(("footprint", "outside"), [("model", "nearest"), ("hull", "ignore")])
-def test_errors_by_region_are_those_of_the_vertices_in_it(footprint: str, outside: str) -> None:
-    problem = MeshProblem("ring:300", footprint=footprint, outside=outside, regions=7)
-    X = (np.random.default_rng(1).random((20, problem.n_var)) < 0.1) | problem.pinned
-    found = Evaluator().eval(problem, Population.new("X", X)).get("region_error")
-    region = np.arange(problem.n_var) * 7 // problem.n_var
-    assert_array_equal(np.flatnonzero(np.diff(region, prepend=-1)), region_starts(7, problem.n_var))
-    for kept, errors in zip(X, found, strict=True):
-        deviation = problem.simplify(kept).deviation
-        np.testing.assert_allclose(errors, np.bincount(region, deviation, minlength=7), rtol=1e-12, atol=1e-12)
-
-
-def test_a_child_takes_each_half_from_the_parent_that_is_good_there() -> None:
-    problem = MeshProblem("peaks:21", regions=2)
-    half = np.arange(problem.n_var) * 2 // problem.n_var == 0
-    rng = np.random.default_rng(3)
-    good = thinning(problem.model).kept(40)
-    poor = problem.pinned.copy()
-    for side in (half, ~half):
-        rows = np.flatnonzero(side & ~problem.pinned)
-        poor[rng.choice(rows, (good & side & ~problem.pinned).sum(), replace=False)] = True
-    parents = np.array([[np.where(half, good, poor), np.where(half, poor, good)]])
-    pairs = region_pairs(problem, parents)
-    children = RegionCrossover(prob=1.0)(problem, pairs, random_state=rng).get("X")
-    assert_array_equal(children, [good, good])
-    assert problem.evaluate(good)[0] < 0.7 * min(parent.F[0] for parent in pairs[0])
-
-
-def test_at_the_price_of_the_parents_no_region_is_taken_that_costs_more_than_the_other_parents() -> None:
-    rng = np.random.default_rng(4)
-    for _ in range(50):
-        excess = rng.normal(size=6)
-        differs = rng.random(6) < 0.8
-        second = cheaper_parent(excess, differs)
-        wrong = second != (excess > 0)
-        assert wrong.sum() <= 1
-        if differs.sum() > 1:
-            assert 0 < second[differs].sum() < differs.sum()
-        if wrong.any():
-            assert np.abs(excess[wrong]) == np.abs(excess[differs]).min()
-
-
-def test_a_triangle_is_worth_the_slope_between_parents_whose_error_falls_with_their_size() -> None:
-    triangles = np.array([20, 50])
-    error = 300.0 / triangles
-    slope = -np.diff(error)[0] / np.diff(triangles)[0]
-    assert price_of_a_triangle(error, triangles) == pytest.approx(slope)
-    assert price_of_a_triangle(np.array([1.0, 1.0]), np.array([0, 4])) == 0.5
-
-
-def test_region_crossover_evaluates_nothing() -> None:
-    problem = MeshProblem("peaks:12", regions=16, memo=0)
-    X = (np.random.default_rng(2).random((4, 2, problem.n_var)) < 0.3) | problem.pinned
-    pairs = region_pairs(problem, X)
-    problem.evaluate_subsets = None  # type: ignore[assignment, method-assign]
-    children = RegionCrossover(prob=1.0)(problem, pairs, random_state=np.random.default_rng(0))
-    assert len(children) == 8
-
-
-def test_without_known_errors_the_message_says_how_to_get_them() -> None:
-    X = (np.random.default_rng(2).random((1, 2, 144)) < 0.5)
-    without = MeshProblem("peaks:12")
-    with pytest.raises(ValueError, match=r"make it with MeshProblem\(\.\.\., regions=256\)"):
-        RegionCrossover(prob=1.0)(without, region_pairs(without, X), random_state=np.random.default_rng(0))
-    other = MeshProblem("peaks:12", regions=5)
-    with pytest.raises(ValueError, match=r"in 5 regions; this one has none"):
-        RegionCrossover(prob=1.0)(other, region_pairs(without, X), random_state=np.random.default_rng(0))
-    with pytest.raises(ValueError, match=r"regions=5000 is no number of regions; give 0 to 4096"):
-        MeshProblem("peaks:12", regions=5000)
-
-
-def test_region_crossover_finds_better_children_than_exchanging_at_random() -> None:
-    """On the same parents, at equal numbers of triangles or fewer; measured by the sum of both objectives, scaled."""
-    problem = MeshProblem("peaks:31", regions=64)
-    rng = np.random.default_rng(5)
-    X = (rng.random((40, 2, problem.n_var)) < rng.uniform(0.05, 0.3, (40, 2, 1))) | problem.pinned
-    pairs = region_pairs(problem, X)
-    means = []
-    for crossover in (RegionCrossover(prob=1.0), SubsetUniformCrossover(prob=1.0)):
-        F = problem.evaluate(crossover(problem, pairs, random_state=np.random.default_rng(6)).get("X"))
-        parents = np.array([[p.F for p in pair] for pair in pairs])
-        price = np.abs(np.diff(parents[:, :, 0])[:, 0] / np.diff(parents[:, :, 1])[:, 0])
-        cost = (F[:, 0] + np.tile(price, 2) * F[:, 1]) / np.tile((parents @ [1.0, 0.0]).mean(axis=1), 2)
-        means.append(np.median(cost))
-    assert means[0] < 0.97 * means[1]

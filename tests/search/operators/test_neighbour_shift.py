@@ -12,17 +12,16 @@ from numpy.testing import assert_array_equal
 from pymoo.core.population import Population
 from stand_in_problem import GridProblem
 
-from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.search.operators import NeighbourShift, Relocation, SizeStep
-from meshsimp_pymoo.search.operators import mutation as module
-from meshsimp_pymoo.search.operators.mutation import bernoulli_positions
+from meshsimp_pymoo.search.operators import NeighbourShift
+from meshsimp_pymoo.search.operators import neighbour_shift as module
+from meshsimp_pymoo.search.operators.neighbour_shift import bernoulli_positions
 
 
 def mutate(kept: str, *, pinned: str = "", along: str = "vector", seed: int = 0, rings: object = None) -> str:
     """Mutate one chromosome written as 0s and 1s, every vertex trying to move."""
     X = np.array([[gene == "1" for gene in kept]])
     pins = np.array([gene == "1" for gene in pinned]) if pinned else np.zeros(X.shape[1], dtype=bool)
-    problem = SimpleNamespace(pinned=pins, n_var=X.shape[1], model=SimpleNamespace(neighbours=rings))
+    problem = SimpleNamespace(pinned=pins, n_var=X.shape[1], surface=SimpleNamespace(neighbours=rings))
     operator = NeighbourShift(1.0, along=along)
     mutated = operator._do(problem, X, random_state=np.random.default_rng(seed))
     return "".join(str(int(gene)) for gene in mutated[0])
@@ -157,58 +156,5 @@ def test_impossible_arguments_are_refused_with_their_value() -> None:
 def test_along_the_mesh_a_problem_without_one_rings_is_refused() -> None:
     problem = SimpleNamespace(pinned=np.zeros(4, dtype=bool), n_var=4)
     X = np.ones((1, 4), dtype=bool)
-    with pytest.raises(TypeError, match=r"reads problem\.model\.neighbours"):
+    with pytest.raises(TypeError, match=r"reads problem\.surface"):
         NeighbourShift(along="mesh")._do(problem, X, random_state=np.random.default_rng(0))
-
-
-# size steps --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("step", [0.02, 0.3])
-def test_a_size_step_stays_within_its_bounds_and_goes_both_ways(step: float) -> None:
-    problem = MeshProblem("peaks:21")
-    X = (np.random.default_rng(1).random((60, problem.n_var)) < 0.3) | problem.pinned
-    changed = SizeStep(step)._do(problem, X, random_state=np.random.default_rng(2))
-    before, after = ((rows & ~problem.pinned).sum(axis=1) for rows in (X, changed))
-    assert (after <= np.round(before * (1 + step)) + 1).all()
-    assert (after >= np.round(before / (1 + step)) - 1).all()
-    assert (after != before).all()
-    assert 15 < (after > before).sum() < 45
-
-
-def test_a_size_step_takes_better_vertices_than_chance() -> None:
-    problem = MeshProblem("peaks:21")
-    rng = np.random.default_rng(3)
-    X = (rng.random((40, problem.n_var)) < 0.2) | problem.pinned
-    changed = SizeStep(0.3)._do(problem, X, random_state=rng)
-    more = changed.sum(axis=1) > X.sum(axis=1)
-    drawn = X.copy()
-    for row, size in zip(drawn, changed.sum(axis=1), strict=True):
-        missing = size - row.sum()
-        rows = np.flatnonzero(~row) if missing > 0 else np.flatnonzero(row & ~problem.pinned)
-        row[rng.choice(rows, abs(missing), replace=False)] = missing > 0
-    ours, chance = (problem.evaluate(rows)[:, 0] for rows in (changed, drawn))
-    assert (ours[more] < chance[more]).mean() > 0.9
-    assert (ours[~more] < chance[~more]).mean() > 0.9
-
-
-def test_a_size_step_at_either_end_stays_there_or_comes_back() -> None:
-    problem = MeshProblem("peaks:6")
-    ends = np.array([problem.pinned, np.ones(problem.n_var, bool)] * 5)
-    sizes = SizeStep(0.1)._do(problem, ends, random_state=np.random.default_rng(4)).sum(axis=1)
-    assert set(sizes[::2]) <= {4, 5}
-    assert set(sizes[1::2]) <= {32, 33, 34, 35, 36}
-
-
-def test_an_impossible_step_is_refused_with_its_value() -> None:
-    with pytest.raises(ValueError, match=r"step = -0\.1 is no number"):
-        SizeStep(-0.1)
-
-
-@pytest.mark.parametrize("mutation", [Relocation, SizeStep])
-def test_what_lowers_sums_refuses_the_maximum_and_impossible_probabilities(mutation: type) -> None:
-    with pytest.raises(ValueError, match=r"prob = 1\.2 is not a probability"):
-        mutation(prob=1.2)
-    problem = MeshProblem("peaks:6", objectives=("max_error", "triangles"))
-    with pytest.raises(ValueError, match=r"the first objective is the maximum, 'max_error'; use objectives="):
-        mutation()._do(problem, np.ones((2, problem.n_var), bool), random_state=np.random.default_rng(1))
