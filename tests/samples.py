@@ -8,12 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.opening import Source, open_model
 from meshsimp_pymoo.storage import write_front
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Simplified
+
+
+def surface(model: Source | OpenModel, *, up: Any = "auto", **rules: Any) -> HeightSurface:
+    """Return the height surface of a built-in name, a mesh or a model, with these rules."""
+    return HeightSurface(open_model(model, Options(up=up)), Rules(**rules))
 
 
 def holey_grid() -> SourceMesh:
@@ -61,3 +70,11 @@ def coloured(source: SourceMesh) -> SourceMesh:
         "seen": rng.random(n) < 0.5,
     }
     return dataclasses.replace(source, attributes=attributes)
+# Models so small that every triangle can look at every vertex: known ridges, holes, bays, and a scan's outline.
+SMALL = {
+    "roof": lambda: load("roof:5"),
+    "holey": holey_grid,
+    "face": lambda: load("face:150"),
+    "ring": lambda: load("ring:120"),
+    "horseshoe": lambda: load("horseshoe:120"),
+}

@@ -25,11 +25,13 @@ from scipy.spatial import Delaunay
 from meshsimp_pymoo import MeshProblem, greedy_insertion, moead, nsga2_v1, nsga2_v2, thinning
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.plane.borrow import borrowed
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets
-from meshsimp_pymoo.surface.live import build, lent_live, make_ground, try_exchange
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.moves import try_exchange
+from meshsimp_pymoo.surface.rules import Rules
 
 ROUNDS = 15
+AS_IN_THE_PAPER = Rules(footprint="hull", outside="ignore")
 CONSOLE = Console(width=110)
 
 
@@ -66,12 +68,12 @@ def evaluations():
         rounds = ROUNDS if model.n_vertices < 50_000 else 3
         batch = max(1, 20_000 // model.n_vertices)
         for share in (0.05, 0.2, 0.5):
-            evaluate_subsets(model, subsets(model, share, 2, 0), footprint="hull", outside="ignore")
+            surface = HeightSurface(model, AS_IN_THE_PAPER)
+            surface.evaluate(subsets(model, share, 2, 0))
             ours, theirs, ratios = [], [], []
             for k in range(rounds):
                 X = subsets(model, share, batch, k)
-                rules = {"footprint": "hull", "outside": "ignore"}
-                mine = seconds(lambda model=model, X=X, rules=rules: evaluate_subsets(model, X, **rules)) / batch
+                mine = seconds(partial(surface.evaluate, X)) / batch
                 reference = seconds(lambda model=model, X=X: by_scipy(model, X[0]))
                 ours.append(mine)
                 theirs.append(reference)
@@ -96,13 +98,12 @@ def concave():
         model = MeshProblem(name).model
         for share in (0.05, 0.2, 0.5):
             X = subsets(model, share, 20, 1)
-            evaluate_subsets(model, X)
+            usual, paper = HeightSurface(model), HeightSurface(model, AS_IN_THE_PAPER)
+            for surface in (usual, paper):
+                surface.evaluate(X)
             ratios = []
             for _ in range(ROUNDS):
-                default = seconds(lambda model=model, X=X: evaluate_subsets(model, X))
-                rules = {"footprint": "hull", "outside": "ignore"}
-                hull = seconds(lambda model=model, X=X, rules=rules: evaluate_subsets(model, X, **rules))
-                ratios.append(default / hull)
+                ratios.append(seconds(partial(usual.evaluate, X)) / seconds(partial(paper.evaluate, X)))
             table.add_row(name, f"{model.n_vertices}", f"{share:.0%}", f"{statistics.median(ratios):.2f}")
     CONSOLE.print(table)
 
@@ -138,13 +139,13 @@ def runs():
 
 
 @njit
-def _try_all(ground, live, old, new):
+def _try_all(ground, books, old, new):
     """Evaluate moves without making them; return how many can be made."""
     ground = borrowed(ground)
-    live = borrowed(live)
+    books = borrowed(books)
     possible = 0
     for k in range(len(old)):
-        change, _ = try_exchange(ground, live, old[k], new[k], np.inf)
+        change, _ = try_exchange(ground, books, old[k], new[k], np.inf)
         possible += change < np.inf
     return possible
 
@@ -155,41 +156,41 @@ def moves():
     table = Table("model", "N", "kept", *columns, title="Tentative operations a second, exact, one core")
     count, nothing = 20_000, -1
     for name in ("jacksboro:12", "jacksboro:4", "jacksboro:1"):
-        model = MeshProblem(name).model
+        surface = MeshProblem(name).surface
         rng = np.random.default_rng(1)
-        nested = thinning(model)
-        kept = nested.kept(round(0.05 * model.n_vertices))
-        ground, live = make_ground(model), lent_live(model.n_vertices)
-        build(ground, live, model, np.flatnonzero(kept))
+        nested = thinning(surface)
+        kept = nested.kept(round(0.05 * surface.n_vertices))
+        ground = surface.ground()
         pinned = nested.kept(0)
         old = rng.choice(np.flatnonzero(kept & ~pinned), count)
         new = rng.choice(np.flatnonzero(~kept), count)
-        indptr, indices = model.neighbours
+        indptr, indices = surface.neighbours
         near = indices[indptr[old] + rng.integers(0, indptr[old + 1] - indptr[old])].astype(np.int64)
         free = ~kept[near]
         none = np.full(count, nothing)
         cells = []
-        for gone, come in ((none, new), (old, none), (old, new), (old[free], near[free])):
-            _try_all(ground, live, gone[:10], come[:10])
-            call = partial(_try_all, ground, live, gone, come)
-            rounds = [seconds(call) / len(gone) for _ in range(5)]
-            cells.append(f"{1 / statistics.median(rounds):,.0f}")
-        table.add_row(name, f"{model.n_vertices}", "5%", *cells)
+        with surface.books(kept) as books:
+            for gone, come in ((none, new), (old, none), (old, new), (old[free], near[free])):
+                _try_all(ground, books, gone[:10], come[:10])
+                call = partial(_try_all, ground, books, gone, come)
+                rounds = [seconds(call) / len(gone) for _ in range(5)]
+                cells.append(f"{1 / statistics.median(rounds):,.0f}")
+        table.add_row(name, f"{surface.n_vertices}", "5%", *cells)
     CONSOLE.print(table)
 
 
 def passes():
     """One pass of thinning and of greedy insertion, all sizes, one core."""
     for run in (thinning, greedy_insertion):
-        run(MeshProblem("jacksboro:12").model)
+        run(MeshProblem("jacksboro:12").surface)
     table = Table("model", "N", "thinning s", "greedy insertion s", title="Greedy passes")
-    for model in (MeshProblem("jacksboro:1").model, million()):
-        model.kernel_arguments  # noqa: B018 - made once a model
+    for surface in (MeshProblem("jacksboro:1").surface, HeightSurface(million())):
+        surface.ground()  # made once a surface
         table.add_row(
-            model.name,
-            f"{model.n_vertices}",
-            f"{seconds(lambda model=model: thinning(model)):.2f}",
-            f"{seconds(lambda model=model: greedy_insertion(model)):.2f}",
+            surface.model.name,
+            f"{surface.n_vertices}",
+            f"{seconds(partial(thinning, surface)):.2f}",
+            f"{seconds(partial(greedy_insertion, surface)):.2f}",
         )
     CONSOLE.print(table)
 

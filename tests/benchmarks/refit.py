@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import time
 import warnings
+from functools import partial
 
 import numpy as np
 from rich.console import Console
@@ -31,10 +32,10 @@ def seconds(call):
     return time.process_time() - start, result
 
 
-def by_highs(model, refitted):
+def by_highs(surface, refitted):
     """Return the least error by linear programming; uncovered vertices are left out, as it can do no distances."""
     faces = np.searchsorted(refitted.rows, refitted.faces)
-    samples = mesh_samples(model, model.points[refitted.rows], faces, outside="ignore", frame="local")
+    samples = mesh_samples(surface.ground(), surface.points[refitted.rows], faces)
     counts = np.flatnonzero(samples.covered)
     n, m = len(counts), len(refitted.rows)
     A = sparse.coo_matrix(
@@ -43,7 +44,7 @@ def by_highs(model, refitted):
     found = linprog(
         np.r_[np.zeros(m), np.ones(2 * n)],
         A_eq=sparse.hstack([A, -sparse.identity(n), sparse.identity(n)]).tocsc(),
-        b_eq=model.points[counts, 2],
+        b_eq=surface.points[counts, 2],
         bounds=[(None, None)] * m + [(0, None)] * (2 * n),
         method="highs-ipm",
     )
@@ -61,15 +62,15 @@ def main() -> None:
     columns = ("model", "N", "kept", "after / before", "proved gap", "true gap", "seconds", "HiGHS s")
     table = Table(*columns, title="Refitted heights of thinned meshes")
     for name in MODELS:
-        model = MeshProblem(name).model
-        front = thinning(model)
+        surface = MeshProblem(name, outside="ignore").surface
+        front = thinning(MeshProblem(name).surface)
         for share in SHARES:
-            kept = front.kept(max(int(share * model.n_vertices) - len(front.base), 3))
-            took, refitted = seconds(lambda model=model, kept=kept: refit_heights(model, kept, outside="ignore"))
-            row = [name, f"{model.n_vertices}", f"{share:.0%}", f"{refitted.error / refitted.before:.4f}"]
+            kept = front.kept(max(int(share * surface.n_vertices) - len(front.base), 3))
+            took, refitted = seconds(partial(refit_heights, surface, kept))
+            row = [name, f"{surface.n_vertices}", f"{share:.0%}", f"{refitted.error / refitted.before:.4f}"]
             row += [f"{1 - refitted.bound / refitted.error:.1e}"]
-            if model.n_vertices <= largest:
-                theirs, least = seconds(lambda model=model, refitted=refitted: by_highs(model, refitted))
+            if surface.n_vertices <= largest:
+                theirs, least = seconds(partial(by_highs, surface, refitted))
                 row += [f"{refitted.error / least - 1:.1e}", f"{took:.3f}", f"{theirs:.2f}"]
             else:
                 row += ["", f"{took:.3f}", ""]

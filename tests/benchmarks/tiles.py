@@ -28,6 +28,7 @@ from rich.table import Table
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.search.greedy import thinning
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED
 from meshsimp_pymoo.tiles.front import tiled_front
@@ -154,7 +155,7 @@ def big(side, tile, jobs, folder):
 def against(name, tiles):
     """Compare with thinning in one piece, at equal triangles."""
     model = build_model(load(name))
-    whole = thinning(model)
+    whole = thinning(HeightSurface(model))
     table = Table("tile", "solutions", "triangles", "worst above 300", "worst up to 300", "mean", "seconds")
     for tile in tiles:
         start = time.perf_counter()

@@ -204,7 +204,8 @@ def good_front() -> tuple[tuple[str, bytes], ...]:
     from meshsimp_pymoo.surface.height import HeightSurface
 
     surface = HeightSurface(open_model("roof:5"))
-    kept = (np.random.default_rng(1).random((3, surface.n_vertices)) < 0.5) | surface.pinned
+    kept = np.random.default_rng(1).random((3, surface.n_vertices)) < 0.5
+    kept |= surface.pinned
     found = [surface.simplify(row) for row in kept]
     with tempfile.TemporaryDirectory() as scratch:
         folder = write_front(

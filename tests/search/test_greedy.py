@@ -2,18 +2,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from samples import surface
 
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.surface.score import mesh_deviation
 
 METHODS = {
     "thinning": thinning,
     "worst point": greedy_insertion,
-    "worst triangle": lambda model, *a, **k: greedy_insertion(model, *a, choose="triangle", **k),
+    "worst triangle": lambda surface, *a, **k: greedy_insertion(surface, *a, choose="triangle", **k),
 }
 
 
@@ -25,9 +24,9 @@ def corners_of(model):
 @pytest.mark.parametrize("name", ["jacksboro:30", "face:200", "horseshoe:150", "pyramid:9"])
 def test_every_subset_has_the_error_and_the_triangles_that_are_said(method, name):
     model = open_model(name)
-    front = METHODS[method](model)
+    front = METHODS[method](surface(model))
     rows = np.unique(np.linspace(0, len(front) - 1, 25).astype(int))
-    table = evaluate_subsets(model, np.array([front.kept(k) for k in rows]))
+    table = surface(model).evaluate(np.array([front.kept(k) for k in rows]))
     np.testing.assert_array_equal(table[:, 1], front.triangles[rows])
     np.testing.assert_allclose(table[:, 0], front.error[rows], rtol=1e-9, atol=1e-9 * model.diagonal)
     assert front.kept(0)[model.corners].all()
@@ -45,12 +44,12 @@ def test_thinning_equals_its_slow_twin():
         rows = np.flatnonzero(kept & ~pinned)
         X = np.tile(kept, (len(rows), 1))
         X[np.arange(len(rows)), rows] = False
-        now = evaluate_subsets(model, kept)[0, 0]
-        added = np.round(evaluate_subsets(model, X)[:, 0] - now, 9)
+        now = surface(model).evaluate(kept)[0, 0]
+        added = np.round(surface(model).evaluate(X)[:, 0] - now, 9)
         best = rows[np.argmin(added)]
         kept[best] = False
         order.append(best)
-    assert thinning(model).order[::-1].tolist() == order
+    assert thinning(surface(model)).order[::-1].tolist() == order
 
 
 def test_worst_point_insertion_equals_its_slow_twin():
@@ -58,17 +57,17 @@ def test_worst_point_insertion_equals_its_slow_twin():
     kept = corners_of(model)
     order = []
     while len(order) < 40:
-        deviation = simplify(model, kept).deviation.copy()
+        deviation = surface(model).simplify(kept).deviation.copy()
         deviation[kept] = -1
         best = int(np.argmax(deviation))
         kept[best] = True
         order.append(best)
-    assert greedy_insertion(model, most=40).order.tolist() == order
+    assert greedy_insertion(surface(model), most=40).order.tolist() == order
 
 
 def test_thinning_beats_insertion_on_a_terrain():
     model = open_model("jacksboro:20")
-    thin, grow = thinning(model), greedy_insertion(model)
+    thin, grow = thinning(surface(model)), greedy_insertion(surface(model))
     for triangles in (50, 100, 200):
         assert thin.error[thin.triangles <= triangles].min() < grow.error[grow.triangles <= triangles].min()
 
@@ -78,30 +77,30 @@ def test_pinned_vertices_are_in_every_subset(method):
     model = open_model("face:150")
     pinned = corners_of(model)
     pinned[[3, 70, 99]] = True
-    front = METHODS[method](model, pinned)
+    front = METHODS[method](surface(model), pinned)
     assert front.kept(0)[pinned].all()
     np.testing.assert_array_equal(front.base, np.flatnonzero(pinned))
 
 
 def test_insertion_stops_where_the_error_is_zero():
     roof = open_model("roof:9")
-    front = greedy_insertion(roof)
+    front = greedy_insertion(surface(roof))
     assert front.error[-1] == 0
     assert front.triangles[-1] <= 8
-    assert len(greedy_insertion(roof, most=1)) == 2
+    assert len(greedy_insertion(surface(roof), most=1)) == 2
 
 
 def test_other_starts_and_wrong_arguments():
     model = open_model("face:150")
     some = np.random.default_rng(0).random(150) < 0.5
-    front = thinning(model, kept=some)
+    front = thinning(surface(model), kept=some)
     np.testing.assert_array_equal(front.kept(len(front) - 1), some | corners_of(model))
     with pytest.raises(ValueError, match="choose='line' is unknown"):
-        greedy_insertion(model, choose="line")
+        greedy_insertion(surface(model), choose="line")
     with pytest.raises(ValueError, match="the subsets 0 to"):
         front.kept(len(front))
-    deviation, _, _ = mesh_deviation(model, model.file_points, simplify(model, front.kept(5)).faces)
-    assert front.error[5] == pytest.approx(deviation.sum())
+    scored = surface(model).score(model.file_points, surface(model).simplify(front.kept(5)).faces)
+    assert front.error[5] == pytest.approx(scored.deviation.sum())
 
 
 def test_insertion_leaves_out_vertices_whose_position_is_taken():
@@ -109,8 +108,8 @@ def test_insertion_leaves_out_vertices_whose_position_is_taken():
     source = SourceMesh(np.array(points), np.array([[0, 1, 4], [1, 2, 5], [2, 3, 4], [3, 0, 6]]), {}, "step")
     model = build_model(source, up="z")
     for method in METHODS.values():
-        front = method(model)
-        table = evaluate_subsets(model, np.array([front.kept(k) for k in range(len(front))]))
+        front = method(surface(model))
+        table = surface(model).evaluate(np.array([front.kept(k) for k in range(len(front))]))
         np.testing.assert_allclose(table[:, 0], front.error)
         np.testing.assert_array_equal(table[:, 1], front.triangles)
 
@@ -118,6 +117,6 @@ def test_insertion_leaves_out_vertices_whose_position_is_taken():
 def test_pins_and_counts_that_are_none_are_refused():
     model = open_model("face:150")
     with pytest.raises(ValueError, match=r"pinned is a bool array of shape \(150,\)"):
-        thinning(model, np.arange(4))
+        thinning(surface(model), np.arange(4))
     with pytest.raises(ValueError, match="most=-1"):
-        greedy_insertion(model, most=-1)
+        greedy_insertion(surface(model), most=-1)

@@ -5,24 +5,16 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
+from samples import holey_grid, surface
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets, simplify
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.measures import measured
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
-
-
-def holey():
-    rng = np.random.default_rng(4)
-    elevation = rng.integers(0, 50, (9, 11)).astype(float)
-    elevation[3:6, 4:7] = np.nan
-    elevation[:4, 8:] = np.nan
-    return grid_source(elevation, 2.0, 3.0, name="holey")
 
 
 def turned_grid():
@@ -42,7 +34,7 @@ def cliff():
 SOURCES = {
     "grid": lambda: load("roof:9"),
     "terrain": lambda: load("jacksboro:30"),
-    "holey": holey,
+    "holey": holey_grid,
     "turned": turned_grid,
     "face": lambda: load("face:150"),
     "horseshoe": lambda: load("horseshoe:120"),
@@ -52,7 +44,7 @@ MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()}
 
 
 def assert_as_from_scratch(live, footprint, outside, measure="error"):
-    scratch = simplify(live.model, live.kept, footprint=footprint, outside=outside)
+    scratch = surface(live.model, footprint=footprint, outside=outside).simplify(live.kept)
     np.testing.assert_array_equal(live.faces, scratch.faces)
     assert live.triangles == scratch.quality.triangles
     scale = live.model.n_vertices * live.model.diagonal
@@ -77,7 +69,7 @@ class LiveMachine(RuleBasedStateMachine):
         self.rules = footprint, outside
         kept = np.random.default_rng(seed).random(self.model.n_vertices) < share
         kept[self.model.corners] = True
-        self.live = LiveTriangulation(self.model, kept, footprint=footprint, outside=outside)
+        self.live = LiveTriangulation(surface(self.model, footprint=footprint, outside=outside), kept)
 
     def pick(self, choice, kept):
         rows = np.flatnonzero(self.live.kept == kept)
@@ -129,7 +121,7 @@ def test_a_thousand_random_operations_do_not_drift(name):
     rng = np.random.default_rng(1)
     kept = rng.random(model.n_vertices) < 0.3
     kept[model.corners] = True
-    live = LiveTriangulation(model, kept)
+    live = LiveTriangulation(surface(model), kept)
     free = np.setdiff1d(np.arange(model.n_vertices), model.corners)
     for _ in range(1000):
         v = int(rng.choice(free))
@@ -145,7 +137,7 @@ def test_weights_and_squares_count_in_every_operation_tried_or_done(name, measur
     model = MODELS[name].with_weights(rng.uniform(0, 3, MODELS[name].source_index.max() + 1) * 2.0)
     kept = rng.random(n) < 0.3
     kept[model.corners] = True
-    live = LiveTriangulation(model, kept, measure=measure)
+    live = LiveTriangulation(surface(model, measure=measure), kept)
     assert_as_from_scratch(live, "model", "nearest", measure)
     free = np.setdiff1d(np.arange(n), model.corners)
     scale = (model.total_weight if measure == "error" else 1.0) * model.diagonal
@@ -169,28 +161,28 @@ def test_weights_and_squares_count_in_every_operation_tried_or_done(name, measur
 def test_the_classic_fronts_follow_the_measure_and_the_weights(method, measure):
     plain = MODELS["face"]
     model = plain.with_weights(np.linspace(0, 1, plain.source_index.max() + 1) ** 4)
-    front = method(model, measure=measure)
-    table = evaluate_subsets(model, np.array([front.kept(k) for k in range(0, len(front), 10)]))
+    front = method(surface(model, measure=measure))
+    table = surface(model).evaluate(np.array([front.kept(k) for k in range(0, len(front), 10)]))
     expected = measured(table, measure, model.total_weight)
     np.testing.assert_allclose(front.error[::10], expected, rtol=1e-9, atol=1e-6 * model.diagonal)
     # At most sizes it beats, in its own measure, the front that looked at another one.
-    other = method(plain)
+    other = method(surface(plain))
     k = np.arange(5, min(len(front), len(other)), 5)
-    rival = measured(evaluate_subsets(model, np.array([other.kept(j) for j in k])), measure, model.total_weight)
+    rival = measured(surface(model).evaluate(np.array([other.kept(j) for j in k])), measure, model.total_weight)
     assert (front.error[k] < rival).mean() > 0.6
 
 
 def test_a_maximum_is_no_sum_and_is_refused():
     for call in (thinning, greedy_insertion):
         with pytest.raises(ValueError, match="no sum over the vertices"):
-            call(MODELS["grid"], measure="max_error")
-    with pytest.raises(ValueError, match="measure='l2' is unknown"):
-        LiveTriangulation(MODELS["grid"], np.ones(81, bool), measure="l2")
+            call(surface(MODELS["grid"], measure="max_error"))
+    with pytest.raises(ValueError, match="no sum over the vertices"):
+        LiveTriangulation(surface(MODELS["grid"], measure="max_error"), np.ones(81, bool))
 
 
 def test_removing_everything_but_the_corners_and_putting_it_back_restores_the_mesh():
     model = MODELS["grid"]
-    live = LiveTriangulation(model, np.ones(model.n_vertices, bool))
+    live = LiveTriangulation(surface(model), np.ones(model.n_vertices, bool))
     before = live.faces
     free = np.setdiff1d(np.arange(model.n_vertices), model.corners)
     for v in free:
@@ -204,7 +196,7 @@ def test_removing_everything_but_the_corners_and_putting_it_back_restores_the_me
 
 def test_wrong_operations_are_refused_and_change_nothing():
     model = MODELS["grid"]
-    live = LiveTriangulation(model, np.isin(np.arange(model.n_vertices), model.corners))
+    live = LiveTriangulation(surface(model), np.isin(np.arange(model.n_vertices), model.corners))
     kept, dropped = int(model.corners[0]), int(np.setdiff1d(np.arange(81), model.corners)[0])
     with pytest.raises(ValueError, match="kept already"):
         live.insert(kept)
@@ -217,9 +209,9 @@ def test_wrong_operations_are_refused_and_change_nothing():
         live.remove(int(model.corners[1]))
     assert live.triangles == 1
     with pytest.raises(ValueError, match="bool array"):
-        LiveTriangulation(model, np.ones(80, bool))
+        LiveTriangulation(surface(model), np.ones(80, bool))
     with pytest.raises(ValueError, match="span no triangle"):
-        LiveTriangulation(model, np.zeros(81, bool))
+        LiveTriangulation(surface(model), np.zeros(81, bool))
 
 
 def test_a_site_without_which_all_lie_on_a_line_cannot_go():
@@ -228,7 +220,7 @@ def test_a_site_without_which_all_lie_on_a_line_cannot_go():
     apex = int(np.flatnonzero(model.points[:, 1] > 0)[0])
     kept = np.zeros(model.n_vertices, bool)
     kept[on_a_line] = kept[apex] = True
-    live = LiveTriangulation(model, kept, footprint="hull")
+    live = LiveTriangulation(surface(model, footprint="hull"), kept)
     before = live.triangles, live.error, live.faces
     assert live.try_remove(apex) == (np.inf, 0)
     with pytest.raises(ValueError, match="span no triangle"):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelWarning
+from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.plane.order import find_corners, vector_order
@@ -127,3 +127,42 @@ def test_copies_share_the_model_and_the_hash_follows_the_geometry(face):
     assert build_model(load("face:400")).hash == face.hash
     assert build_model(load("face:400,seed=2")).hash != face.hash
     assert len(face) == face.n_vertices == 400
+
+
+# ------------------------------------------------------------------------------------------------- weights
+
+
+def test_weights_follow_the_rows_of_the_file_or_come_from_it():
+    grid = np.arange(12.0).reshape(3, 4)
+    elevation = np.random.default_rng(0).random((3, 4))
+    elevation[0, 3] = np.nan
+    plain = build_model(grid_source(elevation, 1.0, 1.0), up="z")
+    model = plain.with_weights(grid)
+    np.testing.assert_array_equal(model.weights, plain.source_index)
+    source = load("face:150")
+    named = SourceMesh(source.points, source.faces, {"importance": np.arange(150, dtype=np.uint16)}, "named")
+    model = build_model(named, up="z").with_weights("importance")
+    np.testing.assert_array_equal(model.weights, model.source_index)
+    assert model.hash != build_model(named, up="z").hash
+    assert model.neighbours is not None
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        (np.ones(149), "149 weights for 150 rows"),
+        (np.full(150, -1.0), r"150 of 150 weights are negative or not finite \(first: row"),
+        (np.r_[np.ones(149), np.nan], "row 149, nan"),
+        (np.zeros(150), "all 150 weights are 0"),
+        (np.array(["x"] * 150), "give one number"),
+        ("colour", "no per-vertex attribute 'colour' to weigh by; it has: color, label"),
+        ("color", "a weight is one number"),
+        ("label", "a weight is one number"),
+    ],
+)
+def test_what_cannot_be_weights_is_refused(weights, message):
+    source = load("face:150")
+    attributes = {"color": np.zeros((150, 4), np.uint8), "label": np.array(["a"] * 150)}
+    model = build_model(SourceMesh(source.points, source.faces, attributes, "labelled"), up="z")
+    with pytest.raises(ModelError, match=message):
+        model.with_weights(weights)

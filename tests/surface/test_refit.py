@@ -7,7 +7,7 @@ import importlib.util
 import numpy as np
 import pytest
 import trimesh
-from samples import holey_grid, subset
+from samples import holey_grid, subset, surface
 from scipy import sparse
 from scipy.optimize import linprog
 
@@ -15,12 +15,11 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.greedy import thinning
-from meshsimp_pymoo.surface.evaluate import simplify
 from meshsimp_pymoo.surface.height import refit_heights
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
-from meshsimp_pymoo.surface.score import mesh_quality, mesh_samples
+from meshsimp_pymoo.surface.score import mesh_deviation, mesh_samples
 
 MODELS = {
     "terrain": lambda: load("jacksboro:20"),
@@ -37,9 +36,10 @@ def model(request):
 
 def by_linear_programme(model, kept, weights=None):
     """Least error over all heights, where every vertex is covered or costs nothing: min w.(u + v), A h - u + v = z."""
-    faces = simplify(model, kept, outside="ignore").faces
+    faces = surface(model, outside="ignore").simplify(kept).faces
     rows, compact = np.unique(faces, return_inverse=True)
-    samples = mesh_samples(model, model.points[rows], compact.reshape(-1, 3), outside="ignore", frame="local")
+    ground = surface(model, outside="ignore").ground()
+    samples = mesh_samples(ground, model.points[rows], compact.reshape(-1, 3))
     counts = np.flatnonzero(samples.covered)
     n = len(counts)
     A = sparse.coo_matrix(
@@ -62,10 +62,10 @@ def by_linear_programme(model, kept, weights=None):
 def test_the_error_is_the_optimum_of_the_linear_programme(model, share):
     kept = subset(model, share)
     least = by_linear_programme(model, kept)
-    quick = refit_heights(model, kept, outside="ignore")
+    quick = refit_heights(surface(model, outside="ignore"), kept)
     assert least * (1 - 1e-9) <= quick.error <= least * (1 + TOLERANCE)
     assert quick.error * (1 - TOLERANCE) <= quick.bound * (1 + 1e-9) <= least * (1 + 2e-9)
-    fine = refit_heights(model, kept, outside="ignore", tolerance=1e-7)
+    fine = refit_heights(surface(model, outside="ignore"), kept, tolerance=1e-7)
     assert fine.error == pytest.approx(least, rel=1e-6)
 
 
@@ -74,7 +74,8 @@ def test_weights_count_in_the_optimum_too(model):
     weighted = model.with_weights(weights)
     kept = subset(model, 0.2)
     least = by_linear_programme(weighted, kept, weighted.weights)
-    assert refit_heights(weighted, kept, outside="ignore", tolerance=1e-6).error == pytest.approx(least, rel=1e-5)
+    refitted = refit_heights(surface(weighted, outside="ignore"), kept, tolerance=1e-6)
+    assert refitted.error == pytest.approx(least, rel=1e-5)
 
 
 @pytest.mark.parametrize("outside", OUTSIDES)
@@ -82,14 +83,14 @@ def test_weights_count_in_the_optimum_too(model):
 def test_heights_never_make_the_error_larger_and_it_is_that_of_the_mesh(model, footprint, outside):
     for share in (0.02, 0.15, 0.5, 0.95, 1.0):
         kept = subset(model, share, 5)
-        plain = simplify(model, kept, footprint=footprint, outside=outside)
-        refitted = refit_heights(model, kept, footprint=footprint, outside=outside)
+        plain = surface(model, footprint=footprint, outside=outside).simplify(kept)
+        refitted = refit_heights(surface(model, footprint=footprint, outside=outside), kept)
         assert refitted.bound <= refitted.error <= refitted.before == plain.quality.error
         assert refitted.error <= refitted.bound * (1 + 2 * TOLERANCE)
         np.testing.assert_array_equal(refitted.faces, plain.faces)
-        vertices = refitted.vertices(model)
+        vertices = refitted.vertices
         faces = np.searchsorted(refitted.rows, refitted.faces)
-        again = mesh_quality(model, vertices, faces, outside=outside)
+        again = surface(model, outside=outside).score(vertices, faces).quality
         assert again.error == pytest.approx(refitted.error, rel=1e-9, abs=1e-12 * model.n_vertices * model.diagonal)
         np.testing.assert_array_equal(vertices[:, :2], model.file_points[refitted.rows, :2])
     assert refitted.error == 0.0
@@ -100,15 +101,16 @@ def test_no_small_change_of_heights_makes_it_better():
     """Uncovered vertices too, whose cost is a distance in space; 200 random directions and each vertex alone."""
     model = build_model(load("horseshoe:200"), up="z")
     kept = subset(model, 0.15)
-    best = refit_heights(model, kept, tolerance=1e-9)
-    assert simplify(model, kept).quality.uncovered > 10
+    best = refit_heights(surface(model), kept, tolerance=1e-9)
+    assert surface(model).simplify(kept).quality.uncovered > 10
     faces = np.searchsorted(best.rows, best.faces)
     rng = np.random.default_rng(0)
     n = len(best.rows)
+    ground, heights = surface(model).ground(), model.to_local(best.vertices)[:, 2]
     for direction in np.vstack([rng.normal(size=(200, n)), np.eye(n), -np.eye(n)]):
         for size in (1e-4, 1e-2):
-            moved = np.c_[model.points[best.rows, :2], best.heights + size * model.diagonal * direction]
-            error = mesh_quality(model, moved, faces, frame="local").error
+            moved = np.c_[model.points[best.rows, :2], heights + size * model.diagonal * direction]
+            error = mesh_deviation(ground, moved, faces)[0].sum()
             assert error >= best.error * (1 - 1e-8)
 
 
@@ -119,14 +121,15 @@ def test_a_plane_is_refitted_exactly_from_vertices_that_stick_out():
     spiked[::6, ::6] += 3.0
     model = build_model(grid_source(spiked, 1.0, 1.0), up="z")
     kept = (model.points[:, :2] % 6 == 0).all(axis=1)
-    refitted = refit_heights(model, kept, tolerance=1e-9)
+    refitted = refit_heights(surface(model), kept, tolerance=1e-9)
     assert refitted.before > 100
     assert refitted.error == pytest.approx(3.0 * kept.sum(), rel=1e-9)
-    np.testing.assert_allclose(refitted.heights, model.points[refitted.rows, 2] - 3.0, atol=1e-6)
+    np.testing.assert_allclose(refitted.vertices, model.file_points[refitted.rows] - [0, 0, 3.0], atol=1e-6)
     # Where the spikes do not count at all, nothing is left of the error.
     weights = np.ones(169)
     weights[model.source_index[kept]] = 0.0
-    assert refit_heights(model.with_weights(weights), kept, tolerance=1e-9).error == pytest.approx(0.0, abs=1e-4)
+    weighted = surface(model.with_weights(weights))
+    assert refit_heights(weighted, kept, tolerance=1e-9).error == pytest.approx(0.0, abs=1e-4)
 
 
 def test_the_heights_of_vertices_that_do_not_count_do_not_matter():
@@ -138,7 +141,7 @@ def test_the_heights_of_vertices_that_do_not_count_do_not_matter():
     for shift in (0.0, rng.normal(0, 5, (11, 11))):
         model = build_model(grid_source(heights + shift * kept, 1.0, 1.0), up="z")
         model = model.with_weights(np.where(kept, 0.0, 1.0))
-        errors.append(refit_heights(model, kept.ravel()[model.source_index], tolerance=1e-6).error)
+        errors.append(refit_heights(surface(model), kept.ravel()[model.source_index], tolerance=1e-6).error)
     assert errors[0] == pytest.approx(errors[1], rel=1e-5)
 
 
@@ -148,21 +151,20 @@ def test_a_tilted_model_moves_its_vertices_along_its_own_height():
     turn = trimesh.geometry.align_vectors([0, 0, 1], up)[:3, :3]
     model = build_model(SourceMesh(source.points @ turn.T + 1e5, source.faces, {}, "tilted"), up=tuple(up))
     kept = subset(model, 0.1)
-    refitted = refit_heights(model, kept)
+    refitted = refit_heights(surface(model), kept)
     assert refitted.error < 0.95 * refitted.before
-    rise = refitted.vertices(model) - model.file_points[refitted.rows]
+    rise = refitted.vertices - model.file_points[refitted.rows]
     np.testing.assert_allclose(rise, np.outer(rise @ up, up), atol=1e-9)
-    local = model.to_local(refitted.vertices(model))
-    np.testing.assert_allclose(local[:, 2], refitted.heights, atol=1e-8)
+    local = model.to_local(refitted.vertices)
     np.testing.assert_allclose(local[:, :2], model.points[refitted.rows, :2], atol=1e-8)
 
 
 def test_the_same_call_gives_the_same_bytes_and_thinning_gains_by_it():
     model = build_model(load("jacksboro:12"), up="z")
-    front = thinning(model)
+    front = thinning(surface(model))
     for k in (50, 200):
-        one, two = (refit_heights(model, front.kept(k)) for _ in range(2))
-        assert one.heights.tobytes() == two.heights.tobytes()
+        one, two = (refit_heights(surface(model), front.kept(k)) for _ in range(2))
+        assert one.vertices.tobytes() == two.vertices.tobytes()
         assert one.before == pytest.approx(front.error[k])
         assert one.error < 0.97 * one.before
 
@@ -174,9 +176,9 @@ def test_the_referee_agrees_with_the_refitted_error(oracle):
     for name in ("face:300", "horseshoe:200", "jacksboro:20"):
         model = build_model(load(name), up="z")
         for outside in OUTSIDES:
-            refitted = refit_heights(model, subset(model, 0.15), outside=outside)
+            refitted = refit_heights(surface(model, outside=outside), subset(model, 0.15))
             faces = np.searchsorted(refitted.rows, refitted.faces)
-            error, _, _ = referee.vertical_error(model.file_points, refitted.vertices(model), faces, outside)
+            error, _, _ = referee.vertical_error(model.file_points, refitted.vertices, faces, outside)
             assert refitted.error == pytest.approx(error, rel=1e-6)
 
 
@@ -191,6 +193,6 @@ def test_one_unknown_height_is_the_weighted_median():
 
 def test_impossible_calls_are_refused(model):
     with pytest.raises(ValueError, match="tolerance=0 is not positive"):
-        refit_heights(model, subset(model, 0.5), tolerance=0)
+        refit_heights(surface(model), subset(model, 0.5), tolerance=0)
     with pytest.raises(ValueError, match="span no triangle"):
-        refit_heights(model, np.zeros(model.n_vertices, bool))
+        refit_heights(surface(model), np.zeros(model.n_vertices, bool))

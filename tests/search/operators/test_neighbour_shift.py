@@ -21,7 +21,7 @@ def mutate(kept: str, *, pinned: str = "", along: str = "vector", seed: int = 0,
     """Mutate one chromosome written as 0s and 1s, every vertex trying to move."""
     X = np.array([[gene == "1" for gene in kept]])
     pins = np.array([gene == "1" for gene in pinned]) if pinned else np.zeros(X.shape[1], dtype=bool)
-    problem = SimpleNamespace(pinned=pins, n_var=X.shape[1], model=SimpleNamespace(neighbours=rings))
+    problem = SimpleNamespace(pinned=pins, n_var=X.shape[1], surface=SimpleNamespace(neighbours=rings))
     operator = NeighbourShift(1.0, along=along)
     mutated = operator._do(problem, X, random_state=np.random.default_rng(seed))
     return "".join(str(int(gene)) for gene in mutated[0])
@@ -156,5 +156,5 @@ def test_impossible_arguments_are_refused_with_their_value() -> None:
 def test_along_the_mesh_a_problem_without_one_rings_is_refused() -> None:
     problem = SimpleNamespace(pinned=np.zeros(4, dtype=bool), n_var=4)
     X = np.ones((1, 4), dtype=bool)
-    with pytest.raises(TypeError, match=r"reads problem\.model\.neighbours"):
+    with pytest.raises(TypeError, match=r"reads problem\.surface"):
         NeighbourShift(along="mesh")._do(problem, X, random_state=np.random.default_rng(0))

@@ -1,4 +1,4 @@
-"""The memetic search finds the whole true front where that is known."""
+"""The memetic search finds the whole true front where that is known, and elsewhere more than thinning."""
 
 from __future__ import annotations
 
@@ -9,11 +9,16 @@ import pytest
 from enumerable_models import GENERATIONS, MOST_FREE, nondominated, random_problem, same_front, true_front
 from pymoo.optimize import minimize
 
-from meshsimp_pymoo import MeshProblem, PackedDuplicates, memetic, thinning
+from meshsimp_pymoo import MeshProblem, NestedSubsets, PackedDuplicates, memetic, thinning
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import IDLE, DownTheLadder, SizeLadder
 
 MODELS = range(20)
+
+
+@pytest.fixture(scope="module", params=["jacksboro:24", "horseshoe:150"])
+def problem(request):
+    return MeshProblem(request.param)
 
 
 @pytest.mark.parametrize("seed", MODELS)
@@ -46,7 +51,7 @@ def test_the_models_differ_in_size_and_thinning_alone_misses_most_fronts():
     assert {int((~problem.pinned).sum()) for problem in problems} == set(range(3, MOST_FREE + 1))
     missed = 0
     for problem in problems:
-        nested = thinning(problem.model)
+        nested = thinning(problem.surface)
         missed += not same_front(np.c_[nested.error, nested.triangles], true_front(problem), tolerance=1e-9)
     assert missed > len(problems) / 2
 
@@ -68,7 +73,7 @@ def test_the_ways_of_making_children_can_be_chosen_and_none_is_worse_than_thinni
     mating = DownTheLadder(ladder, eliminate_duplicates=PackedDuplicates(), **options)
     result = minimize(problem, memetic(30, survival=ladder, mating=mating), ("n_gen", 6), seed=1)
     usual = minimize(problem, memetic(30), ("n_gen", 6), seed=1)
-    thinned = thinning(problem.model)
+    thinned = thinning(problem.surface)
     assert not np.array_equal(result.F, usual.F)
     for error, triangles in result.F:
         fitting = thinned.triangles <= triangles
@@ -79,9 +84,37 @@ def test_the_ways_of_making_children_can_be_chosen_and_none_is_worse_than_thinni
 def test_where_all_vertices_are_not_the_best_mesh_the_front_still_ends_with_the_best_of_thinning(shared_data):
     """Where a scan's outline is not covered, the whole mesh's error is not the least."""
     problem = MeshProblem(shared_data / "m4_skull.ply")
-    thinned = thinning(problem.model)
+    thinned = thinning(problem.surface)
     whole = problem.evaluate(np.ones(problem.n_var, bool))
     assert thinned.error.min() < whole[0]
     result = minimize(problem, memetic(20, moves_per_vertex=0), ("n_gen", 2), seed=1)
     assert result.F[:, 0].min() <= thinned.error.min() * (1 + 1e-9)
     assert result.F[:, 0].min() < result.algorithm.pop.get("F")[:, 0].min()  # the last rungs have none of it
+
+
+def test_the_memetic_front_is_never_worse_than_thinning_and_soon_better(problem):
+    front = thinning(problem.surface)
+    result = minimize(problem, memetic(24, moves_per_vertex=200), ("n_gen", 5), seed=1)
+    sampled = NestedSubsets()._do(problem, 24, random_state=np.random.default_rng(0))
+    ratios = []
+    for e, t in problem.evaluate(sampled):
+        best = result.F[result.F[:, 1] <= t, 0].min()
+        assert best <= e * (1 + 1e-9)
+        if e > 1e-6 * front.error.max():
+            ratios.append(best / e)
+    assert np.exp(np.mean(np.log(ratios))) < 0.97
+
+
+def test_the_memetic_search_repeats_and_stays_in_its_range():
+    problem = MeshProblem("face:200")
+    runs = [minimize(problem, memetic(12, triangles=(20, 90)), ("n_gen", 3), seed=4) for _ in range(2)]
+    assert runs[0].X.tobytes() == runs[1].X.tobytes()
+    assert runs[0].F[:, 1].max() <= 90
+    np.testing.assert_allclose(runs[0].F[:, 0], problem.surface.evaluate(runs[0].X)[:, 0])
+
+
+def test_the_memetic_search_finds_the_true_front_of_a_roof():
+    result = minimize(MeshProblem("roof:9"), memetic(20, triangles=(2, 20)), ("n_gen", 5), seed=1)
+    found = {(round(float(e), 9), int(t)) for e, t in result.F}
+    assert (0.0, 4) in found
+    assert min(t for _, t in found) == 2
