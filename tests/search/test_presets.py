@@ -16,7 +16,7 @@ from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from stand_in_problem import GridProblem
 
 from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.cli.arguments import make_parser
+from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.search.operators import NeighbourShift
 from meshsimp_pymoo.search.presets import PRESETS
