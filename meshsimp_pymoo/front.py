@@ -331,7 +331,7 @@ class Front(Sequence[FrontSolution]):
         ----------
         folder : path
             The folder.
-        model : path, built-in name, trimesh.Trimesh or OpenModel, optional
+        model : path, built-in name, trimesh.Trimesh, OpenModel or Surface, optional
             The original mesh, if it is no longer where the record says.
 
         Raises
@@ -630,7 +630,12 @@ class Front(Sequence[FrontSolution]):
         source = model if model is not None else self._model_file()
         try:
             options, rules, objectives = self._recorded()
-            problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
+            if hasattr(source, "rules"):
+                if plain(source.rules) != plain(rules):
+                    raise ResultError(f"{where}: has other rules than this {type(source).__name__}: {rules}; {way_out}")
+                problem = MeshProblem(source, objectives=objectives)
+            else:
+                problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
         except ModelError as trouble:
             if model is not None:
                 raise

@@ -294,7 +294,8 @@ def write_front(
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, **surface.stored_arrays())
+        rows = model.source_index.astype(np.int64)
+        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=rows, **surface.stored_arrays())
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,

@@ -20,7 +20,7 @@ Examples
 ... @njit
 ... def fixed_cost(ground, books):
 ...     return ground.cost
->>> @njit
+>>> @loop
 ... def twice(ground, books):
 ...     return 2.0 * total_cost(ground, books)
 >>> twice(Fixed(1.5), 0)
@@ -35,9 +35,41 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
+from numba.core.caching import FunctionCache
 from numba.extending import overload
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+PACKAGE = __name__.partition(".")[0]
+
+
+class _OwnRecords(FunctionCache):
+    """Keeps on disk what was compiled for the records of this package alone.
+
+    Code for the records of others holds their answers, which may change or be gone while this package stays the same;
+    and the index of a compiled function cannot be read any more where one record of it cannot be imported.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function from disk, if it is there."""
+        return super().load_overload(sig, target_context) if _is_own(sig) else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled function on disk, if it is for records of this package."""
+        if _is_own(sig):
+            super().save_overload(sig, data)
+
+
+def _is_own(sig: Any) -> bool:
+    records = (getattr(kind, "instance_class", None) for kind in getattr(sig, "args", sig))
+    return all(record.__module__.partition(".")[0] == PACKAGE for record in records if record is not None)
+
+
+def loop(function: Function) -> Function:
+    """Compile a function that asks these questions: once for each class of ground, without Python's lock."""
+    compiled: Any = njit(nogil=True)(function)
+    compiled._cache = _OwnRecords(function)
+    loops: Function = compiled
+    return loops
 
 
 def answers(question: Callable[..., Any], record: type) -> Callable[[Function], Function]:
@@ -137,7 +169,7 @@ def cells_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     return int(_unanswered())
 
 
-@njit(cache=True, nogil=True)
+@loop
 def site_mask(ground: Any, books: Any, n: int) -> np.ndarray:
     """Return which of n vertices are sites, as a bool array (n,)."""
     mask = np.zeros(n, np.bool_)
