@@ -236,7 +236,7 @@ def test_all_shared_meshes_are_accepted_upright_as_they_are(shared_data):
     loops = {"t_matteo500": 2, "f_mask_holes": 3, "l_lato000": 10}
     borders = {"m1_laurana": 175, "m2_demosthenes": 378, "l_lato000": 1429, "f_mask_holes": 1401}
     for path in sorted(shared_data.glob("*.*")):
-        if path.suffix not in (".ply", ".npz"):
+        if path.suffix not in (".ply", ".npz") or path.name.startswith("c_"):  # those are closed
             continue
         source = read_source(path)
         assert_array_equal(up_direction(source), [0, 0, 1])

@@ -78,9 +78,8 @@ def test_a_problem_without_a_mesh_is_refused_by_name(kind: str, name: str) -> No
     if name == "uniform":
         assert operator(stranger, pop, random_state=rng(1)).get("X").shape == (4, 20)  # asks nothing of it
         return
-    with pytest.raises(
-        TypeError, match=r"reads problem\.pinned, which SimpleNamespace does not have.*MeshProblem"
-    ):
+    missing = r"reads problem\.(pinned|surface), which SimpleNamespace does not have.*MeshProblem"
+    with pytest.raises(TypeError, match=missing):
         operator(stranger, pop, random_state=rng(1))
 
 

@@ -14,5 +14,5 @@ def test_what_lowers_sums_refuses_the_maximum_and_impossible_probabilities(mutat
     with pytest.raises(ValueError, match=r"prob = 1\.2 is not a probability"):
         mutation(prob=1.2)
     problem = MeshProblem("peaks:6", objectives=("max_error", "triangles"))
-    with pytest.raises(ValueError, match=r"the first objective is the maximum, 'max_error'; use objectives="):
+    with pytest.raises(ValueError, match=r"'max_error' is none; use 'error' or"):
         mutation()._do(problem, np.ones((2, problem.n_var), bool), random_state=np.random.default_rng(1))
