@@ -33,8 +33,7 @@ def test_it_scores_every_method_at_the_sizes_of_thinning(quality, tmp_path, caps
     assert quality.main([*options, "-o", str(rows_file), "-o", str(tables)]) == 0
     with rows_file.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    model = open_model("peaks:9")
-    front = thinning(model)
+    front = thinning(MeshProblem("peaks:9").surface)
     for row in rows:
         wanted = front.triangles[round(float(row["share"]) / 100 * 81) - len(front.base)]
         assert int(row["wanted"]) == wanted
@@ -95,13 +94,13 @@ def test_the_largest_mesh_that_fits_is_found_whatever_the_parameter_means(qualit
     def make(target):
         calls.append(target)
         count = max(20, 2 * ((target * 3) // 4) + offset)
-        return np.zeros((3, 3)), np.zeros((count, 3), int), "file"
+        return np.zeros((3, 3)), np.zeros((count, 3), int)
 
-    (_, faces, _), _, fits = quality.largest_at_most(make, 1001, 5000)
+    (_, faces), _, fits = quality.largest_at_most(make, 1001, 5000)
     assert fits
     assert 1001 - max(quality.NEAR, quality.NEAR_SHARE * 1001) <= len(faces) <= 1001
     assert len(calls) <= quality.TRIES
-    (_, faces, _), _, fits = quality.largest_at_most(make, 10, 5000)
+    (_, faces), _, fits = quality.largest_at_most(make, 10, 5000)
     assert not fits
     assert len(faces) == 20
 

@@ -64,8 +64,8 @@ from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import DownTheLadder, SizeLadder
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import Quality
-from meshsimp_pymoo.surface.score import mesh_quality
 
 BUILT_IN = ("jacksboro:11", "face:1000", "jacksboro:4", "topobathy", "jacksboro")
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -278,7 +278,7 @@ class Comparison:
 def nested_curve(model, build):
     """Time a pass of a greedy method."""
     start = time.perf_counter()
-    nested = build(model)
+    nested = build(HeightSurface(model))
     seconds = time.perf_counter() - start
     problem = MeshProblem(model, memo=0)
     return Curve(nested.error, nested.triangles, lambda k: problem.quality(nested.kept(k)), seconds)
@@ -325,7 +325,7 @@ def by_pydelatin(model):
         places = rows[len(rows) - 1 - up, column]
         if not np.allclose(model.points[places, 2], mesh.vertices[:, 2], rtol=1e-4, atol=1e-4 * np.ptp(heights)):
             raise RuntimeError("pydelatin's vertices are not where its heights are")
-        return model.points[places], mesh.triangles.astype(np.int64), "local"
+        return model.file_points[places], mesh.triangles.astype(np.int64)
 
     return {"pydelatin": make}
 
@@ -354,7 +354,7 @@ def by_pyfqmr(model):
         tool.setMesh(points, model.faces.astype(np.int32))
         tool.simplify_mesh(target_count=size, preserve_border=preserve_border, verbose=False)
         vertices, faces, _ = tool.getMesh()
-        return back(vertices), np.asarray(faces, np.int64), "file"
+        return back(vertices), np.asarray(faces, np.int64)
 
     return {"border": lambda size: make(size, True), "free": lambda size: make(size, False)}
 
@@ -366,7 +366,7 @@ def by_fast_simplification(model):
 
     def make(size, **options):
         vertices, faces = simplify(points, model.faces.astype(np.int32), target_count=size, **options)
-        return back(vertices), np.asarray(faces, np.int64), "file"
+        return back(vertices), np.asarray(faces, np.int64)
 
     try:
         make(len(model.faces), preserve_border=True)
@@ -381,8 +381,7 @@ def by_meshlab(model):
         raise Absent("pymeshlab does not load")
 
     def make(size):
-        mesh = quadric_collapse(model.file_points, model.faces, size, preserve_boundary=True, unit_diagonal=True)
-        return *mesh, "file"
+        return quadric_collapse(model.file_points, model.faces, size, preserve_boundary=True, unit_diagonal=True)
 
     return {"quadric": make}
 
@@ -393,7 +392,8 @@ def largest_at_most(make, size, most):
     Parameters
     ----------
     make : callable
-        From a number of triangles, about so many of which come out, to (vertices, faces, frame).
+        From a number of triangles, about so many of which come out, to (vertices, faces) in the
+        frame of the file.
     size : int
         Triangles that the mesh may have; if all have more, the smallest mesh found is returned and ``fits`` is False.
     most : int
@@ -434,7 +434,7 @@ def largest_at_most(make, size, most):
 
 PASSES = {
     "worst point": greedy_insertion,
-    "worst triangle": lambda model: greedy_insertion(model, choose="triangle"),
+    "worst triangle": lambda surface: greedy_insertion(surface, choose="triangle"),
 }
 TOOLS = {
     "pydelatin": by_pydelatin,
@@ -459,7 +459,7 @@ def size_class(n_vertices):
 def reference_of(model, shares):
     """Return thinning's curve, and its triangles at each share of the vertices."""
     start = time.perf_counter()
-    nested = thinning(model)
+    nested = thinning(HeightSurface(model))
     seconds = time.perf_counter() - start
     problem = MeshProblem(model, memo=0)
     curve = Curve(nested.error, nested.triangles, lambda k: problem.quality(nested.kept(k)), seconds)
@@ -473,12 +473,13 @@ def reference_of(model, shares):
 def add_tool(comparison, method):
     """Score a tool's mesh at every size: of its variants the one that does best beside thinning."""
     model = comparison.model
+    surface = HeightSurface(model)
     variants = TOOLS[method](model)
     for share, size in comparison.sizes.items():
         found = []
         for make in variants.values():
-            (vertices, faces, frame), seconds, fits = largest_at_most(make, size, len(model.faces))
-            quality = mesh_quality(model, vertices, faces, frame=frame)
+            (vertices, faces), seconds, fits = largest_at_most(make, size, len(model.faces))
+            quality = surface.score(vertices, faces).quality
             ratio = _ratio(quality.error, comparison.reference.value(quality.triangles))
             found.append((not fits, ratio, seconds, quality))
         _, _, seconds, quality = min(found, key=lambda row: row[:2])

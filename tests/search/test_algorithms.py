@@ -21,19 +21,11 @@ from pymoo.util.archive import MultiObjectiveArchive
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from stand_in_problem import GridProblem
 
-from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo import MeshProblem, moead, nsga2_v1, nsga2_v2, weighted_ga_v1, weighted_ga_v2
 from meshsimp_pymoo.search.operators import OAX, NeighbourShift, PackedDuplicates, PinnedCorners, RandomSubset
-from meshsimp_pymoo.search.presets import (
-    PRESETS,
-    WeightedSum,
-    crowded_tournament,
-    moead,
-    nsga2_v1,
-    nsga2_v2,
-    weighted_ga_v1,
-    weighted_ga_v2,
-    weighted_sum,
-)
+from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.search.selection import crowded_tournament
+from meshsimp_pymoo.search.weighted import WeightedSum, weighted_sum
 
 Make = Callable[..., Any]
 OPERATORS = {"sampling": RandomSubset(), "mutation": NeighbourShift(), "repair": PinnedCorners()}
@@ -41,7 +33,7 @@ OPERATORS = {"sampling": RandomSubset(), "mutation": NeighbourShift(), "repair":
 
 def preset(name: str, pop_size: int = 20, **kwargs: Any) -> Any:
     weight = [0.1] if name.startswith("weighted") else []
-    return PRESETS[name](*weight, pop_size=pop_size, **kwargs)
+    return PRESETS[name].function(*weight, pop_size=pop_size, **kwargs)
 
 
 def front_of(problem: GridProblem) -> np.ndarray:

@@ -18,7 +18,7 @@ from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.util.archive import MultiObjectiveArchive
 
-from meshsimp_pymoo import MeshProblem, nsga3
+from meshsimp_pymoo import MeshProblem, nsga2_v1, nsga3
 from meshsimp_pymoo.search import checkpoint as module
 from meshsimp_pymoo.search.checkpoint import (
     CheckpointError,
@@ -29,10 +29,10 @@ from meshsimp_pymoo.search.checkpoint import (
     restore,
 )
 from meshsimp_pymoo.search.operators import OAX
-from meshsimp_pymoo.search.presets import PRESETS, nsga2_v1
+from meshsimp_pymoo.search.presets import PRESETS
 
 WHAT = {"model": "roof"}
-ALGORITHMS = PRESETS | {"nsga3": nsga3}
+ALGORITHMS = {name: row.function for name, row in PRESETS.items()} | {"nsga3": nsga3}
 
 
 @pytest.fixture(scope="module")

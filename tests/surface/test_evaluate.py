@@ -170,7 +170,7 @@ def test_fewer_than_three_vertices_are_no_mesh(kept_rows):
 
 def test_subsets_of_another_length_are_refused():
     plane = surface("plane:5")
-    with pytest.raises(ValueError, match="25 entries"):
+    with pytest.raises(ValueError, match="25 vertices has as many entries, not 24"):
         plane.evaluate(np.ones((3, 24), bool))
     with pytest.raises(ValueError, match=r"has shape \(25,\)"):
         plane.simplify(np.ones(24, bool))
