@@ -136,7 +136,7 @@ class FrontSolution:
             if stored is not None and stored.suffix == suffix:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.problem.model, self.faces)
+                write_solution(unfinished, self.front.problem.surface, self.faces)
         return path
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
@@ -331,8 +331,9 @@ class Front(Sequence[FrontSolution]):
         ----------
         folder : path
             The folder.
-        model : path, built-in name, trimesh.Trimesh or OpenModel, optional
-            The original mesh, if it is no longer where the record says.
+        model : path, built-in name, trimesh.Trimesh, OpenModel or Surface, optional
+            The original mesh, if it is no longer where the record says; of another kind than a height field, the
+            surface.
 
         Raises
         ------
@@ -630,7 +631,12 @@ class Front(Sequence[FrontSolution]):
         source = model if model is not None else self._model_file()
         try:
             options, rules, objectives = self._recorded()
-            problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
+            if hasattr(source, "rules"):  # a surface
+                if plain(source.rules) != plain(rules):
+                    raise ResultError(f"{where}: was made with {rules}, not with those of this surface")
+                problem = MeshProblem(source, objectives=objectives)
+            else:
+                problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
         except ModelError as trouble:
             if model is not None:
                 raise

@@ -28,6 +28,7 @@ from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.moves import (
     cells_around,
     exchange,
+    loop,
     n_cells,
     n_triangles,
     site_mask,
@@ -235,7 +236,7 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
     at[v] = k
 
 
-@njit(cache=True, nogil=True)
+@loop
 def thin(
     ground: Any,
     books: Any,
@@ -316,7 +317,7 @@ def thin(
     return n_removed
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _grow(
     ground: Any,
     books: Any,

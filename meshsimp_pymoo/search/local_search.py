@@ -20,6 +20,7 @@ from meshsimp_pymoo.surface.moves import (
     exchange,
     is_site,
     is_taken,
+    loop,
     n_sites,
     n_triangles,
     site_mask,
@@ -81,7 +82,7 @@ def _unit(state: np.ndarray) -> float:
     return ((_next(state) >> 10) + 1) * 2.0**-53
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _urgent(g: Any, live: Any, n: int, state: np.ndarray) -> int:
     """Draw a vertex that is no site, from the triangle with the largest error of a few; -1 if none was met."""
     best = -1
@@ -96,7 +97,7 @@ def _urgent(g: Any, live: Any, n: int, state: np.ndarray) -> int:
     return best
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _anneal(
     ground: Any,
     books: Any,
@@ -189,7 +190,7 @@ def _anneal(
     return n_best
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _fit(
     ground: Any, books: Any, n: int, fixed: np.ndarray, by_triangles: bool, wanted: int, state: np.ndarray
 ) -> None:
@@ -233,7 +234,7 @@ def _fit(
             failures += 1
 
 
-@njit(cache=True, nogil=True)
+@loop
 def _state(ground: Any, books: Any) -> tuple[float, int]:
     return total_cost(ground, books), n_triangles(ground, books)
 

@@ -35,6 +35,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
+from numba.core.caching import FunctionCache
 from numba.extending import overload
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -67,6 +68,27 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
         return function
 
     return register
+
+
+class _OwnCache(FunctionCache):
+    """Keeps on disk what was compiled for this package's records, and nothing of anybody else's.
+
+    What is kept names the classes that it was compiled for: a process that cannot import one of them could not read any
+    of it. Nor would Numba see that the answers of such a class have changed.
+    """
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep one compilation."""
+        records = [getattr(kind, "instance_class", None) for kind in data.signature.args]
+        if all(record.__module__.partition(".")[0] == __name__.partition(".")[0] for record in records if record):
+            super().save_overload(sig, data)
+
+
+def loop(function: Function) -> Function:
+    """Compile a function that asks these questions, anew in each process for the records of others."""
+    compiled = njit(nogil=True)(function)
+    compiled._cache = _OwnCache(function)
+    return compiled
 
 
 def _unanswered() -> Any:
@@ -136,7 +158,7 @@ def cells_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     return int(_unanswered())
 
 
-@njit(cache=True, nogil=True)
+@loop
 def site_mask(ground: Any, books: Any, n: int) -> np.ndarray:
     """Return which of n vertices are sites, as a bool array (n,)."""
     mask = np.zeros(n, np.bool_)

@@ -1,0 +1,364 @@
+"""A second kind of surface, tiny and exactly known: points of a circle, whose mesh is a fan.
+
+The mesh of a subset is the fan over the kept points from the first of them, T = n - 2 triangles. A dropped point costs
+its distance to the chord between the kept points on either side of it, which is its distance to the mesh. Three points
+are pinned. Nothing here is quick: every question looks at the whole circle.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.surface import moves
+from meshsimp_pymoo.surface.measures import OBJECTIVES, REGIONS, as_quality
+from meshsimp_pymoo.surface.moves import answers
+from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
+from meshsimp_pymoo.workers import thread_pool
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """N points in convex position, counter-clockwise."""
+
+    file_points: FloatArray
+    name: str = "a circle"
+    attributes: dict[str, AnyArray] = field(default_factory=dict)
+    georeference: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of points."""
+        return len(self.file_points)
+
+    @property
+    def faces(self) -> IntArray:
+        """The fan over all of them."""
+        return fan(np.arange(self.n_vertices))
+
+    @property
+    def source_index(self) -> IntArray:
+        """The points are in the order of the file."""
+        return np.arange(self.n_vertices)
+
+    @property
+    def hash(self) -> str:
+        """A checksum of the points."""
+        return hashlib.sha256(np.ascontiguousarray(self.file_points).tobytes()).hexdigest()
+
+
+class Circle:
+    """A curve and the rules, of which only the measure counts here."""
+
+    def __init__(self, model: Curve, rules: Rules | None = None) -> None:
+        self.model = model
+        self.rules = rules or Rules()
+        self.pinned: BoolArray = np.zeros(model.n_vertices, bool)
+        self.pinned[[0, model.n_vertices // 3, 2 * model.n_vertices // 3]] = True
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of points."""
+        return self.model.n_vertices
+
+    @property
+    def points(self) -> FloatArray:
+        """The points, as in the file."""
+        return self.model.file_points
+
+    @property
+    def faces(self) -> IntArray:
+        """The fan over all of them."""
+        return self.model.faces
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of their bounding box."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @property
+    def total_weight(self) -> float:
+        """All points count alike."""
+        return float(self.n_vertices)
+
+    @property
+    def neighbours(self) -> Csr:
+        """The points before and after each."""
+        i = np.arange(self.n_vertices)
+        return 2 * np.arange(self.n_vertices + 1), np.sort(np.c_[i - 1, i + 1] % self.n_vertices, axis=1).ravel()
+
+    @property
+    def border(self) -> IntArray:
+        """Any point brings one triangle only."""
+        return np.arange(self.n_vertices)
+
+    @property
+    def places(self) -> FloatArray:
+        """The points in the plane."""
+        return self.points[:, :2]
+
+    @property
+    def view(self) -> View:
+        """From above."""
+        return View(self.points, 1.0, np.eye(3), self.points.min(axis=0))
+
+    def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
+        """Return the table of numbers of subsets (P, N)."""
+
+        def row(subset: BoolArray) -> FloatArray:
+            n, n_all = int(subset.sum()), self.n_vertices
+            if n < 3:
+                return np.r_[[np.inf, 0, 0, np.inf, np.inf, n_all], np.full(regions, np.inf)]
+            d = _deviations(self.places.ravel(), subset)
+            region = np.bincount(np.arange(n_all) * regions // n_all, d, minlength=regions)[:regions]
+            return np.r_[[d.sum(), n - 2, n, (d * d).sum(), d.max(), n_all - n], region]
+
+        rows = np.atleast_2d(kept)
+        found = list(thread_pool(threads).map(row, rows) if threads > 1 else map(row, rows))
+        return np.array(found).reshape(len(rows), REGIONS + regions)
+
+    def simplify(self, kept: BoolArray) -> Simplified:
+        """Return the fan over the kept points."""
+        if kept.sum() < 3:
+            raise ValueError(f"{int(kept.sum())} points of {self.model.name} span no triangle")
+        quality = as_quality(self.evaluate(kept)[0], self.total_weight)
+        return Simplified(fan(np.flatnonzero(kept)), quality, _deviations(self.places.ravel(), kept), kept.copy())
+
+    def score(self, points: FloatArray, faces: IntArray) -> Scored:
+        """Measure any mesh in the plane: the distance of each point to its nearest triangle."""
+        d = np.full(self.n_vertices, np.inf)
+        for corners in np.asarray(points, float)[np.asarray(faces)][:, :, :2]:
+            for i, p in enumerate(self.places):
+                sides = [_cross(corners[k], corners[(k + 1) % 3], p) for k in range(3)]
+                near = min(_to_segment(p, corners[k], corners[(k + 1) % 3]) for k in range(3))
+                d[i] = min(d[i], 0.0 if min(sides) >= 0 or max(sides) <= 0 else near)
+        covered = d == 0
+        row = [d.sum(), len(faces), len(np.unique(faces)), (d * d).sum(), d.max(), (~covered).sum()]
+        return Scored(as_quality(np.array(row, float), self.total_weight), d, covered)
+
+    def refit(self, kept: BoolArray) -> Refitted:
+        """Return the fan as it is: nothing moves here."""
+        mesh = self.simplify(kept)
+        rows = np.flatnonzero(kept)
+        error = mesh.quality.error
+        return Refitted(mesh.faces, rows, self.points[rows], error, error, 0.0)
+
+    def stored_arrays(self) -> dict[str, AnyArray]:
+        """Return the row of each point in the file."""
+        return {"source_index": self.model.source_index}
+
+    def ground(self) -> Any | None:
+        """Return the points and the measure."""
+        return Round(np.ascontiguousarray(self.places.ravel()), OBJECTIVES[self.rules.measure].squared)
+
+    @contextmanager
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Any]:
+        """Lend a record of the kept points; all are at places of their own."""
+        books = Kept(kept.copy(), np.zeros(1))
+        books.total[0] = _cost_of(self.ground(), books.site)
+        yield books
+
+
+class UnmovableCircle(Circle):
+    """The same without moves: its meshes can be evaluated, that is all."""
+
+    def ground(self) -> None:
+        """Return that there is none."""
+        return
+
+
+def circle(n: int, *, seed: int = 1, kind: type[Circle] = Circle, **rules: Any) -> Surface:
+    """Return a circle of n points at random angles."""
+    angle = np.sort(np.random.default_rng(seed).random(n)) * 2 * np.pi
+    return kind(Curve(np.c_[np.cos(angle), np.sin(angle), np.zeros(n)]), Rules(**rules))
+
+
+def fan(rows: IntArray) -> IntArray:
+    """Return the triangles (n - 2, 3) from the first of n rows to each two that follow each other."""
+    return np.array([[rows[0], a, b] for a, b in itertools.pairwise(rows[1:])], np.int32).reshape(-1, 3)
+
+
+# ------------------------------------------------------------------------------------------------ what loops ask
+
+
+class Round(NamedTuple):
+    """What does not change."""
+
+    xy: np.ndarray  # (2 N,) the points
+    squared: bool  # whether the cost is the square of the distance
+
+
+class Kept(NamedTuple):
+    """What changes."""
+
+    site: np.ndarray  # (N,) whether a point is kept
+    total: np.ndarray  # (1,) the sum of the costs
+
+
+@njit
+def _cross(a: Any, b: Any, p: Any) -> float:
+    return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+
+
+@njit(nogil=True)
+def _to_segment(p: Any, a: Any, b: Any) -> float:
+    ux, uy, px, py = b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1]
+    t = min(max((px * ux + py * uy) / (ux * ux + uy * uy), 0.0), 1.0)
+    return np.hypot(px - t * ux, py - t * uy)
+
+
+@njit(nogil=True)
+def _next(site: np.ndarray, v: int, step: int) -> int:
+    """Return the kept point after v (step 1) or before it (-1)."""
+    v = (v + step) % len(site)
+    while not site[v]:
+        v = (v + step) % len(site)
+    return v
+
+
+@njit(nogil=True)
+def _deviation(xy: np.ndarray, site: np.ndarray, i: int) -> float:
+    if site[i]:
+        return 0.0
+    a, b = _next(site, i, -1), _next(site, i, 1)
+    return _to_segment(xy[2 * i : 2 * i + 2], xy[2 * a : 2 * a + 2], xy[2 * b : 2 * b + 2])
+
+
+@njit(nogil=True)
+def _deviations(xy: np.ndarray, site: np.ndarray) -> np.ndarray:
+    return np.array([_deviation(xy, site, i) for i in range(len(site))])
+
+
+@njit(nogil=True)
+def _cost(ground: Round, site: np.ndarray, i: int) -> float:
+    d = _deviation(ground.xy, site, i)
+    return d * d if ground.squared else d
+
+
+@njit(nogil=True)
+def _cost_of(ground: Round, site: np.ndarray) -> float:
+    if site.sum() < 3:
+        return np.inf
+    total = 0.0
+    for i in range(len(site)):
+        total += _cost(ground, site, i)
+    return total
+
+
+@njit(nogil=True)
+def _swap(site: np.ndarray, gone: int, come: int) -> None:
+    if gone >= 0:
+        site[gone] = False
+    if come >= 0:
+        site[come] = True
+
+
+@answers(moves.total_cost, Round)
+@njit(nogil=True)
+def _total_cost(ground: Round, books: Kept) -> float:
+    return books.total[0]
+
+
+@answers(moves.n_triangles, Round)
+@njit(nogil=True)
+def _n_triangles(ground: Round, books: Kept) -> int:
+    return max(books.site.sum() - 2, 0)
+
+
+@answers(moves.n_sites, Round)
+@njit(nogil=True)
+def _n_sites(ground: Round, books: Kept) -> int:
+    return books.site.sum()
+
+
+@answers(moves.is_site, Round)
+@njit(nogil=True)
+def _is_site(ground: Round, books: Kept, v: int) -> bool:
+    return books.site[v]
+
+
+@answers(moves.is_taken, Round)
+@njit(nogil=True)
+def _is_taken(ground: Round, books: Kept, w: int) -> bool:
+    return books.site[w]
+
+
+@njit(nogil=True)
+def _cell_cost(ground: Round, books: Kept, a: int) -> float:
+    """Return the cost of the cell of site a: the arc from it to the next one."""
+    total = 0.0
+    i = (a + 1) % len(books.site)
+    while not books.site[i]:
+        total += _cost(ground, books.site, i)
+        i = (i + 1) % len(books.site)
+    return total
+
+
+@answers(moves.urgency, Round)
+@njit(nogil=True)
+def _urgency(ground: Round, books: Kept, v: int) -> float:
+    return _cell_cost(ground, books, _next(books.site, v, -1))
+
+
+@answers(moves.try_exchange, Round)
+@njit(nogil=True)
+def _try_exchange(ground: Round, books: Kept, v: int, w: int, limit: float) -> tuple[float, int]:
+    _swap(books.site, v, w)
+    change = _cost_of(ground, books.site) - books.total[0]
+    _swap(books.site, w, v)
+    return change, (1 if w >= 0 else 0) - (1 if v >= 0 else 0)
+
+
+@answers(moves.exchange, Round)
+@njit(nogil=True)
+def _exchange(ground: Round, books: Kept, v: int, w: int) -> bool:
+    _swap(books.site, v, w)
+    if books.site.sum() < 3:
+        _swap(books.site, w, v)
+        return False
+    books.total[0] = _cost_of(ground, books.site)
+    return True
+
+
+@answers(moves.sites_around, Round)
+@njit(nogil=True)
+def _sites_around(ground: Round, books: Kept, v: int, found: np.ndarray) -> int:
+    found[0], found[1] = _next(books.site, v, -1), _next(books.site, v, 1)
+    return 2
+
+
+@answers(moves.n_cells, Round)
+@njit(nogil=True)
+def _n_cells(ground: Round, books: Kept) -> int:
+    return len(books.site)
+
+
+@answers(moves.worst_in, Round)
+@njit(nogil=True)
+def _worst_in(ground: Round, books: Kept, cell: int) -> tuple[int, float, float]:
+    n, worst, most = len(books.site), -1, 0.0
+    if not books.site[cell]:
+        return worst, most, 0.0
+    i = (cell + 1) % n
+    while not books.site[i]:
+        cost = _cost(ground, books.site, i)
+        if cost > most:
+            worst, most = i, cost
+        i = (i + 1) % n
+    return worst, most, _cell_cost(ground, books, cell)
+
+
+@answers(moves.cells_around, Round)
+@njit(nogil=True)
+def _cells_around(ground: Round, books: Kept, v: int, found: np.ndarray) -> int:
+    found[0], found[1] = v, _next(books.site, v, -1)
+    return 2
