@@ -1,25 +1,23 @@
 """Pareto fronts of simplified open meshes, as a pymoo plugin.
 
-The data flow, which is also the order in which one part may import another::
+The tree is the data flow. Bottom up; one part may import only parts above it in this list::
 
-    geometry/      load -> orient -> model -> triangulation -> error -> live     arrays in, arrays out; knows no pymoo
+    errors, arrays                 words that all share: one-line errors, types of arrays
+    settings, workers, indicators  what a user may set; threads, processes, Dask; dominance, knee, hypervolume
+    files          files and folders whole or not at all, locks, arrays without pickles
+    plane/         predicates, triangulation, footprint, faces: arrays in, arrays out
+    formats/       one file a format, in one table; ends in a SourceMesh
+    surface/       what a chromosome means: rules and measures, the height surface, its moves, refit, score
     datasets       built-in models by name
+    opening        the one way in: path, name or arrays, and Options -> model
     problem        MeshProblem: which vertices are kept -> (error, triangles)
-    operators/     sampling, crossover, mutation, repair, duplicates: how fronts are searched
-    memetic_search the seeded search
-    algorithms     the paper's algorithms, wired
-    baselines/     other ways to simplify, scored by the same error
-    indicators     how good a front is
-    analysis       many runs -> merged fronts, tables, choices
-    results, runs  what a run leaves on disk
-    checkpoint     what a killed search goes on from
-    display        what a search shows of itself
-    tiles/         height grids too big for one piece
-    report/        pictures, tables, findings
-    experiment/    YAML files and the runs they ask for
+    search/        operators, thinning and insertion, annealing, memetic, presets, MOEA/D, GA, checkpoints
+    storage        the folder of a front
+    report/        pictures and the page of one front
     front          Front: a sequence of solutions to choose from
-    cli            the shell command ``meshsimp``
-    engines        where work is done: here, in processes, on a Dask cluster
+    tiles/         height grids too big for one piece
+    comparison/    the study: YAML files, the runs they ask for, tables, findings
+    cli/           the shell command ``meshsimp``
 
 Public names are imported when they are first used, so that ``import meshsimp_pymoo`` is quick.
 """
@@ -31,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
+    from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.front import Front, FrontSolution
     from meshsimp_pymoo.problem import MeshProblem
     from meshsimp_pymoo.report.figures import plot_error, plot_front, plot_mesh
@@ -54,10 +53,11 @@ if TYPE_CHECKING:
     )
     from meshsimp_pymoo.search.weighted import weighted_ga_v1, weighted_ga_v2
     from meshsimp_pymoo.storage import read_front, write_front
-    from meshsimp_pymoo.surface.height import refit_heights
+    from meshsimp_pymoo.surface.height import HeightSurface, refit_heights
     from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
     from meshsimp_pymoo.surface.measures import Quality
     from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.rules import Rules
     from meshsimp_pymoo.surface.surface import Refitted
     from meshsimp_pymoo.tiles.front import tiled_front
     from meshsimp_pymoo.tiles.grid import open_grid
@@ -108,6 +108,7 @@ __all__ = [
     "FrontOutput",
     "FrontSolution",
     "HalfPlaneCrossover",
+    "HeightSurface",
     "LiveTriangulation",
     "MeshProblem",
     "ModelError",
@@ -115,6 +116,7 @@ __all__ = [
     "NeighbourShift",
     "NestedSubsets",
     "OpenModel",
+    "Options",
     "PackedDuplicates",
     "PinnedCorners",
     "Processes",
@@ -124,6 +126,7 @@ __all__ = [
     "RegionCrossover",
     "Relocation",
     "ResultError",
+    "Rules",
     "SizeStep",
     "SubsetUniformCrossover",
     "greedy_insertion",

@@ -332,8 +332,7 @@ class Front(Sequence[FrontSolution]):
         folder : path
             The folder.
         model : path, built-in name, trimesh.Trimesh, OpenModel or Surface, optional
-            The original mesh, if it is no longer where the record says; of another kind than a height field, the
-            surface.
+            The original mesh, if it is no longer where the record says.
 
         Raises
         ------
@@ -631,9 +630,9 @@ class Front(Sequence[FrontSolution]):
         source = model if model is not None else self._model_file()
         try:
             options, rules, objectives = self._recorded()
-            if hasattr(source, "rules"):  # a surface
+            if hasattr(source, "rules"):
                 if plain(source.rules) != plain(rules):
-                    raise ResultError(f"{where}: was made with {rules}, not with those of this surface")
+                    raise ResultError(f"{where}: has other rules than this {type(source).__name__}: {rules}; {way_out}")
                 problem = MeshProblem(source, objectives=objectives)
             else:
                 problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)

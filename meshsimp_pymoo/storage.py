@@ -46,8 +46,8 @@ from meshsimp_pymoo.files import (
     write_csv,
     write_npz,
 )
-from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
-from meshsimp_pymoo.formats.table import format_of_output, format_to_write, write_mesh
+from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
 from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
 
@@ -290,7 +290,8 @@ def write_front(
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, **surface.stored_arrays())
+        rows = model.source_index.astype(np.int64)
+        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=rows, **surface.stored_arrays())
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,

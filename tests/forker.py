@@ -71,7 +71,8 @@ def serve() -> None:
         for algorithm, budget in (("nsga2_v1", "40"), ("memetic", "20")):
             arguments = [*warm, "--algorithm", algorithm, "--evaluations", budget, "-o", f"{folder}/{algorithm}"]
             assert main(arguments) == 0
-        import meshsimp_pymoo.cli.experiments  # noqa: F401
+        import meshsimp_pymoo.cli.reporting
+        import meshsimp_pymoo.comparison.runner  # noqa: F401
         from meshsimp_pymoo.workers import _executors
 
         # threads must not be there when a process forks

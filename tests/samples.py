@@ -1,7 +1,9 @@
-"""What tests of the geometry are tried on."""
+"""What tests are tried on."""
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,11 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import Source, open_model
+from meshsimp_pymoo.storage import write_front
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.surface import Simplified
 
 
 def surface(model: Source | OpenModel, *, up: Any = "auto", **rules: Any) -> HeightSurface:
@@ -37,6 +41,35 @@ def subset(model: OpenModel, share: float, seed: int = 0) -> np.ndarray:
     return kept
 
 
+def random_solutions(model: OpenModel) -> tuple[np.ndarray, list[Simplified]]:
+    """Return twelve random subsets of growing size, listed out of order, with their simplified meshes."""
+    rng = np.random.default_rng(5)
+    kept = rng.random((12, model.n_vertices)) < np.linspace(0.1, 0.9, 12)[rng.permutation(12), None]
+    kept[:, model.corners] = True
+    surface = HeightSurface(model)
+    return kept, [surface.simplify(row) for row in kept]
+
+
+def write_solutions(folder: Path, model: OpenModel, solutions: tuple[Any, Any], **options: Any) -> Path:
+    """Write such solutions as a front of the model by the usual rules."""
+    kept, simplified = solutions
+    options = {"faces": lambda row: simplified[row].faces, "run": {"seed": 3}} | options
+    return write_front(folder, HeightSurface(model), [s.quality for s in simplified], kept, **options)
+
+
+def coloured(source: SourceMesh) -> SourceMesh:
+    """Return a mesh with attributes of every type."""
+    rng = np.random.default_rng(2)
+    n = len(source.points)
+    attributes = {
+        "color": rng.integers(0, 256, (n, 4), dtype=np.uint8),
+        "quality": rng.random(n).astype(np.float32),
+        "label": rng.integers(-5, 5, n),
+        "two words": rng.random(n),
+        "pair": rng.random((n, 2)),
+        "seen": rng.random(n) < 0.5,
+    }
+    return dataclasses.replace(source, attributes=attributes)
 # Models so small that every triangle can look at every vertex: known ridges, holes, bays, and a scan's outline.
 SMALL = {
     "roof": lambda: load("roof:5"),

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pymoo.core.evaluator import Evaluator
-from pymoo.core.population import Population
 from pymoo.core.problem import ElementwiseProblem
 
 
@@ -52,33 +50,9 @@ def grid_neighbours(side: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return indptr, np.concatenate(rings)
 
 
-def evaluated_pairs(problem: GridProblem, n_matings: int, seed: int, equal_genes: float = 0.0) -> Population:
-    """Evaluated random pairs; a share of the genes is the same in both parents of a pair."""
-    rng = np.random.default_rng(seed)
-    parents = rng.random((n_matings, 2, problem.n_var)) < 0.5
-    same = rng.random((n_matings, problem.n_var)) < equal_genes
-    parents[:, 1][same] = parents[:, 0][same]
-    parents |= problem.pinned
-    pop = Population.new("X", parents.reshape(-1, problem.n_var))
-    return Evaluator().eval(problem, pop).reshape(n_matings, 2)
-
-
-def opposite_pairs(problem: GridProblem, n_matings: int, seed: int) -> Population:
-    """Evaluated pairs that differ in every gene, nothing being pinned: no segment on which they agree."""
-    problem.pinned = np.zeros(problem.n_var, dtype=bool)
-    first = np.random.default_rng(seed).random((n_matings, problem.n_var)) < 0.5
-    pop = Population.new("X", np.stack([first, ~first], axis=1).reshape(-1, problem.n_var))
-    return Evaluator().eval(problem, pop).reshape(n_matings, 2)
-
-
-def call(
-    crossover: Any, problem: GridProblem, pairs: Any, seed: int, **algorithm: Any
-) -> tuple[np.ndarray, int]:
-    """Children (n_offsprings, n_matings, N) and the number of evaluations that were counted."""
-    caller = SimpleNamespace(
-        **({"evaluator": Evaluator(), "data": {}, "n_iter": 2, "archive": None} | algorithm)
-    )
-    before, calls = caller.evaluator.n_eval, problem.calls
-    children = crossover(problem, pairs, random_state=np.random.default_rng(seed), algorithm=caller).get("X")
-    assert caller.evaluator.n_eval - before == problem.calls - calls
-    return children.reshape(crossover.n_offsprings, len(pairs), -1), problem.calls - calls
+def front_of(problem: GridProblem) -> NDArray[np.float64]:
+    """The true front: keep the heaviest vertices, any number of them."""
+    weights = np.sort(problem.weights[~problem.pinned])
+    n_dropped = np.arange(len(weights) + 1)
+    error = np.concatenate([[0.0], np.cumsum(weights)])
+    return np.column_stack([error, 2.0 * (problem.n_var - n_dropped) - 6])

@@ -10,8 +10,9 @@ from meshsimp_pymoo import datasets
 from meshsimp_pymoo.datasets import describe, load, names
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_model
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.rules import Rules
 
 SMALL = {"jacksboro": "jacksboro:40", "topobathy": "topobathy:9", "face": "face:300", "crater": "crater:13"}
 
@@ -34,7 +35,7 @@ CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 def test_every_built_in_is_an_open_height_field_that_can_be_simplified(name):
     model = build_model(load(SMALL.get(name, name)))
     assert model.up.tolist() == [0, 0, 1]
-    everything = simplify(model, np.ones(model.n_vertices, dtype=bool))
+    everything = HeightSurface(model).simplify(np.ones(model.n_vertices, dtype=bool))
     assert everything.quality.error == pytest.approx(0, abs=1e-9 * model.diagonal * model.n_vertices)
     assert everything.quality.vertices == model.n_vertices
 
@@ -78,25 +79,25 @@ def test_topobathy_has_its_north_up_and_sea_below_zero():
 
 @pytest.mark.parametrize("side", [3, 17, 33])
 def test_a_roof_is_exact_with_4_triangles_and_costs_its_known_error_without_its_ridge(side):
-    roof = build_model(load("roof", side=side))
-    ridge = simplify(roof, subset(roof, *CORNERS, (0, -1), (0, 1)))
+    roof = HeightSurface(build_model(load("roof", side=side)))
+    ridge = roof.simplify(subset(roof.model, *CORNERS, (0, -1), (0, 1)))
     assert (ridge.quality.error, ridge.quality.triangles) == (0.0, 4)
-    flat = simplify(roof, subset(roof, *CORNERS))
+    flat = roof.simplify(subset(roof.model, *CORNERS))
     assert (flat.quality.error, flat.quality.triangles) == (side * (side - 1) / 2, 2)
 
 
 @pytest.mark.parametrize("side", [5, 17])
 def test_a_pyramid_is_exact_with_4_triangles_and_costs_its_known_error_without_its_apex(side):
-    pyramid = build_model(load("pyramid", side=side))
-    apex = simplify(pyramid, subset(pyramid, *CORNERS, (0, 0)))
+    pyramid = HeightSurface(build_model(load("pyramid", side=side)))
+    apex = pyramid.simplify(subset(pyramid.model, *CORNERS, (0, 0)))
     assert (apex.quality.error, apex.quality.triangles) == (0.0, 4)
-    flat = simplify(pyramid, subset(pyramid, *CORNERS))
+    flat = pyramid.simplify(subset(pyramid.model, *CORNERS))
     assert flat.quality.error == pytest.approx(side * (side - 2) / 3, rel=1e-12)
 
 
 def test_a_plane_is_exact_with_2_triangles():
-    plane = open_model("plane")
-    flat = simplify(plane, subset(plane, *CORNERS))
+    plane = HeightSurface(open_model("plane"))
+    flat = plane.simplify(subset(plane.model, *CORNERS))
     assert (flat.quality.error, flat.quality.triangles) == (0.0, 2)
 
 
@@ -137,7 +138,7 @@ def test_hull_triangles_outside_the_outline_are_left_out_by_the_footprint(name, 
     kept = np.ones(model.n_vertices, dtype=bool)
 
     def area(footprint):
-        corners = model.points[simplify(model, kept, footprint=footprint).faces][:, :, :2]
+        corners = model.points[HeightSurface(model, Rules(footprint=footprint)).simplify(kept).faces][:, :, :2]
         u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
         return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum()
 

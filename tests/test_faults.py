@@ -159,7 +159,7 @@ def test_a_killed_search_goes_on_and_says_so(tmp_path, whole, monkeypatch, capsy
 def test_a_killed_search_of_every_preset_ends_with_the_same_bytes(tmp_path, monkeypatch, algorithm):
     from meshsimp_pymoo.search.presets import PRESETS
 
-    kind = type(PRESETS[algorithm](pop_size=8))
+    kind = type(PRESETS[algorithm].function(pop_size=8))
     options = ("simplify", "face:60", "--algorithm", algorithm, "--population", "8", "--generations", "5", *PLAIN)
     assert run(*options, "-o", tmp_path / "whole") == 0
     with monkeypatch.context() as patch:
@@ -202,7 +202,7 @@ def test_ten_kills_at_random_moments_change_no_byte(tmp_path, forker):
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "whole"]
 
 
-@pytest.mark.parametrize("place", ["report.figures.front_figure", "results.put_in_place", "results._flush"])
+@pytest.mark.parametrize("place", ["report.figures.front_figure", "files._put_in_place", "files._flush"])
 def test_killed_while_the_results_are_written(tmp_path, forker, whole, monkeypatch, place):
     out = stopped(tmp_path / "out", monkeypatch)
     options = ("simplify", *SEARCH, *PLAIN, *BUDGET, "-o", out)
@@ -255,7 +255,7 @@ def test_a_search_with_other_settings_does_not_go_on_from_it(tmp_path, whole, mo
     for options, words in [
         (("--seed", "7"), "seed 1, not 7"),
         (("--evaluations", "500"), "evaluations 400, not 500"),
-        (("--pin", "3"), "pinned vertices"),
+        (("--pin", "3"), "pin None, not [3]"),
         (("--footprint", "hull"), "footprint model, not hull"),
     ]:
         assert simplify(out, *options) == 2
@@ -286,7 +286,7 @@ def test_two_processes_do_not_share_a_folder(tmp_path, monkeypatch, capsys):
     out = stopped(tmp_path / "out", monkeypatch)
     with locked(out):
         assert simplify(out) == 2
-    assert "another process is running" in one_line(capsys)
+    assert "another process is at work there" in one_line(capsys)
     assert (out / CHECKPOINT).exists()
 
 
@@ -303,7 +303,7 @@ def test_ctrl_c_leaves_the_front_so_far_and_no_checkpoint(tmp_path, monkeypatch,
 def test_ctrl_c_while_writing_keeps_the_search(tmp_path, whole, monkeypatch, capsys):
     out = stopped(tmp_path / "out", monkeypatch)
     with monkeypatch.context() as patch:
-        patch.setattr("meshsimp_pymoo.files.put_in_place", lambda *_: stop(KeyboardInterrupt)())
+        patch.setattr("meshsimp_pymoo.files._put_in_place", lambda *_: stop(KeyboardInterrupt)())
         assert simplify(out) == 130
     assert "the same command goes on from the checkpoint" in one_line(capsys)
     assert simplify(out) == 0
@@ -559,7 +559,7 @@ def test_a_killed_run_goes_on_within_the_run(config, tmp_path, all_runs, monkeyp
 
 
 def test_killed_runs_of_moead_go_on_too(config, tmp_path, all_runs, monkeypatch):
-    from meshsimp_pymoo.search.presets import TchebycheffMOEAD
+    from meshsimp_pymoo.search.moead import TchebycheffMOEAD
 
     begin, count = TchebycheffMOEAD._begin_generation, []
     config = read(config)

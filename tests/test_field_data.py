@@ -52,7 +52,8 @@ def test_a_raster_becomes_meshes_in_its_own_coordinates_and_the_record_says_whic
     summary = json.loads(capsys.readouterr().out)
     assert "mesh_origin" not in summary
     record = json.loads((out / "run.json").read_text())
-    assert record["settings"]["window"] == [2, 1, 13, 12]
+    assert record["options"]["window"] == [2, 1, 13, 12]
+    assert "window" not in record["settings"]
     facts = record["model"]["georeference"]
     assert (facts["epsg"], facts["window"]) == (25832, [2, 1, 13, 12])
     assert facts["transform"] == [10, 0, 500_000.25, 0, -10, 5_400_000.75]

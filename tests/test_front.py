@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import builtins
+import dataclasses
 import itertools
 import json
 import pickle
+import re
 import shutil
 import sys
 
@@ -24,8 +26,10 @@ from meshsimp_pymoo import (
     MeshProblem,
     NeighbourShift,
     NestedSubsets,
+    Options,
     PinnedCorners,
     ResultError,
+    Rules,
     greedy_insertion,
     memetic,
     moead,
@@ -34,13 +38,13 @@ from meshsimp_pymoo import (
     weighted_ga_v1,
 )
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.formats.table import write_mesh
+from meshsimp_pymoo.formats.table import write_mesh, written_suffixes
 from meshsimp_pymoo.front import starting_front
 from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.measures import MEASURES
 
 
 @pytest.fixture(scope="module")
@@ -166,12 +170,15 @@ def test_a_solution_that_is_not_there_is_an_error(front):
 
 def test_a_solution_has_its_numbers_and_its_mesh(front):
     solution = front[3]
-    found = simplify(front.model, solution.kept)
+    found = front.problem.surface.simplify(solution.kept)
     q = solution.quality
     assert found.quality == q
     assert (solution.error, solution.triangles, solution.vertices) == (q.error, q.triangles, q.vertices)
     assert (solution.mean_error, solution.rms_error, solution.max_error) == (q.mean_error, q.rms_error, q.max_error)
     assert solution.uncovered == q.uncovered
+    assert {name: getattr(solution, name) for name in MEASURES} == dataclasses.asdict(q)
+    with pytest.raises(AttributeError, match="a solution of a front has no 'eror'; its numbers are error, triangles"):
+        _ = solution.eror
     assert isinstance(solution.mesh, trimesh.Trimesh)
     assert len(solution.mesh.faces) == solution.triangles == len(solution.faces)
     assert solution.simplified.deviation.sum() == pytest.approx(solution.error)
@@ -186,8 +193,8 @@ def test_best_of_a_size_is_the_most_accurate_that_is_small_enough(front):
         assert front.best(triangles=limit).error == min(s.error for s in fitting)
 
 
-@pytest.mark.parametrize("name", ["error", "mean_error", "rms_error", "max_error"])
-def test_best_within_an_error_is_the_smallest(front, name):
+@pytest.mark.parametrize("name", [name for name in MEASURES if name != "triangles"])
+def test_best_within_a_measure_is_the_smallest(front, name):
     values = np.array([getattr(s, name) for s in front])
     for limit in (np.median(values), values.min(), values.max()):
         fitting = [s for s in front if getattr(s, name) <= limit]
@@ -203,6 +210,9 @@ def test_a_limit_that_nothing_meets_says_how_near_the_front_comes(front):
         front.best(triangles=5, error=3)
     with pytest.raises(TypeError, match="0 are given"):
         front.best()
+    with pytest.raises(TypeError, match=r"best\(\) knows no limit 'size'; it takes error, triangles, vertices, "):
+        front.best(size=5)
+    assert front.best(triangles=50, error=None) == front.best(triangles=50)
 
 
 def test_the_knee_lies_farthest_below_the_line_between_the_ends(front):
@@ -229,7 +239,7 @@ def test_what_is_saved_is_read_back(front, stored):
     }
     record = json.loads((stored / "run.json").read_text())
     assert (record["seed"], record["algorithm"], record["generations"], record["evaluations"]) == (1, "NSGA2", 6, 96)
-    assert record["settings"]["footprint"] == "model"
+    assert record["rules"]["footprint"] == "model"
 
 
 def test_a_front_that_was_read_can_be_saved_again_with_the_same_bytes(stored, tmp_path):
@@ -247,12 +257,12 @@ def test_a_search_that_starts_from_thinning_shows_what_it_gained(tmp_path):
     front = Front.from_result(minimize(problem, algorithm, ("n_gen", 3), seed=1))
     ((name, start),) = front.series.items()
     assert name == "adaptive thinning (start)"
-    thinned = thinning(problem.model).F
+    thinned = thinning(problem.surface).F
     assert {tuple(row) for row in start} <= {tuple(row) for row in thinned}
     assert start[0, 1] == thinned[thinned[:, 1] > 0, 1].min()
     assert (np.diff(start[:, 1]) > 0).all()
     assert (np.diff(start[:, 0]) < 0).all()
-    front.series["greedy"] = greedy_insertion(problem.model, most=20).F[1:]
+    front.series["greedy"] = greedy_insertion(problem.surface, most=20).F[1:]
     folder = front.save(tmp_path / "out", meshes=0)
     again = Front.load(folder)
     assert list(again.series) == [name, "greedy"]
@@ -273,7 +283,7 @@ def test_of_a_large_model_the_start_is_drawn_from_points_spread_over_the_sizes()
     problem = MeshProblem("peaks:40")
     (start,) = starting_front(problem, memetic()).values()
     assert 100 < len(start) <= 200
-    assert len(thinning(problem.model).F) > 1500
+    assert len(thinning(problem.surface).F) > 1500
     upper = start[start[:, 1] > 20, 1]
     assert (upper[1:] / upper[:-1]).max() < 1.2
     assert start[-1].tolist() == [0.0, 2 * 39**2]
@@ -299,7 +309,11 @@ def test_nothing_is_overwritten_unasked(front, tmp_path):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("mesh.doc", r"the suffix '\.doc' says no format that can be written; use one of \.ply, \.obj"),
+        (
+            "mesh.doc",
+            r"the suffix '\.doc' says no format that can be written; use one of "
+            + re.escape(", ".join(written_suffixes())),
+        ),
         ("mesh", r"the suffix '' says no format"),
         ("nowhere/mesh.ply", r"there is no folder .*nowhere; make it first"),
         ("folder.ply", r"is a folder; name a file"),
@@ -362,7 +376,8 @@ def test_how_the_model_was_read_is_remembered(tmp_path):
     Front.from_subsets(problem, np.ones((1, 29), bool), ends=True).save(tmp_path / "out", meshes=0)
     front = Front.load(tmp_path / "out")
     assert np.ptp(front[-1].mesh.vertices[:, :2], axis=0).tolist() == [50, 80]
-    assert (front.problem.footprint, front.problem.outside) == ("hull", "ignore")
+    assert front.problem.surface.rules == Rules(footprint="hull", outside="ignore")
+    assert front.problem.options == problem.options == Options(spacing=(10, 20), nodata=-9999)
 
 
 def test_a_front_can_be_pickled(front):

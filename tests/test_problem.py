@@ -20,17 +20,25 @@ from meshsimp_pymoo import (
     MeshProblem,
     NeighbourShift,
     NestedSubsets,
+    Options,
     PinnedCorners,
     RandomSubset,
     Relocation,
+    Rules,
+    memetic,
+    moead,
+    nsga2_v1,
+    nsga2_v2,
+    nsga3,
 )
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import ThreadRunner
-from meshsimp_pymoo.search.presets import memetic, moead, nsga2_v1, nsga2_v2, nsga3
-from meshsimp_pymoo.surface import evaluate as error
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +54,8 @@ def subsets(problem, n=20, seed=0):
 def test_objectives_are_error_and_triangles_of_the_kept_and_pinned_vertices(problem):
     X = subsets(problem)
     F = problem.evaluate(X)
-    table = error.evaluate_subsets(problem.model, X | problem.pinned)
-    np.testing.assert_array_equal(F, table[:, [error.ERROR, error.TRIANGLES]])
+    table = HeightSurface(problem.model).evaluate(X | problem.pinned)
+    np.testing.assert_array_equal(F, table[:, [ERROR, TRIANGLES]])
     np.testing.assert_array_equal(problem.evaluate(X[0]), F[0])
 
 
@@ -137,6 +145,43 @@ def test_a_misspelt_argument_is_refused_with_the_nearest_name():
         MeshProblem("roof:3", footprnt="hull")
 
 
+def test_options_and_rules_come_whole_or_by_name_and_those_by_name_win(tmp_path):
+    np.save(tmp_path / "grid.npy", np.random.default_rng(2).random((5, 6)))
+    options, rules = Options(spacing=(10, 20)), Rules(footprint="hull", outside="ignore", pin="hull")
+    whole = MeshProblem(tmp_path / "grid.npy", options=options, rules=rules)
+    by_name = {"spacing": (10, 20), "footprint": "hull", "outside": "ignore", "pin": "hull"}
+    for arguments in (
+        by_name,
+        {"options": Options(spacing=(1, 1)), "rules": Rules(outside="ignore")} | by_name,
+        {"options": options, "rules": Rules(footprint="hull", pin="hull"), "outside": "ignore"},
+    ):
+        problem = MeshProblem(tmp_path / "grid.npy", **arguments)
+        assert (problem.options, problem.surface.rules) == (options, rules)
+        assert problem.model.hash == whole.model.hash
+        np.testing.assert_array_equal(problem.pinned, whole.pinned)
+        np.testing.assert_array_equal(problem.evaluate(subsets(whole, 5)), whole.evaluate(subsets(whole, 5)))
+
+
+def test_the_measure_of_the_rules_is_the_first_objective():
+    problem = MeshProblem("roof:5", rules=Rules(measure="max_error"))
+    assert problem.objectives == ("max_error", "triangles")
+    problem = MeshProblem("roof:5", rules=Rules(measure="max_error"), objectives=("rms_error", "triangles"))
+    assert problem.surface.rules == Rules(measure="rms_error")
+
+
+def test_a_surface_brings_its_rules_and_takes_no_other_ones():
+    surface = HeightSurface(open_model("roof:5"), Rules(footprint="hull", measure="rms_error"))
+    problem = MeshProblem(surface)
+    assert problem.surface is surface
+    assert problem.model is surface.model
+    assert problem.objectives == ("rms_error", "triangles")
+    for arguments in ({"footprint": "model"}, {"rules": Rules()}, {"spacing": 2.0}, {"options": Options(up="z")}):
+        with pytest.raises(TypeError, match="a HeightSurface is a model that was read, with its rules; make an"):
+            MeshProblem(surface, **arguments)
+    with pytest.raises(ValueError, match=r"the surface's rules measure 'rms_error'; .* Rules\(measure='error'\)"):
+        MeshProblem(surface, objectives=("error", "triangles"))
+
+
 # ------------------------------------------------------------------------------- other objectives, and weights
 
 
@@ -219,7 +264,7 @@ def test_relocation_lowers_the_measure_of_the_problem():
 
 def test_thinning_and_relocation_refuse_the_maximum():
     problem = MeshProblem("roof:9", objectives=("max_error", "triangles"))
-    with pytest.raises(ValueError, match="the first objective is the maximum"):
+    with pytest.raises(ValueError, match=r"lower a sum .*, and 'max_error' is none; use 'error' or 'rms_error', "):
         NestedSubsets()(problem, 4, random_state=np.random.default_rng(0))
     with pytest.raises(ValueError, match=r"nsga2_v1\(\)"):
         Relocation()._do(problem, subsets(problem, 2), random_state=np.random.default_rng(0))

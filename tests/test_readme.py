@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.cli.arguments import make_parser
+from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.presets import PRESETS

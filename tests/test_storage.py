@@ -9,24 +9,20 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import trimesh
+from samples import random_solutions, write_solutions
 
-from meshsimp_pymoo import storage as results
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelWarning, ResultError
+from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.source import SourceMesh
-from meshsimp_pymoo.formats.table import read_source, write_mesh
+from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.storage import FRONT_COLUMNS, claim_output, mesh_arrays, read_front, write_front
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
-
-MESH_PROGRAM_FORMATS = [name for name in results.MESH_FORMATS if name != "landxml"]
-UTM = np.array([500_000.25, 5_400_000.5, 300.125])
 
 
 @pytest.fixture(scope="module")
@@ -36,17 +32,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def solutions(model):
-    """Twelve random subsets of growing size, listed out of order, with their simplified meshes."""
-    rng = np.random.default_rng(5)
-    kept = rng.random((12, model.n_vertices)) < np.linspace(0.1, 0.9, 12)[rng.permutation(12), None]
-    kept[:, model.corners] = True
-    return kept, [simplify(model, row) for row in kept]
-
-
-def write(folder, model, solutions, **options):
-    kept, simplified = solutions
-    options = {"faces": lambda row: simplified[row].faces, "run": {"seed": 3}} | options
-    return write_front(folder, model, [s.quality for s in simplified], kept, **options)
+    return random_solutions(model)
 
 
 def files(folder):
@@ -57,7 +43,7 @@ def files(folder):
 
 def test_a_front_reads_back_as_it_was_written(tmp_path, model, solutions):
     kept, simplified = solutions
-    stored = read_front(write(tmp_path / "deep" / "out", model, solutions, chosen=4))
+    stored = read_front(write_solutions(tmp_path / "deep" / "out", model, solutions, chosen=4))
     order = np.lexsort(([s.quality.error for s in simplified], [s.quality.triangles for s in simplified]))
     assert np.array_equal(stored.kept, kept[order])
     for column in FRONT_COLUMNS[1:-1]:
@@ -74,19 +60,19 @@ def test_a_front_reads_back_as_it_was_written(tmp_path, model, solutions):
 
 def test_other_fronts_are_stored_beside_it_sorted_by_triangles(tmp_path, model, solutions):
     others = {"greedy, worst point": [[0.1, 9], [1 / 3, 4]], 'a "b"': [[7.0, 2]]}
-    stored = read_front(write(tmp_path / "out", model, solutions, series=others))
+    stored = read_front(write_solutions(tmp_path / "out", model, solutions, series=others))
     assert {name: F.tolist() for name, F in stored.series.items()} == {
         "greedy, worst point": [[1 / 3, 4.0], [0.1, 9.0]], 'a "b"': [[7.0, 2.0]]
     }  # fmt: skip
-    assert read_front(write(tmp_path / "alone", model, solutions)).series == {}
+    assert read_front(write_solutions(tmp_path / "alone", model, solutions)).series == {}
     assert not (tmp_path / "alone" / "series.csv").exists()
     for wrong in ([1.0, 2.0], [[1.0, np.nan]], np.zeros((0, 2))):
         with pytest.raises(ValueError, match="the series 'x' is no front"):
-            write(tmp_path / "wrong", model, solutions, series={"x": wrong})
+            write_solutions(tmp_path / "wrong", model, solutions, series={"x": wrong})
 
 
 def test_meshes_stand_where_the_front_says_and_are_the_solutions(tmp_path, model, solutions):
-    folder = write(tmp_path / "out", model, solutions)
+    folder = write_solutions(tmp_path / "out", model, solutions)
     stored = read_front(folder)
     assert stored.meshes[0] == f"meshes/000_{stored.quality['triangles'][0]}.ply"
     for kept, triangles, path in zip(stored.kept, stored.quality["triangles"], stored.meshes, strict=True):
@@ -99,9 +85,9 @@ def test_meshes_stand_where_the_front_says_and_are_the_solutions(tmp_path, model
 
 def test_the_referee_agrees_with_the_written_front(tmp_path, model, solutions, oracle):
     everything = np.ones(model.n_vertices, dtype=bool)
-    assert simplify(model, everything).quality.error < 1e-9
+    assert HeightSurface(model).simplify(everything).quality.error < 1e-9
     write_mesh(tmp_path / "original.ply", model.file_points, model.faces)
-    folder = write(tmp_path / "out", model, solutions)
+    folder = write_solutions(tmp_path / "out", model, solutions)
     command = [sys.executable, oracle, tmp_path / "original.ply", "--front", folder / "front.csv"]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
@@ -110,7 +96,7 @@ def test_the_referee_agrees_with_the_written_front(tmp_path, model, solutions, o
 
 
 def test_the_same_front_gives_the_same_bytes(tmp_path, model, solutions):
-    one, two = (files(write(tmp_path / name, model, solutions, mesh_format="ply")) for name in "ab")
+    one, two = (files(write_solutions(tmp_path / name, model, solutions, mesh_format="ply")) for name in "ab")
     assert one == two
     assert {"front.csv", "front.npz", "run.json"} < set(one)
     with zipfile.ZipFile(tmp_path / "a" / "front.npz") as archive:
@@ -122,188 +108,11 @@ def test_the_same_front_gives_the_same_bytes(tmp_path, model, solutions):
     [(None, list(range(12))), (100, list(range(12))), (3, [0, 6, 11]), (1, [0]), (0, [])],
 )
 def test_a_long_front_writes_an_even_selection_of_its_meshes(tmp_path, model, solutions, meshes, written):
-    folder = write(tmp_path / "out", model, solutions, meshes=meshes)
+    folder = write_solutions(tmp_path / "out", model, solutions, meshes=meshes)
     stored = read_front(folder)
     assert [row for row, path in enumerate(stored.meshes) if path] == written
     on_disk = {p.relative_to(folder).as_posix() for p in folder.glob("meshes/*")}
     assert on_disk == {path for path in stored.meshes if path}
-
-
-@pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)
-def test_every_format_opens_in_trimesh_with_the_same_shape(tmp_path, model, solutions, suffix):
-    folder = write(tmp_path / "out", model, solutions, mesh_format=suffix, chosen=0, meshes=1)
-    vertices, faces, _ = mesh_arrays(model, solutions[1][0].faces)
-    mesh = trimesh.load(folder / f"chosen.{suffix}", process=False, force="mesh")
-    single = suffix in ("stl", "glb")
-    assert len(mesh.faces) == len(faces)
-    corners = mesh.triangles.reshape(-1, 9)
-    expected = vertices[faces].reshape(-1, 9)
-    if single:
-        np.testing.assert_allclose(corners, expected, rtol=1e-6)
-    else:
-        assert np.array_equal(corners, expected)
-
-
-@pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)
-def test_every_format_opens_in_pymeshlab(tmp_path, model, solutions, suffix):
-    pymeshlab = pytest.importorskip("pymeshlab", exc_type=ImportError)
-    vertices, faces, attributes = mesh_arrays(model, solutions[1][0].faces)
-    write_mesh(tmp_path / f"a.{suffix}", vertices, faces, attributes)
-    meshes = pymeshlab.MeshSet()
-    meshes.load_new_mesh(str(tmp_path / f"a.{suffix}"))
-    assert meshes.current_mesh().face_number() == len(faces)
-    if suffix == "ply":
-        assert np.array_equal(meshes.current_mesh().vertex_matrix(), vertices)
-
-
-def coloured(source):
-    rng = np.random.default_rng(2)
-    n = len(source.points)
-    attributes = {
-        "color": rng.integers(0, 256, (n, 4), dtype=np.uint8),
-        "quality": rng.random(n).astype(np.float32),
-        "label": rng.integers(-5, 5, n),
-        "two words": rng.random(n),
-        "pair": rng.random((n, 2)),
-        "seen": rng.random(n) < 0.5,
-    }
-    return dataclasses.replace(source, attributes=attributes)
-
-
-def test_colours_and_attributes_travel_to_the_simplified_mesh(tmp_path, solutions):
-    source = coloured(load("face:200"))
-    folder = write(tmp_path / "out", build_model(source), solutions, chosen=1)
-    back = read_source(folder / "chosen.ply")
-    row = {tuple(point): k for k, point in enumerate(source.points.tolist())}
-    came_from = [row[tuple(point)] for point in back.points.tolist()]
-    for name in ("color", "quality", "label", "seen"):
-        assert np.array_equal(back.attributes[name], source.attributes[name][came_from]), name
-    assert np.array_equal(back.attributes["two_words"], source.attributes["two words"][came_from])
-    assert np.array_equal(back.attributes["pair_1"], source.attributes["pair"][came_from, 1])
-    assert back.attributes["quality"].dtype == np.float32
-
-
-@pytest.mark.parametrize("suffix", ["obj", "glb"])
-def test_colours_travel_in_the_other_formats_that_hold_them(tmp_path, solutions, suffix):
-    source = coloured(load("face:200"))
-    folder = write(tmp_path / "out", build_model(source), solutions, chosen=1, mesh_format=suffix)
-    mesh = trimesh.load(folder / f"chosen.{suffix}", process=False, force="mesh")
-    row = {tuple(point): k for k, point in enumerate(source.points.astype(np.float32).tolist())}
-    came_from = [row[tuple(point)] for point in mesh.vertices.astype(np.float32).tolist()]
-    expected = source.attributes["color"][came_from, :3]
-    np.testing.assert_allclose(mesh.visual.vertex_colors[:, :3].astype(int), expected.astype(int), atol=1)
-
-
-def test_double_precision_survives_far_from_the_origin(tmp_path, solutions):
-    source = load("face:200")
-    far = dataclasses.replace(source, points=source.points + np.array([5e6, 4e6, 0]))
-    folder = write(tmp_path / "out", build_model(far), solutions, chosen=1)
-    written = {tuple(point) for point in read_source(folder / "chosen.ply").points.tolist()}
-    assert written <= {tuple(point) for point in far.points.tolist()}
-
-
-def test_a_single_precision_format_says_how_far_it_moves_vertices(tmp_path, solutions):
-    source = load("face:200")
-    far = build_model(dataclasses.replace(source, points=source.points + np.array([5e6, 4e6, 0])))
-    with pytest.warns(
-        ModelWarning, match=r"moves vertices by up to 0\.[12]\d+ \[file units\]; ply, obj and off"
-    ):
-        write(tmp_path / "out", far, solutions, mesh_format="stl")
-
-
-def glb_tree(path):
-    content = path.read_bytes()
-    length = int.from_bytes(content[12:16], "little")
-    assert content[:4] == b"glTF"
-    assert int.from_bytes(content[8:12], "little") == len(content)
-    assert length % 4 == 0
-    return json.loads(content[20 : 20 + length])
-
-
-def test_a_glb_far_from_the_origin_states_a_local_one_and_loses_nothing(tmp_path, solutions):
-    source = load("face:200")
-    points = np.round(source.points * 1024) / 1024 + UTM
-    far = build_model(dataclasses.replace(source, points=points, georeference={"epsg": 25832, "crs": "PROJCS[...]"}))
-    folder = write(tmp_path / "out", far, solutions, mesh_format="glb", chosen=3)
-    (origin,) = {tuple(glb_tree(path)["nodes"][0]["extras"]["origin"]) for path in folder.glob("**/*.glb")}
-    assert origin == tuple(np.floor(far.file_points.min(axis=0)))
-    node = glb_tree(folder / "chosen.glb")["nodes"][0]
-    assert node["translation"] == list(origin)
-    assert (node["extras"]["epsg"], node["extras"]["crs"]) == (25832, "PROJCS[...]")
-    assert read_front(folder).run["mesh_origin"] == list(origin)
-    vertices, faces, _ = mesh_arrays(far, solutions[1][3].faces)
-    for path in (folder / "chosen.glb", folder / "meshes" / "000.glb"):
-        if not path.exists():
-            continue
-        mesh = trimesh.load(path, process=False, force="mesh")  # puts it where the node says, in double precision
-        assert np.array_equal(mesh.triangles, vertices[faces])
-    again = read_source(folder / "chosen.glb")
-    assert {tuple(p) for p in again.points.tolist()} == {tuple(p) for p in vertices.tolist()}
-
-
-def test_a_glb_near_the_origin_has_its_coordinates_as_they_are(tmp_path, model, solutions):
-    folder = write(tmp_path / "out", model, solutions, mesh_format="glb", meshes=1)
-    (path,) = folder.glob("meshes/*.glb")
-    assert glb_tree(path)["nodes"] == [{"mesh": 0}]
-    assert "mesh_origin" not in read_front(folder).run
-
-
-LAND = "{http://www.landxml.org/schema/LandXML-1.2}"
-
-
-@pytest.mark.parametrize(
-    ("unit", "system", "linear"),
-    [(None, "Metric", "meter"), ("metre", "Metric", "meter"), ("US survey foot", "Imperial", "USSurveyFoot")],
-)
-def test_landxml_is_a_tin_of_northing_easting_and_elevation_in_double_precision(
-    tmp_path, solutions, unit, system, linear
-):
-    source = load("face:200")
-    facts = {"epsg": 25832, "crs": 'PROJCS["a & b"]', "unit": unit}
-    far = build_model(dataclasses.replace(source, points=source.points + UTM, georeference=facts, name='<a & "b">.tif'))
-    folder = write(tmp_path / "out", far, solutions, mesh_format="landxml", chosen=3, meshes=1)
-    assert read_front(folder).meshes[0].endswith(".xml")
-    root = ElementTree.parse(folder / "chosen.xml").getroot()
-    assert root.tag == f"{LAND}LandXML"
-    assert {"version", "date", "time"} <= set(root.attrib)
-    (units,) = root.find(f"{LAND}Units")
-    assert units.tag == LAND + system
-    assert units.get("linearUnit") == linear
-    assert {"areaUnit", "linearUnit", "volumeUnit", "temperatureUnit", "pressureUnit"} == set(units.attrib)
-    coordinates = root.find(f"{LAND}CoordinateSystem")
-    assert (coordinates.get("epsgCode"), coordinates.get("ogcWktCode")) == ("25832", 'PROJCS["a & b"]')
-    surface = root.find(f"{LAND}Surfaces/{LAND}Surface")
-    assert surface.get("name") == '<a & "b">'
-    definition = surface.find(f"{LAND}Definition")
-    assert definition.get("surfType") == "TIN"
-    points = {int(p.get("id")): [float(word) for word in p.text.split()] for p in definition.find(f"{LAND}Pnts")}
-    assert sorted(points) == list(range(1, len(points) + 1))
-    vertices, faces, _ = mesh_arrays(far, solutions[1][3].faces)
-    back = np.array([points[k + 1] for k in range(len(points))])[:, [1, 0, 2]]
-    assert np.array_equal(back, vertices)  # to the last bit
-    triangles = np.array([f.text.split() for f in definition.find(f"{LAND}Faces")], dtype=int)
-    assert np.array_equal(triangles - 1, faces)
-    assert float(definition.get("elevMax")) == vertices[:, 2].max()
-
-
-def test_landxml_is_refused_where_the_height_is_not_z(tmp_path):
-    roof = load("roof:5")
-    model = build_model(SourceMesh(roof.points[:, [2, 0, 1]], roof.faces, {}, "turned"), up="x")
-    kept = np.ones((1, model.n_vertices), dtype=bool)
-    with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .* do not look up"):
-        write_front(tmp_path / "out", model, [simplify(model, kept[0]).quality], kept, meshes=0, mesh_format="landxml")
-
-
-def test_the_reference_system_stands_in_the_record_and_in_the_ply(tmp_path, solutions):
-    source = load("face:200")
-    facts = {"epsg": 25832, "transform": [1.0, 0.0, 2.0, 0.0, -1.0, 5.0]}
-    folder = write(tmp_path / "a", build_model(dataclasses.replace(source, georeference=facts)), solutions, chosen=1)
-    assert read_front(folder).run["model"]["georeference"] == facts
-    assert b"\ncomment crs EPSG:25832\n" in (folder / "chosen.ply").read_bytes()
-    wkt = {"crs": 'LOCAL_CS["Höhe\n\n2",  UNIT["metre",1]]'}
-    folder = write(tmp_path / "b", build_model(dataclasses.replace(source, georeference=wkt)), solutions, chosen=1)
-    assert '\ncomment crs LOCAL_CS["Höhe 2", UNIT["metre",1]]\n'.encode() in (folder / "chosen.ply").read_bytes()
-    assert len(read_source(folder / "chosen.ply").faces) == solutions[1][1].quality.triangles
 
 
 def test_a_tilted_model_is_written_back_in_its_own_frame(tmp_path):
@@ -321,29 +130,29 @@ def test_a_tilted_model_is_written_back_in_its_own_frame(tmp_path):
 def test_an_existing_folder_is_refused_and_left_alone(tmp_path, model, solutions):
     (tmp_path / "out").mkdir()
     with pytest.raises(ResultError, match=r"out: exists already; name another folder or allow overwriting"):
-        write(tmp_path / "out", model, solutions)
+        write_solutions(tmp_path / "out", model, solutions)
     assert list((tmp_path / "out").iterdir()) == []
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
 def test_own_results_are_replaced_when_asked(tmp_path, model, solutions):
-    folder = write(tmp_path / "out", model, solutions, meshes=5, chosen=2)
-    write(folder, model, solutions, meshes=0, overwrite=True)
+    folder = write_solutions(tmp_path / "out", model, solutions, meshes=5, chosen=2)
+    write_solutions(folder, model, solutions, meshes=0, overwrite=True)
     assert set(files(folder)) == {"front.csv", "front.npz", "run.json"}
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
 def test_foreign_files_are_never_deleted(tmp_path, model, solutions):
-    folder = write(tmp_path / "out", model, solutions)
+    folder = write_solutions(tmp_path / "out", model, solutions)
     (folder / "thesis.tex").write_text("years of work")
     before = files(folder)
     with pytest.raises(ResultError, match=r"out: holds thesis.tex, which is no result of meshsimp"):
-        write(folder, model, solutions, overwrite=True)
+        write_solutions(folder, model, solutions, overwrite=True)
     assert files(folder) == before
 
 
 def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_path, model, solutions):
-    folder = write(tmp_path / "out", model, solutions)
+    folder = write_solutions(tmp_path / "out", model, solutions)
     before = files(folder)
 
     def fail(unfinished):
@@ -351,7 +160,7 @@ def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_pat
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write(folder, model, solutions, extra=fail, overwrite=True)
+        write_solutions(folder, model, solutions, extra=fail, overwrite=True)
     assert files(folder) == before
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
@@ -359,7 +168,7 @@ def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_pat
 def test_an_old_result_survives_when_the_new_one_cannot_be_put_in_place(
     tmp_path, model, solutions, monkeypatch
 ):
-    folder = write(tmp_path / "out", model, solutions)
+    folder = write_solutions(tmp_path / "out", model, solutions)
     before = files(folder)
     rename = Path.rename
 
@@ -370,7 +179,7 @@ def test_an_old_result_survives_when_the_new_one_cannot_be_put_in_place(
 
     monkeypatch.setattr(Path, "rename", fail_for_the_new_one)
     with pytest.raises(ResultError, match=r"cannot be put in place \(Permission denied\)"):
-        write(folder, model, solutions, overwrite=True)
+        write_solutions(folder, model, solutions, overwrite=True)
     monkeypatch.undo()
     assert files(folder) == before
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
@@ -381,7 +190,7 @@ def test_a_failure_leaves_nothing(tmp_path, model, solutions):
         raise RuntimeError("no ink")
 
     with pytest.raises(RuntimeError, match="no ink"):
-        write(tmp_path / "out", model, solutions, extra=fail)
+        write_solutions(tmp_path / "out", model, solutions, extra=fail)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -411,20 +220,20 @@ def test_an_unwritable_parent_is_named(tmp_path, monkeypatch):
 
 def test_an_empty_or_unfinished_front_is_refused(tmp_path, model, solutions):
     kept, simplified = solutions
-    quality = [s.quality for s in simplified]
+    surface, quality = HeightSurface(model), [s.quality for s in simplified]
     with pytest.raises(ValueError, match="the front is empty"):
-        write_front(tmp_path / "out", model, [], kept[:0])
+        write_front(tmp_path / "out", surface, [], kept[:0])
     with pytest.raises(ValueError, match=r"kept has the shape \(11, 200\)"):
-        write_front(tmp_path / "out", model, quality, kept[:-1])
+        write_front(tmp_path / "out", surface, quality, kept[:-1])
     broken = [*quality[:-1], dataclasses.replace(quality[-1], error=float("nan"))]
     with pytest.raises(ValueError, match="solution 11 has an error that is not finite"):
-        write_front(tmp_path / "out", model, broken, kept, meshes=0)
+        write_front(tmp_path / "out", surface, broken, kept, meshes=0)
     with pytest.raises(ValueError, match="no faces are given"):
-        write_front(tmp_path / "out", model, quality, kept)
+        write_front(tmp_path / "out", surface, quality, kept)
     with pytest.raises(ValueError, match="mesh_format is 'xyz'"):
-        write(tmp_path / "out", model, solutions, mesh_format="xyz")
+        write_solutions(tmp_path / "out", model, solutions, mesh_format="xyz")
     with pytest.raises(TypeError, match=r"a set cannot be recorded in run\.json"):
-        write(tmp_path / "out", model, solutions, run={"seed": {1}})
+        write_solutions(tmp_path / "out", model, solutions, run={"seed": {1}})
     assert list(tmp_path.iterdir()) == []
 
 
@@ -565,7 +374,7 @@ DAMAGE = {
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_result_is_noticed_and_named(tmp_path, model, solutions, damage):
     spoil, message = DAMAGE[damage]
-    folder = write(tmp_path / "out", model, solutions, meshes=0)
+    folder = write_solutions(tmp_path / "out", model, solutions, meshes=0)
     spoil(folder)
     with pytest.raises(ResultError, match=message) as caught:
         read_front(folder)
@@ -573,10 +382,10 @@ def test_a_damaged_result_is_noticed_and_named(tmp_path, model, solutions, damag
 
 
 def test_a_bit_beyond_the_last_vertex_is_noticed(tmp_path):
-    model = open_model("roof:3")
+    surface = HeightSurface(open_model("roof:3"))
     kept = np.ones((1, 9), dtype=bool)
-    whole = simplify(model, kept[0])
-    folder = write_front(tmp_path / "out", model, [whole.quality], kept, meshes=0)
+    whole = surface.simplify(kept[0])
+    folder = write_front(tmp_path / "out", surface, [whole.quality], kept, meshes=0)
     spoil_npz(kept=lambda k: k | 1)(folder)
     with pytest.raises(ResultError, match="kept has bits set beyond the 9 vertices"):
         read_front(folder)

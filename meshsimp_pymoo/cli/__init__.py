@@ -21,7 +21,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from meshsimp_pymoo.cli.arguments import make_parser
+from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.cli.terminal import BAD_INPUT, INTERRUPTED, OK, interruptible, say, warnings_as_lines
 from meshsimp_pymoo.errors import InputError
 

@@ -6,10 +6,11 @@ called. No files, no figures.
 
 The order of a study:
 
-1. `merged_fronts`, `pseudo_optimal`: what each method found in all its runs, and what all found together;
+1. `pseudo_optimal`: what a method found in all its runs, or what all methods found together;
 2. `unary_scores`: hypervolume ratio, epsilon, coverage and cardinality of every run against that optimum;
    `epsilon_table`, `coverage_table`: every method's runs against every other's, the paper's Tables 2 and 1;
-3. `compare`: the paper's Wilcoxon procedure, with effect sizes; `holm`, `corrected` for many comparisons;
+3. `rank_sum`, of indicators or of `dominance_rates`: the paper's Wilcoxon procedure, with effect sizes; `holm`,
+   `corrected` for many comparisons;
 4. `selected_solutions`: the paper's three solutions per method, and the knees;
 5. `attainment_surfaces`: where a share of a method's runs gets.
 
@@ -53,7 +54,6 @@ from meshsimp_pymoo.indicators import (
 __all__ = [
     "ALPHA",
     "COVERAGE_THRESHOLD",
-    "INDICATORS",
     "Comparison",
     "OptimalFront",
     "PairTable",
@@ -62,7 +62,6 @@ __all__ = [
     "Solution",
     "Summary",
     "attainment_surfaces",
-    "compare",
     "corrected",
     "coverage_table",
     "dominance_rates",
@@ -70,8 +69,6 @@ __all__ = [
     "holm",
     "knees",
     "magnitude",
-    "merged_front",
-    "merged_fronts",
     "pseudo_optimal",
     "rank_sum",
     "scale_factor",
@@ -90,9 +87,6 @@ COVERAGE_THRESHOLD = 0.75
 
 # How many random weights choose the best trade-off.
 N_WEIGHTS = 1000
-
-INDICATORS = ("hvr", "cardinality", "epsilon", "coverage")
-"""What `compare` can compare methods by: two indicators of a run, two of a pair of runs."""
 
 
 @dataclass(frozen=True)
@@ -281,24 +275,6 @@ class Solution:
     error: float
     triangles: int
     seeds: tuple[int, ...]
-
-
-def merged_front(runs: Mapping[int, ArrayLike]) -> FloatArray:
-    """Return what all runs of one method found together: merged, duplicates removed, dominance applied.
-
-    Examples
-    --------
-    >>> merged_front({1: [[3.0, 2], [1.0, 6]], 2: [[2.0, 4], [1.0, 8]]})
-    array([[3., 2.],
-           [2., 4.],
-           [1., 6.]])
-    """
-    return non_dominated(np.vstack(list(_fronts({"method": runs})["method"].values())))
-
-
-def merged_fronts(runs: Runs) -> dict[str, FloatArray]:
-    """Return the merged front of every method."""
-    return {method: _merged(fronts) for method, fronts in _fronts(runs).items()}
 
 
 def pseudo_optimal(runs: Runs) -> OptimalFront:
@@ -558,66 +534,6 @@ def dominance_rates(
     return np.asarray(dominates.mean(axis=1), dtype=float)
 
 
-def compare(
-    runs: Runs,
-    indicator: str,
-    *,
-    optimal: OptimalFront | ArrayLike | None = None,
-    alpha: float = ALPHA,
-    model: str = "",
-) -> list[Comparison]:
-    """Compare every two methods by an indicator, by the paper's Wilcoxon procedure.
-
-    For an indicator of a run ("hvr", "cardinality") the samples are its values; for an indicator of a pair of
-    runs ("epsilon", "coverage") they are P_A(B) and P_B(A), see `dominance_rates`. The rank-sum test compares
-    the two samples; the method with the larger mean is better if p < alpha. Holm's correction is over all
-    pairs of this call; `corrected` does it over more.
-
-    Parameters
-    ----------
-    runs : mapping
-        ``runs[method][seed]`` is an (n, 2) front; at least two methods.
-    indicator : {"hvr", "cardinality", "epsilon", "coverage"}
-        What to compare by; all so that the larger sample is better.
-    optimal : OptimalFront or (P, 2) array-like, optional
-        For "hvr".
-    alpha : float
-        Level of significance.
-    model : str
-        A name to carry along.
-
-    Returns
-    -------
-    list of Comparison
-        One for each pair of methods, in the order of ``runs``.
-    """
-    fronts = _fronts(runs)
-    if len(fronts) < 2:
-        raise ValueError(f"there is only the method {next(iter(fronts))!r}: give two or more to compare")
-    if indicator in ("hvr", "cardinality"):
-        scores = unary_scores(runs, optimal)
-        values = {method: getattr(scores[method], indicator).astype(float) for method in fronts}
-        samples = {(a, b): (values[a], values[b]) for a, b in itertools.combinations(fronts, 2)}
-    elif indicator in ("epsilon", "coverage"):
-        table = epsilon_table(runs) if indicator == "epsilon" else coverage_table(runs)
-        samples = {
-            (a, b): (
-                dominance_rates(table.values[a, b], table.values[b, a], indicator),
-                dominance_rates(table.values[b, a], table.values[a, b], indicator),
-            )
-            for a, b in itertools.combinations(fronts, 2)
-        }
-    else:
-        raise ValueError(f"unknown indicator {indicator!r}: choose among {', '.join(INDICATORS)}")
-    comparisons = []
-    for (a, b), (sample_a, sample_b) in samples.items():
-        test = rank_sum(sample_a, sample_b, alpha=alpha)
-        comparisons.append(
-            Comparison(indicator, a, b, sample_a, sample_b, test.p, test.p, test.a12, alpha, model, test.note)
-        )
-    return corrected(comparisons)
-
-
 def corrected(comparisons: Iterable[Comparison]) -> list[Comparison]:
     """Return comparisons with Holm's correction over all of them, e.g. of one indicator on all models."""
     family = list(comparisons)
@@ -647,7 +563,6 @@ def trade_off(
     random_state: np.random.Generator,
     alpha: float | None = None,
     n_weights: int = N_WEIGHTS,
-    rule: str = "mean",
 ) -> int:
     """Return the best trade-off of a front between error and triangles, over many random weights.
 
@@ -656,13 +571,13 @@ def trade_off(
         F_w(s) = w * error(s) + (1 - w) * alpha * triangles(s)
 
     A reading: the design gives the random weights and the scale factor, not how 1000 values become one
-    choice. Under ``rule="mean"`` the solution with the least average of F_w is chosen, under ``"votes"`` the
-    one that is best for most weights. Of equal solutions the one with the fewest triangles is chosen.
+    choice. Here the solution with the least average of F_w is chosen, of equal ones that with the fewest
+    triangles.
 
     Parameters
     ----------
     front : (n, 2) array-like
-        (error, triangles), non-dominated and sorted by triangles, as `merged_front` gives it.
+        (error, triangles), non-dominated and sorted by triangles, as `indicators.non_dominated` gives it.
     random_state : numpy.random.Generator
         Draws the weights.
     alpha : float, optional
@@ -670,8 +585,6 @@ def trade_off(
         the same, that of the pseudo-optimal front, to compare their choices.
     n_weights : int
         Number of weights.
-    rule : {"mean", "votes"}
-        How the weights choose.
 
     Returns
     -------
@@ -691,11 +604,7 @@ def trade_off(
         raise ValueError(f"the scale factor alpha is {factor}: it must be positive")
     weights = random_state.uniform(size=(n_weights, 1))
     value = weights * F[:, 0] + (1 - weights) * factor * F[:, 1]
-    if rule == "mean":
-        return int(value.mean(axis=0).argmin())
-    if rule == "votes":
-        return int(np.bincount(value.argmin(axis=1), minlength=len(F)).argmax())
-    raise ValueError(f"unknown rule {rule!r}: choose 'mean' or 'votes'")
+    return int(value.mean(axis=0).argmin())
 
 
 def knees(front: ArrayLike) -> IntArray:
@@ -707,7 +616,7 @@ def knees(front: ArrayLike) -> IntArray:
     Parameters
     ----------
     front : (n, 2) array-like
-        (error, triangles), non-dominated and sorted by triangles, as `merged_front` gives it.
+        (error, triangles), non-dominated and sorted by triangles, as `indicators.non_dominated` gives it.
 
     Returns
     -------
@@ -733,7 +642,6 @@ def selected_solutions(
     random_state: np.random.Generator,
     optimal: OptimalFront | ArrayLike | None = None,
     n_weights: int = N_WEIGHTS,
-    rule: str = "mean",
 ) -> dict[str, tuple[Solution, ...]]:
     """Return the paper's three solutions of every method, and its knees.
 
@@ -749,7 +657,7 @@ def selected_solutions(
         Draws the weights.
     optimal : OptimalFront or (P, 2) array-like, optional
         Gives the scale factor; `pseudo_optimal` of the runs unless given.
-    n_weights, rule
+    n_weights : int
         As in `trade_off`.
 
     Returns
@@ -776,7 +684,7 @@ def selected_solutions(
         found = pseudo_optimal({method: seeds})
         front = found.front
         same_weights = np.random.default_rng(seed_of_weights)
-        middle = trade_off(front, random_state=same_weights, alpha=alpha, n_weights=n_weights, rule=rule)
+        middle = trade_off(front, random_state=same_weights, alpha=alpha, n_weights=n_weights)
         rows = [("least_error", len(front) - 1), ("fewest_triangles", 0), ("trade_off", middle)]
         rows += [("knee", int(row)) for row in knees(front)]
         chosen[method] = tuple(
@@ -867,7 +775,7 @@ def _front(front: ArrayLike) -> FloatArray:
     if F.shape != reduced.shape or not np.array_equal(F, reduced):
         raise ValueError(
             f"these {len(F)} solutions are not a front sorted by triangles, so rows would be ambiguous; "
-            "pass them through merged_front or indicators.non_dominated first"
+            "pass them through indicators.non_dominated first"
         )
     return F
 

@@ -78,9 +78,6 @@ MAX_VALUES = 20_000
 MAX_DEPTH = 40
 MAX_NAME = 60
 MAX_FILE_NAME = 255
-# Whole numbers beyond this are not exact as floats any more, and no run is that long.
-MAX_WHOLE = 2**53
-MAX_REAL = 1e300
 # Parameters that decide how much memory and time a trial takes, and the most of them that can be meant.
 MOST = {"pop_size": 5_000, "n_offsprings": 5_000, "ref_dirs": 5_000, "n_neighbors": 5_000, "moves_per_vertex": 1_000}
 
@@ -308,7 +305,9 @@ def settings(part: Any) -> dict[str, Any]:
     0.8
     """
     kind = type(part)
-    found: dict[str, Any] = {"class": f"{kind.__module__}.{kind.__qualname__}"}
+    # a class of this package is known by its name, wherever it lives
+    home = "meshsimp_pymoo" if kind.__module__.startswith("meshsimp_pymoo.") else kind.__module__
+    found: dict[str, Any] = {"class": f"{home}.{kind.__qualname__}"}
     for name in sorted((_parameters(kind) or set()) - WITHOUT_EFFECT):
         value: Any = getattr(part, name, None)
         if type(value).__module__ == "pymoo.core.variable":
@@ -627,12 +626,7 @@ def _option(key: str, entry: Entry) -> Any:
             )
         return names
     known = settings_of(Options) | settings_of(Rules)
-    kind = known[key].kind if key in known else LIMITS[key]
-    value = entry.plain()
-    try:
-        return kind.from_plain(value)
-    except ValueError as problem:
-        entry.fail(str(problem))
+    return entry.of(known[key].kind if key in known else LIMITS[key])
 
 
 def _distinct(entry: Entry, read: Callable[[Entry], Any], what: str) -> tuple[Any, ...]:
@@ -856,23 +850,21 @@ class Entry:
             self.fail("expected true or false")
         return bool(self.plain())
 
+    def of(self, kind: Kind) -> Any:
+        """Return a value of a kind that settings have."""
+        value = self.plain()
+        try:
+            return kind.from_plain(value)
+        except ValueError as problem:
+            self.fail(str(problem))
+
     def whole(self, least: int) -> int:
         """Return a whole number."""
-        value = self.plain()
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MAX_WHOLE:
-            most = " and at most 2**53" if isinstance(value, int) and value > MAX_WHOLE else ""
-            self.fail(f"expected a whole number of at least {least}{most}")
-        return int(value)
+        return int(self.of(Whole(least)))
 
     def real(self, least: float | None, *, strict: bool = False) -> float:
         """Return a number, at least (or, strictly, more than) a limit."""
-        value = self.plain()
-        number = not isinstance(value, bool) and isinstance(value, (int, float)) and abs(value) < MAX_REAL
-        if not number or (least is not None and (value < least or (strict and value == least))):
-            limit = "" if least is None else f" {'of more than' if strict else 'of at least'} {least:g}"
-            limit += f" and below {MAX_REAL:g}" if isinstance(value, (int, float)) and abs(value) >= MAX_REAL else ""
-            self.fail(f"expected a number{limit}")
-        return float(value)
+        return float(self.of(Real(least, strict)))
 
     def plain(self) -> Any:
         """Return the value as plain Python data."""

@@ -27,6 +27,8 @@ from scipy import stats
 from meshsimp_pymoo.comparison.analysis import ALPHA, holm
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.comparison.tables import INDICATOR_NAMES, Table, markdown_text
+from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = [
     "CLAIMS",
@@ -343,12 +345,12 @@ def _joined(lines: Sequence[str]) -> str:
 
 def _other_errors(study: Study) -> list[str]:
     """Return what *error* means where it is not the sum of the deviations."""
-    names = {"rms_error": "the root mean square of the deviations", "max_error": "the largest deviation"}
     said = []
     measures = dict.fromkeys(problem.rules.measure for problem in study.problems)
     for measure in (name for name in measures if name != "error"):
         models = ", ".join(problem.name for problem in study.problems if problem.rules.measure == measure)
-        said.append(f"On {models} the *error* is {names[measure]}, not their sum.")
+        row = MEASURES[measure]
+        said.append(f"On {models} the *error* is the {row.label} ({row.meaning}), not the sum of the deviations.")
     for weights in dict.fromkeys(problem.rules.weights for problem in study.problems if problem.rules.weights):
         models = ", ".join(problem.name for problem in study.problems if problem.rules.weights == weights)
         said.append(f"On {models} each vertex counts by its attribute *{weights}*.")
@@ -413,7 +415,7 @@ def times_page(study: Study) -> str:
     return _joined(lines)
 
 
-RIVALS_IN_TIME = ("nsga2_v1", "nsga2_v2", "weighted_ga_v1", "weighted_ga_v2")
+RIVALS_IN_TIME = tuple(name for name, preset in PRESETS.items() if preset.is_the_papers and name != "moead")
 _TIME = Claim("time", "MOEA/D takes the least time", "better", (), ())
 
 

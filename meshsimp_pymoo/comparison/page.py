@@ -18,9 +18,9 @@ from meshsimp_pymoo.comparison import findings as verdicts
 from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.analysis import attainment_surfaces
 from meshsimp_pymoo.comparison.figures import method_look
-from meshsimp_pymoo.comparison.study import SCORINGS, Case, Study, slug
+from meshsimp_pymoo.comparison.study import SCORINGS, Case, Study
 from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.report.document import html_document
+from meshsimp_pymoo.report.document import html_document, slug
 
 __all__ = ["experiment_page"]
 

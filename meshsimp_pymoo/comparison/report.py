@@ -25,8 +25,9 @@ from meshsimp_pymoo.comparison import findings as verdicts
 from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.page import experiment_page
 from meshsimp_pymoo.comparison.store import ExperimentWarning
-from meshsimp_pymoo.comparison.study import Study, slug
+from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.files import new_folder, put_back, put_text
+from meshsimp_pymoo.report.document import slug
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.comparison.config import (
     AlgorithmConfig,
     Budget,
@@ -706,7 +707,9 @@ def _write_classic(
     charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))
     none = quality_of((name, 0 if name in COUNTED else np.inf) for name in MEASURES)
     none = replace(none, uncovered=surface.n_vertices)
-    quality, nearest, vertices, faces, notes = [], [], [], [], []
+    quality, nearest, notes = [], [], []
+    vertices: list[FloatArray] = []
+    faces: list[IntArray] = []
     start = time.perf_counter()
     for number in asked:
         try:

@@ -34,7 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
-from meshsimp_pymoo.files import new_file, read_npz, stays_inside
+from meshsimp_pymoo.files import new_file, put_text, read_npz, stays_inside
 from meshsimp_pymoo.surface.model import OpenModel
 
 Arrays = Mapping[str, npt.NDArray[Any]]
@@ -66,8 +66,8 @@ class StoredRun:
         The content of the record.
     arrays : dict of str to array
         For an evolutionary run ``F`` (S, 2), ``kept`` (S, ceil(N / 8)) packed bits, and one value per
-        solution of ``vertices``, ``mean_error``, ``rms_error``, ``max_error``, ``uncovered`` and
-        ``error_nearest`` (the error when uncovered vertices cost their distance). See the runner for what
+        solution of ``error_nearest`` (the error when uncovered vertices cost their distance) and of every
+        measure but "error" and "triangles" (see `meshsimp_pymoo.surface.measures`). See the runner for what
         the classic methods add.
     """
 
@@ -124,7 +124,7 @@ def claim_experiment(out: str | os.PathLike[str]) -> Path:
 def write_experiment(out: Path, content: Mapping[str, Any]) -> None:
     """Write the description of the experiment; in place of an earlier one, whole or not at all."""
     record = {"format": FORMAT} | dict(content)
-    _put_text(out / EXPERIMENT_FILE, json.dumps(record, indent=1, allow_nan=False) + "\n")
+    put_text(out / EXPERIMENT_FILE, json.dumps(record, indent=1, allow_nan=False) + "\n", way_out=WAY_OUT)
 
 
 def read_experiment(out: str | os.PathLike[str]) -> dict[str, Any]:
@@ -183,7 +183,7 @@ def write_run(
     record["checksum"] = hashlib.sha256(canonical(record).encode()).hexdigest()
     _put(folder / f"{stem}.npz", content.getvalue())
     path = folder / f"{stem}.json"
-    _put_text(path, json.dumps(record, indent=1, allow_nan=False) + "\n")
+    put_text(path, json.dumps(record, indent=1, allow_nan=False) + "\n", way_out=WAY_OUT)
     return path
 
 
@@ -329,10 +329,6 @@ def _stored_fields() -> list[str]:
 def _put(path: Path, content: bytes) -> None:
     with new_file(path, way_out=WAY_OUT, flush=False) as partial:
         partial.write_bytes(content)
-
-
-def _put_text(path: Path, text: str) -> None:
-    _put(path, text.encode("utf-8"))
 
 
 def _arrays(content: bytes, path: Path) -> dict[str, npt.NDArray[Any]]:

@@ -57,7 +57,6 @@ __all__ = [
     "Picked",
     "Problem",
     "Study",
-    "slug",
 ]
 
 
@@ -414,15 +413,3 @@ def scored(run: StoredRun, scoring: str) -> FloatArray:
     if scoring == "searched":
         return F
     return np.column_stack([run.arrays["error_nearest"], F[:, 1]]) if len(F) else F.reshape(0, 2)
-
-
-def slug(name: str) -> str:
-    """Return a name as a file name.
-
-    Examples
-    --------
-    >>> slug("50 generations"), slug("M1: Laurana/2")
-    ('50-generations', 'M1-Laurana-2')
-    """
-    spelled = "".join(c if c.isascii() and (c.isalnum() or c in "._") else " " for c in name)
-    return "-".join(spelled.split()) or "unnamed"

@@ -21,14 +21,15 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from meshsimp_pymoo.comparison.analysis import PairTable, Summary, magnitude, selected_solutions, summarise
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, SCORINGS, Case, Study
+from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = [
     "COMPARISONS",
@@ -50,6 +51,12 @@ Cell = str | int | float | None
 # Seeds the random weights that choose the best trade-off, so that the tables are the same every time.
 WEIGHTS_SEED = 1
 DIGITS = 4
+# The columns of measures of the error beside the one that was minimised, by their heading.
+AS_SEARCHED = {
+    f"{name.removesuffix('_error')}_as_searched": name
+    for name, measure in MEASURES.items()
+    if measure.unit and name != "error"
+}
 
 INDICATOR_NAMES = {
     "hvr": "HVR",
@@ -84,6 +91,12 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     shown: Table | None = None
+
+    def part(self, headings: Mapping[str, str], rows: Sequence[tuple[Cell, ...]]) -> Table:
+        """Return some of its columns, by their headings for people, of some of its rows."""
+        places = [self.columns.index(column) for column in headings]
+        shown = tuple(tuple(row[place] for place in places) for row in rows)
+        return Table(self.name, self.title, tuple(headings.values()), shown)
 
     def csv(self) -> str:
         """Return the table for programs, floats with all their digits."""
@@ -222,7 +235,7 @@ def selected(study: Study, budget: str, scoring: str) -> Table:
     """Return the paper's three solutions of every method, and its knees."""
     columns = (
         "model", "method", "solution", "error", "triangles", "vertices", "uncovered", "error_as_searched",
-        "mean_as_searched", "rms_as_searched", "max_as_searched", "error_every_vertex", "seed", "found_in_runs",
+        *AS_SEARCHED, "error_every_vertex", "seed", "found_in_runs",
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
     for case in study.compared(budget, scoring):
@@ -234,17 +247,19 @@ def selected(study: Study, budget: str, scoring: str) -> Table:
                     (
                         case.problem.name, method, solution.kind.replace("_", " "), solution.error,
                         solution.triangles, int(found.number("vertices")), int(found.number("uncovered")),
-                        float(found.run.arrays["F"][found.row, 0]), found.number("mean_error"),
-                        found.number("rms_error"), found.number("max_error"), found.number("error_nearest"),
-                        None if method in case.classic else found.seed, len(solution.seeds),
+                        float(found.run.arrays["F"][found.row, 0]), *map(found.number, AS_SEARCHED.values()),
+                        found.number("error_nearest"), None if method in case.classic else found.seed,
+                        len(solution.seeds),
                     )
                 )  # fmt: skip
     title = f"Selected solutions of the merged fronts ({_setting(budget, scoring)})"
-    shown_columns = (
-        "model", "method", "solution", "triangles", "error as searched", "error, every vertex", "uncovered", "seed",
-    )  # fmt: skip
-    shown = tuple((*row[:3], row[4], row[7], row[11], row[6], row[12]) for row in rows if row[2] != "knee")
-    return Table("selected", title, columns, tuple(rows), Table("selected", title, shown_columns, shown))
+    shown_columns = {
+        "model": "model", "method": "method", "solution": "solution", "triangles": "triangles",
+        "error_as_searched": "error as searched", "error_every_vertex": "error, every vertex",
+        "uncovered": "uncovered", "seed": "seed",
+    }  # fmt: skip
+    table = Table("selected", title, columns, tuple(rows))
+    return replace(table, shown=table.part(shown_columns, [row for row in rows if row[2] != "knee"]))
 
 
 COMPARISONS: tuple[Callable[[Study, str, str], Table], ...] = (scores, coverage, epsilon, wilcoxon, selected)
@@ -258,7 +273,7 @@ def meshlab(study: Study, budget: str) -> Table | None:
     """
     columns = (
         "model", "method", "series", "asked", "triangles", "vertices", "error_as_searched", "error_every_vertex",
-        "mean_as_searched", "rms_as_searched", "max_as_searched", "uncovered", "uncovered_share",
+        *AS_SEARCHED, "uncovered", "uncovered_share",
         "evolution_error_every_vertex", "evolution_method", "note",
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
@@ -272,26 +287,27 @@ def meshlab(study: Study, budget: str) -> Table | None:
                 label, note = CLASSIC_NAMES.get(method, method), run.record["notes"][k]
                 series = "paper" if a["paper"][k] else "down to the fronts"
                 if not triangles:
-                    rows.append((name, label, series, asked, 0, *[None] * 10, note))
+                    rows.append((name, label, series, asked, 0, *[None] * (len(columns) - 6), note))
                     continue
                 best, by = _best_up_to(case, triangles)
                 rows.append(
                     (
                         name, label, series, asked, int(triangles), int(a["vertices"][k]), float(error),
-                        float(a["error_nearest"][k]), float(a["mean_error"][k]), float(a["rms_error"][k]),
-                        float(a["max_error"][k]), int(a["uncovered"][k]),
+                        float(a["error_nearest"][k]), *(float(a[measure][k]) for measure in AS_SEARCHED.values()),
+                        int(a["uncovered"][k]),
                         float(a["uncovered"][k] / problem.vertices), best, by, note,
                     )
                 )  # fmt: skip
     if not rows:
         return None
     title = f"MeshLab's meshes, and the best evolutionary one of at most as many triangles ({budget})"
-    shown_columns = (
-        "model", "method", "asked", "triangles", "error as searched", "error, every vertex", "uncovered",
-        "evolution, every vertex", "by",
-    )  # fmt: skip
-    shown = tuple((row[0], row[1], row[3], row[4], row[6], row[7], row[11], row[13], row[14]) for row in rows)
-    return Table("meshlab", title, columns, tuple(rows), Table("meshlab", title, shown_columns, shown))
+    shown_columns = {
+        "model": "model", "method": "method", "asked": "asked", "triangles": "triangles",
+        "error_as_searched": "error as searched", "error_every_vertex": "error, every vertex",
+        "uncovered": "uncovered", "evolution_error_every_vertex": "evolution, every vertex", "evolution_method": "by",
+    }  # fmt: skip
+    table = Table("meshlab", title, columns, tuple(rows))
+    return replace(table, shown=table.part(shown_columns, rows))
 
 
 def runs(study: Study) -> Table:

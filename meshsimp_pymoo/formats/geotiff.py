@@ -7,9 +7,7 @@ a TIFF and nothing else, and what the TIFF declares is compared with its size be
 from __future__ import annotations
 
 import contextlib
-import logging
 import math
-import threading
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,9 +23,6 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
     from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.formats.source.heights import PlacedHeights
-
-# rasterio logs what GDAL says; without a handler Python would print that to stderr.
-logging.getLogger("rasterio").addHandler(logging.NullHandler())
 
 # What a small file may unpack to, whatever its packing: some packings shrink a constant raster to nearly nothing.
 UNPACKED_FLOOR = 64 << 20
@@ -144,6 +139,8 @@ class RasterHeights:
     ndim = 2
 
     def __init__(self, path: Path, name: str, options: Options) -> None:
+        import threading
+
         import numpy as np
 
         from meshsimp_pymoo.formats.source.heights import check_window, steps_of
@@ -220,9 +217,14 @@ def _environment() -> Any:
 @contextlib.contextmanager
 def _guarded(name: str) -> Iterator[None]:
     """Say in one line what GDAL and rasterio say, and ignore their warnings."""
+    import logging
+
     import rasterio  # noqa: F401 - its parts may have been imported where it is missing now
     from rasterio.errors import NotGeoreferencedWarning
 
+    logger = logging.getLogger("rasterio")
+    if not logger.handlers:  # it logs what GDAL says; without a handler Python would print that to stderr
+        logger.addHandler(logging.NullHandler())
     try:
         with warnings.catch_warnings():
             for kind in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):

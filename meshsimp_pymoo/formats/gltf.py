@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import struct
 from pathlib import Path
@@ -10,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ModelError, reason_of
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, OutMesh, register
+from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray
@@ -30,6 +30,8 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
 
 def _check(path: Path, name: str, *, packed: bool) -> None:
     """Refuse a glTF whose declared sizes exceed what its file can hold."""
+    import json
+
     from meshsimp_pymoo.formats.source.numbers import glimpse
 
     size = path.stat().st_size
@@ -76,6 +78,8 @@ def _is_beside(uri: str) -> bool:
 
 def _write(path: Path, mesh: OutMesh) -> None:
     """Write a GLB of one node with one mesh, whose coordinates are those from the origin."""
+    import json
+
     import numpy as np
 
     from meshsimp_pymoo.formats.source.precision import local_origin

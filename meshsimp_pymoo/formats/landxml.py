@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.formats.table import Format, Held, OutMesh, register
+from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.table import Format, Held, register
 
 NAMESPACE = "http://www.landxml.org/schema/LandXML-1.2"
 # LandXML demands a date and a time; one that never changes keeps equal meshes equal.

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, OutMesh, register
+from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
     import numpy.typing as npt

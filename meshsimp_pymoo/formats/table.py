@@ -12,9 +12,10 @@ is to read or write.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -22,8 +23,9 @@ from pkgutil import iter_modules
 from typing import TYPE_CHECKING, Any, Protocol
 
 from meshsimp_pymoo import formats
-from meshsimp_pymoo.errors import ModelError, reason_of
+from meshsimp_pymoo.errors import ModelError, ModelWarning, reason_of
 from meshsimp_pymoo.formats.options import DEFAULT, Options
+from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.settings import defaults_of, settings_of
 
 if TYPE_CHECKING:
@@ -51,18 +53,6 @@ class Held(Protocol):
     @property
     def faces(self) -> IntArray:
         """Triangles (T, 3)."""
-
-
-@dataclass(frozen=True, eq=False)
-class OutMesh:
-    """A mesh to be written; see :func:`write_mesh` for its parts."""
-
-    vertices: FloatArray
-    faces: IntArray
-    attributes: dict[str, AnyArray]
-    origin: FloatArray | None = None
-    georeference: dict[str, Any] = field(default_factory=dict)
-    name: str = "surface"
 
 
 @dataclass(frozen=True)
@@ -395,3 +385,42 @@ def write_mesh(
     start = None if origin is None else np.asarray(origin, dtype=np.float64)
     assert kind.write is not None
     kind.write(Path(path), OutMesh(vertices, faces, dict(attributes or {}), start, dict(georeference or {}), name))
+
+
+def shared_frame(kind: Format, points: FloatArray, *, name: str, georeference: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what `write_mesh` is to know of a model's frame, so that all its meshes have one origin.
+
+    Parameters
+    ----------
+    kind : Format
+        The format of the meshes.
+    points : (N, 3) float array
+        All vertices of the model, as in the file.
+    name : str
+        The model's name.
+    georeference : mapping
+        What is known of the coordinates.
+    """
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.precision import local_origin
+
+    origin = local_origin(points) if kind.states_origin else np.zeros(3)
+    return {"origin": origin, "georeference": georeference, "name": Path(name).stem}
+
+
+def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> None:
+    """Warn if the format's single precision moves vertices by more than a person would see in the numbers."""
+    from meshsimp_pymoo.formats.source.precision import SINGLE_PRECISION_LOSS
+
+    if not kind.single_precision or kind.states_origin or shift <= SINGLE_PRECISION_LOSS * diagonal:
+        return
+    known = written_formats().values()
+    exact = listed(other.name for other in known if not other.single_precision)
+    stating = listed(other.name for other in known if other.states_origin)
+    warnings.warn(
+        f"{name}: {kind.name} holds single precision, which moves vertices by up to {shift:.3g} [file units]; {exact} "
+        f"keep them exactly, {stating} states a local origin",
+        ModelWarning,
+        stacklevel=3,
+    )

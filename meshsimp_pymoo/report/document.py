@@ -127,3 +127,15 @@ def _json(data: Any) -> str:
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text
+
+
+def slug(name: str) -> str:
+    """Return a name as a file name.
+
+    Examples
+    --------
+    >>> slug("50 generations"), slug("M1: Laurana/2")
+    ('50-generations', 'M1-Laurana-2')
+    """
+    spelled = "".join(c if c.isascii() and (c.isalnum() or c in "._") else " " for c in name)
+    return "-".join(spelled.split()) or "unnamed"

@@ -87,7 +87,7 @@ def plot_front(
         Vertices of the model (their weights in all, if it has some); if given, the mean error per vertex is
         drawn instead of the sum.
     measure : str
-        What the first column of F is: "error" (a sum), "rms_error" or "max_error".
+        What the first column of F is: one of `meshsimp_pymoo.surface.measures.OBJECTIVES`.
     series : mapping of str to (n, 2) array, optional
         Other fronts to draw faintly behind this one, by name, in the same measure.
 

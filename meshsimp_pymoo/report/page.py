@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
-from meshsimp_pymoo.comparison.study import slug
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.files import new_file
-from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma
+from meshsimp_pymoo.files import put_text
+from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
+from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
 from meshsimp_pymoo.surface.measures import MEASURES, Measure
+from meshsimp_pymoo.surface.rules import Rules
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
@@ -87,8 +88,7 @@ def write_page(
     """Write ``report.html`` to the folder of a front, whole or not at all; see :func:`simplification_page`."""
     content = simplification_page(front, problem, folder=folder, knee=knee)
     path = front.folder / "report.html"
-    with new_file(path) as unfinished:
-        unfinished.write_text(content, encoding="utf-8", newline="\n")
+    put_text(path, content, flush=True)
     return path
 
 
@@ -183,10 +183,16 @@ def simplification_page(
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,
-        errors={name: measure.label for name, measure in MEASURES.items() if measure.unit},
+        errors={name: MEASURES[name].label for name in _errors()},
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
+
+
+def _errors() -> list[str]:
+    """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
+    errors = [name for name, measure in MEASURES.items() if measure.unit]
+    return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
 
 
 def spoken(measure: Measure) -> dict[str, str]:
@@ -300,9 +306,11 @@ def _settings(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what is known of how the front was made, as rows of a table."""
     rows = [("model", run["model"]["name"]), ("hash of the model", run["model"]["hash"])]
     rows += [(key, str(run[key])) for key in RECORDED if run.get(key) is not None]
+    derived = [name for name, known in settings_of(Rules).items() if known.derived]
     said = [part for name in ("options", "rules", "settings") for part in (run.get(name) or {}).items()]
-    for key, value in said:
-        if value not in (None, False) and key not in (*run, "threads"):  # which change no result
+    said = [(key, value) for key, value in said if key not in (*run, *derived, "threads")]  # which change no result
+    for key, value in [*said, ("objectives", run.get("objectives"))]:
+        if value not in (None, False):
             rows.append((key.replace("_", " "), ", ".join(map(str, value)) if isinstance(value, list) else str(value)))
     version = (run.get("versions") or {}).get("meshsimp-pymoo")
     return rows + ([("meshsimp-pymoo", version)] if version else [])

@@ -88,3 +88,6 @@ PRESETS: dict[str, Preset] = {
 
 # What the shell takes where nothing is said.
 DEFAULT = "memetic"
+# Generations of those that do not sweep, where nothing is said: four times the paper's budget, since its 50 generations
+# take a second at its sizes and leave much to gain.
+DEFAULT_GENERATIONS = 200

@@ -209,8 +209,8 @@ class HeightSurface:
         return Refitted(mesh.faces, rows, raised, error, before, min(bound, error))
 
     def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return the row of each vertex in the file."""
-        return {"source_index": self.model.source_index.astype(np.int64)}
+        """Return nothing: the row of each vertex in the file says it all."""
+        return {}
 
     def _checked(self, kept: Any) -> BoolArray:
         row = np.array(kept, order="C")

@@ -169,4 +169,7 @@ def require_measure(measure: str, *, summed_for: str = "") -> None:
         raise ValueError(f"measure={measure!r} is unknown; choose one of {', '.join(map(repr, OBJECTIVES))}")
     if summed_for and not OBJECTIVES[measure].is_sum:
         sums = " or ".join(repr(name) for name, known in OBJECTIVES.items() if known.is_sum)
-        raise ValueError(f"{summed_for} lower a sum over the vertices, and {measure!r} is none; use {sums}")
+        raise ValueError(
+            f"{summed_for} lower a sum over the vertices, and {measure!r} is none; use {sums}, or an algorithm that "
+            "only evaluates, such as nsga2_v1()"
+        )

@@ -20,7 +20,7 @@ Examples
 ... @njit
 ... def fixed_cost(ground, books):
 ...     return ground.cost
->>> @njit
+>>> @loop
 ... def twice(ground, books):
 ...     return 2.0 * total_cost(ground, books)
 >>> twice(Fixed(1.5), 0)
@@ -39,6 +39,37 @@ from numba.core.caching import FunctionCache
 from numba.extending import overload
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+PACKAGE = __name__.partition(".")[0]
+
+
+class _OwnRecords(FunctionCache):
+    """Keeps on disk what was compiled for the records of this package alone.
+
+    Code for the records of others holds their answers, which may change or be gone while this package stays the same;
+    and the index of a compiled function cannot be read any more where one record of it cannot be imported.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function from disk, if it is there."""
+        return super().load_overload(sig, target_context) if _is_own(sig) else None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled function on disk, if it is for records of this package."""
+        if _is_own(sig):
+            super().save_overload(sig, data)
+
+
+def _is_own(sig: Any) -> bool:
+    records = (getattr(kind, "instance_class", None) for kind in getattr(sig, "args", sig))
+    return all(record.__module__.partition(".")[0] == PACKAGE for record in records if record is not None)
+
+
+def loop(function: Function) -> Function:
+    """Compile a function that asks these questions: once for each class of ground, without Python's lock."""
+    compiled: Any = njit(nogil=True)(function)
+    compiled._cache = _OwnRecords(function)
+    loops: Function = compiled
+    return loops
 
 
 def answers(question: Callable[..., Any], record: type) -> Callable[[Function], Function]:
@@ -64,31 +95,11 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
         def choose(ground: Any, *_: Any) -> Any:
             return called if getattr(ground, "instance_class", None) is record else None
 
-        overload(question, strict=False)(choose)
+        # inlined, or every call would hand over some fifty arrays: annealing takes half as long again
+        overload(question, strict=False, jit_options={"forceinline": True, "nogil": True})(choose)
         return function
 
     return register
-
-
-class _OwnCache(FunctionCache):
-    """Keeps on disk what was compiled for this package's records, and nothing of anybody else's.
-
-    What is kept names the classes that it was compiled for: a process that cannot import one of them could not read any
-    of it. Nor would Numba see that the answers of such a class have changed.
-    """
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep one compilation."""
-        records = [getattr(kind, "instance_class", None) for kind in data.signature.args]
-        if all(record.__module__.partition(".")[0] == __name__.partition(".")[0] for record in records if record):
-            super().save_overload(sig, data)
-
-
-def loop(function: Function) -> Function:
-    """Compile a function that asks these questions, anew in each process for the records of others."""
-    compiled = njit(nogil=True)(function)
-    compiled._cache = _OwnCache(function)
-    return compiled
 
 
 def _unanswered() -> Any:

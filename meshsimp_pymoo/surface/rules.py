@@ -30,7 +30,7 @@ class Rules:
         accepts='{"model", "hull"}',
         doc="Emit only the triangles whose centroid lies inside the original mesh's projection, or all of them (the "
         "paper).",
-        help="model: bays and holes stay open; hull: all of the convex hull is covered (default: %(default)s)",
+        help="model: bays and holes stay open; hull: all of the convex hull is covered",
     )
     outside: str = setting(
         "nearest",
@@ -38,7 +38,7 @@ class Rules:
         accepts='{"nearest", "ignore"}',
         doc="What a vertex costs that no triangle covers: its distance to the nearest point of the mesh, or nothing "
         "(the paper).",
-        help="what a vertex that no triangle covers costs: its distance to the mesh, or nothing (default: %(default)s)",
+        help="what a vertex that no triangle covers costs: its distance to the mesh, or nothing",
     )
     pin: Any = setting(
         None,

@@ -234,7 +234,7 @@ class Surface(Protocol):
         ...
 
     def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return what a folder of results must hold of the surface, so that its rows are understood."""
+        """Return what ``front.npz`` must hold of the surface beside the row of each vertex in the file."""
         ...
 
     def ground(self) -> Any | None:

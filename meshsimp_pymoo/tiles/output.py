@@ -33,8 +33,16 @@ from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.source.precision import shared_frame, single_precision_shift, warn_of_shift
-from meshsimp_pymoo.formats.table import Format, format_of_output, format_to_write, write_mesh
+from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.table import (
+    Format,
+    format_of_output,
+    format_to_write,
+    shared_frame,
+    warn_of_shift,
+    write_mesh,
+)
+from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.storage import (
     FRONT_COLUMNS,
     MESHES_BY_DEFAULT,
@@ -49,8 +57,6 @@ from meshsimp_pymoo.tiles.weld import WeldedMesh, pieces, weld
 
 NESTED_FILE = "nested.npz"
 WORK = "tiles"
-# What of how a grid is read the record of its front says.
-RECORDED = ("spacing", "nodata", "window", "up")
 WAY_OUT = "what is finished stays there: mend that, and the same call goes on"
 
 
@@ -260,9 +266,11 @@ def stored_model(folder: str | os.PathLike[str]) -> tuple[str, Options]:
     """Return where the grid of a stored tiled front was, and how it was read."""
     record = _read_record(Path(folder))
     file = record["model"].get("file")
-    settings = record.get("settings", {})
     name = record["model"]["name"] if file is None else str((Path(folder) / file).resolve())
-    return name, Options(**{key: settings[key] for key in RECORDED if key in settings})
+    try:
+        return name, read_back(Options, record.get("options") or {})
+    except ValueError as problem:
+        raise ResultError(f"{Path(folder) / 'run.json'}: cannot be read ({problem}); simplify again") from None
 
 
 def _read_record(folder: Path) -> dict[str, Any]:

@@ -22,10 +22,9 @@ from rich.console import Console
 from rich.table import Table
 from scipy.spatial import Delaunay
 
-from meshsimp_pymoo import MeshProblem, greedy_insertion, thinning
+from meshsimp_pymoo import MeshProblem, greedy_insertion, moead, nsga2_v1, nsga2_v2, thinning
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.plane.borrow import borrowed
-from meshsimp_pymoo.search.presets import moead, nsga2_v1, nsga2_v2
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.moves import try_exchange

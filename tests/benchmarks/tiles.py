@@ -119,7 +119,7 @@ def big(side, tile, jobs, folder):
     if not path.exists():
         np.save(path, fractal(side))
     out = folder / f"front_{side}"
-    command = [sys.executable, "-m", "meshsimp_pymoo.cli", "simplify", str(path), "-o", str(out), "--tile", str(tile)]
+    command = [sys.executable, "-m", "meshsimp_pymoo", "simplify", str(path), "-o", str(out), "--tile", str(tile)]
     command += ["--jobs", str(jobs), "--overwrite", "--meshes", "12", "--json"]
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from meshsimp_pymoo.comparison.store import claim_experiment, write_experiment, write_model, write_run
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.settings import plain
+from meshsimp_pymoo.surface.rules import Rules
 
 PRESETS = {
     "N1": "nsga2_v1", "N2": "nsga2_v2", "MD": "moead", "MD normalised": "moead", "G1": "weighted_ga_v1",
@@ -41,7 +44,8 @@ def store(
     for problem, methods in fronts.items():
         problems.append(
             {
-                "name": problem, "source": "roof:3", "options": {"outside": outside}, "stored": stored,
+                "name": problem, "source": "roof:3", "options": plain(Options()),
+                "rules": plain(Rules(outside=outside)), "limits": {}, "stored": stored,
                 "hash": model.hash, "vertices": model.n_vertices, "triangles": len(model.faces),
             }
         )  # fmt: skip

@@ -14,9 +14,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.comparison.analysis import merged_front
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, Case, Study
-from meshsimp_pymoo.indicators import epsilon
+from meshsimp_pymoo.indicators import epsilon, non_dominated
 from meshsimp_pymoo.search.greedy import thinning
 
 FloatArray = npt.NDArray[np.float64]
@@ -111,8 +110,7 @@ def against_meshlab(study: Study, names: list[str]) -> Iterator[str]:
                 for case in (searched, nearest)
             )
             row.append(pair(forth, back))
-        model = study.model(nearest.problem)
-        thinned = thinning(model, np.isin(np.arange(model.n_vertices), model.corners), footprint="hull")
+        thinned = thinning(study.surface(nearest.problem, "nearest"))
         front = np.column_stack([thinned.error, thinned.triangles])
         row.append(f"{np.median(over_meshlab(nearest, methods[1], front)):.2f}")
         rows.append(row)
@@ -138,7 +136,7 @@ def abandoned(cases: list[Case]) -> Iterator[str]:
 def papers_solutions(case: Case) -> Iterator[str]:
     rows = []
     for method, triangles, error in PAPER_M1:
-        front = merged_front(case.runs[method])
+        front = non_dominated(np.vstack(list(case.runs[method].values())))
         best = front[front[:, 1] <= triangles]
         row = best[best[:, 0].argmin()]
         rows.append([f"{method}, at most {triangles} triangles", f"{error:.0f}", f"{row[0]:.0f} at {row[1]:.0f}"])

@@ -12,9 +12,11 @@ import pytest
 
 from meshsimp_pymoo.comparison.config import PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.search.operators import OAX, OPERATORS, SubsetUniformCrossover
 from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.surface.rules import Rules
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
@@ -67,7 +69,9 @@ def test_the_papers_configuration_has_the_papers_numbers():
     merged = [a.merged_values for a in experiment.algorithms if a.merged_parameter]
     assert merged == [tuple(k / 10 for k in range(11))] * 2
     for problem in experiment.problems:
-        assert problem.options == {"footprint": "hull", "outside": "ignore", "pin": "corners"}
+        assert problem.options == Options()
+        assert problem.rules == Rules(footprint="hull", outside="ignore", pin="corners")
+        assert problem.limits == {}
 
 
 def test_the_quick_configuration_names_all_that_can_stand_there():
@@ -79,8 +83,10 @@ def test_the_quick_configuration_names_all_that_can_stand_there():
 def test_shared_options_hold_for_all_problems_and_a_problem_overrides_them(tmp_path):
     path = changed(tmp_path, problems='[{name: A, model: "pyramid:9", outside: nearest}, "roof:5"]')
     first, second = read_experiment_file(path).problems
-    assert first.options == {"footprint": "hull", "outside": "nearest"}
-    assert second.options == {"footprint": "hull", "outside": "ignore"}
+    assert first.rules == Rules(footprint="hull", outside="nearest")
+    assert second.rules == Rules(footprint="hull", outside="ignore")
+    assert first.options == second.options == Options()
+    assert first.limits == second.limits == {}
     assert second.name == "roof:5"
 
 
@@ -186,7 +192,7 @@ MISTAKES = {
     ),
     "measure that an algorithm cannot lower": (
         {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]"},
-        ["algorithms[0]", "'memetic' fails", "lower a sum"],
+        ["algorithms[0]", "'memetic' cannot be used on the problem 'A'", "lower a sum"],
     ),
     "weights not in the file": ({"problem": "{weights: sharpness}"}, ["problems[0]", "'sharpness'", "it has: none"]),
     "pin impossible": ({"problem": "{pin: [100000]}"}, ["problems[0]", "100000"]),

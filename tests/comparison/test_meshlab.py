@@ -246,50 +246,55 @@ def test_meshlabs_own_collapse_abandons_the_border_and_the_unit_matters(shared_m
 
 
 @pytest.fixture(scope="module")
-def model():
+def surface():
     from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.surface.height import HeightSurface
     from meshsimp_pymoo.surface.model import build_model
 
-    return build_model(SourceMesh(points=np.add(VERTICES, [5e5, 4e6, 0]), faces=FACES, attributes={}, name="hills"))
+    points = np.add(VERTICES, [5e5, 4e6, 0])
+    return HeightSurface(build_model(SourceMesh(points=points, faces=FACES, attributes={}, name="hills")))
 
 
 @pytest.mark.usefixtures("pymeshlab")
 class TestFront:
-    def test_scores_every_mesh_of_every_method_as_the_referee_does(self, model, vertical_error):
-        front = meshlab_front(model, (400, 120))
+    def test_scores_every_mesh_of_every_method_as_the_referee_does(self, surface, vertical_error):
+        front = meshlab_front(surface, (400, 120))
         assert [(mesh.method, mesh.asked) for mesh in front] == [
             (name, asked) for name in MESHLAB_METHODS for asked in (400, 120)
         ]
         for mesh in front:
-            error, uncovered, _ = vertical_error(model.file_points, mesh.vertices, mesh.faces)
+            error, uncovered, _ = vertical_error(surface.model.file_points, mesh.vertices, mesh.faces)
             assert_allclose(mesh.quality.error, error, rtol=1e-6)
             assert mesh.quality.uncovered == uncovered
             assert mesh.quality.triangles == mesh.triangles == len(mesh.faces)
             assert mesh.seconds > 0
 
-    def test_ignoring_what_is_uncovered_costs_no_more(self, model):
-        for strict, lenient in zip(
-            meshlab_front(model, [100]), meshlab_front(model, [100], outside="ignore"), strict=True
-        ):
+    def test_ignoring_what_is_uncovered_costs_no_more(self, surface):
+        from meshsimp_pymoo.surface.height import HeightSurface
+        from meshsimp_pymoo.surface.rules import Rules
+
+        ignoring = HeightSurface(surface.model, Rules(outside="ignore"))
+        for strict, lenient in zip(meshlab_front(surface, [100]), meshlab_front(ignoring, [100]), strict=True):
             assert_array_equal(strict.faces, lenient.faces)
             assert lenient.quality.error <= strict.quality.error
             assert (lenient.quality.error < strict.quality.error) == (strict.quality.uncovered > 0)
 
     def test_agrees_with_the_referee_on_a_bust(self, shared_data, vertical_error):
         from meshsimp_pymoo.opening import open_model
+        from meshsimp_pymoo.surface.height import HeightSurface
 
-        bust = open_model(shared_data / "m1_laurana.ply")
+        bust = HeightSurface(open_model(shared_data / "m1_laurana.ply"))
         for mesh in meshlab_front(bust, [1000, 300]):
-            error, uncovered, _ = vertical_error(bust.file_points, mesh.vertices, mesh.faces)
+            error, uncovered, _ = vertical_error(bust.model.file_points, mesh.vertices, mesh.faces)
             assert_allclose(mesh.quality.error, error, rtol=1e-6)
             assert mesh.quality.uncovered == uncovered
 
-    def test_refuses_everything_before_it_computes_anything(self, model, monkeypatch):
+    def test_refuses_everything_before_it_computes_anything(self, surface, monkeypatch):
         monkeypatch.setattr(meshlab, "_filtered", None)
         with pytest.raises(ValueError, match="unknown MeshLab method 'qem': choose among quadric_collapse, "):
-            meshlab_front(model, [100], methods=("quadric_collapse", "qem"))
+            meshlab_front(surface, [100], methods=("quadric_collapse", "qem"))
         with pytest.raises(ValueError, match="801 triangles were asked for"):
-            meshlab_front(model, [100, 801])
+            meshlab_front(surface, [100, 801])
 
 
 class TestReductions:

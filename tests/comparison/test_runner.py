@@ -32,6 +32,8 @@ from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import DaskEngine
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -287,7 +289,7 @@ def test_runs_of_several_weights_make_one_front(reference):
     for seed in (1, 2, 3):
         single = [run.arrays["F"] for run in case.sources["G1"][seed]]
         assert [len(F) for F in single] == [1, 1, 1]
-        np.testing.assert_array_equal(case.runs["G1"][seed], analysis.merged_front(dict(enumerate(single))))
+        np.testing.assert_array_equal(case.runs["G1"][seed], non_dominated(np.vstack(single)))
 
 
 def test_ctrl_c_leaves_the_finished_runs(config, tmp_path, reference):
@@ -358,7 +360,7 @@ def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(conf
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a POSIX signal")
 def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(config, tmp_path, reference):
     out = tmp_path / "out"
-    call = [sys.executable, "-m", "meshsimp_pymoo.cli", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
+    call = [sys.executable, "-m", "meshsimp_pymoo", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]
     config.write_text(CONFIG.replace("seeds: [1, 2, 3]", f"seeds: {list(range(1, 60))}"), encoding="utf-8")
     parent = subprocess.Popen(call, start_new_session=True)
     deadline = time.monotonic() + 60
@@ -441,15 +443,15 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     smallest = min(r.arrays["F"][:, 1].min() for r in study.all_runs if r.record["problem"] == "Face")
     assert run.arrays["asked"].tolist() == list(meshlab.reductions(problem.triangles, down_to=int(smallest), steps=3))
     assert run.arrays["paper"].sum() == 10
-    model = study.model(problem)
+    model = study.surface(problem).model
     from meshsimp_pymoo.comparison.store import classic_mesh
-    from meshsimp_pymoo.surface.score import mesh_quality
 
     for row in range(len(run.arrays["asked"])):
         vertices, faces = classic_mesh(run, row)
         assert len(faces) == run.arrays["F"][row, 1]
         for outside, error in (("ignore", run.arrays["F"][row, 0]), ("nearest", run.arrays["error_nearest"][row])):
-            assert mesh_quality(model, vertices, faces, outside=outside).error == pytest.approx(error, rel=1e-12)
+            found = HeightSurface(model, Rules(outside=outside)).score(vertices, faces)
+            assert found.quality.error == pytest.approx(error, rel=1e-12)
     # under the paper's reading only its own series is compared, else all of it
     searched = study.cases["Face", "6 generations", "searched"].runs["MeshLab quadric"][0]
     nearest = study.cases["Face", "6 generations", "nearest"].runs["MeshLab quadric"][0]
@@ -589,8 +591,8 @@ def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findin
     np.testing.assert_array_equal(by_nearest.evaluate(kept)[:, 0], arrays["error_nearest"])
     np.testing.assert_array_equal(arrays["rms_error"], arrays["F"][:, 0])
     study = Study(tmp_path / "out")
-    assert study.model(study.problems[0]).total_weight == pytest.approx(45.0)
+    assert study.surface(study.problems[0]).total_weight == pytest.approx(45.0)
     write_tables(tmp_path / "out")
     said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
-    assert "On face the *error* is the root mean square of the deviations" in said
+    assert "On face the *error* is the RMS error (root mean square), not the sum of the deviations." in said
     assert "attribute *importance*" in said

@@ -9,6 +9,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.report.figures import (
     AMBIENT,
     LIGHT,
@@ -20,7 +21,7 @@ from meshsimp_pymoo.report.figures import (
     plot_front,
     plot_mesh,
 )
-from meshsimp_pymoo.surface.evaluate import simplify
+from meshsimp_pymoo.surface.height import HeightSurface
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def ax():
 
 @pytest.fixture(scope="module")
 def roof():
-    return open_model("roof:5")
+    return HeightSurface(open_model("roof:5"))
 
 
 def polygons(ax):
@@ -118,24 +119,34 @@ def test_without_axes_a_figure_is_made(roof):
     pyplot.close("all")
 
 
-def test_a_model_a_trimesh_and_arrays_are_drawn_alike(roof):
+def test_a_problem_a_surface_a_model_a_trimesh_and_arrays_are_drawn_alike(roof):
     mesh = trimesh.Trimesh(roof.points, roof.faces, process=False)
     drawn = []
-    for shape in (roof, mesh, (roof.points, roof.faces)):
+    for shape in (MeshProblem(roof), roof, roof.model, mesh, (roof.points, roof.faces)):
         ax = Figure().subplots()
         plot_mesh(shape, ax)
         drawn.append((polygons(ax).get_facecolors().tolist(), ax.get_xlim(), ax.get_ylim()))
-    assert drawn[0] == drawn[1] == drawn[2]
-    with pytest.raises(TypeError, match="a str is no mesh; give an OpenModel"):
+    assert all(other == drawn[0] for other in drawn[1:])
+    with pytest.raises(TypeError, match="a str is no mesh; give a MeshProblem, an OpenModel"):
         plot_mesh("roof", Figure().subplots())
 
 
-def test_the_kept_vertices_of_a_model_are_drawn_as_their_mesh(ax, roof):
-    kept = np.isin(np.arange(roof.n_vertices), roof.corners)
-    plot_mesh(roof, ax, kept=kept)
-    assert len(polygons(ax).get_paths()) == 2
-    with pytest.raises(TypeError, match="kept chooses vertices of an OpenModel, not of a tuple"):
-        plot_mesh((roof.points, roof.faces), ax, kept=kept)
+def test_the_kept_vertices_of_a_surface_are_drawn_as_their_mesh(roof):
+    kept = np.isin(np.arange(roof.n_vertices), roof.model.corners)
+    for shape in (roof, MeshProblem(roof)):
+        assert len(polygons(plot_mesh(shape, Figure().subplots(), kept=kept)).get_paths()) == 2
+    for shape in (roof.model, (roof.points, roof.faces)):
+        name = type(shape).__name__
+        with pytest.raises(TypeError, match=f"by a problem's rules, which a {name} does not have; give the problem or"):
+            plot_mesh(shape, Figure().subplots(), kept=kept)
+
+
+def test_the_kept_vertices_are_drawn_by_the_rules():
+    paths = []
+    for footprint in ("model", "hull"):
+        ring = MeshProblem("ring", footprint=footprint)
+        paths.append(len(polygons(plot_mesh(ring, Figure().subplots(), kept=ring.pinned)).get_paths()))
+    assert paths[0] < paths[1]
 
 
 def test_the_colours_of_a_trimesh_show(ax, roof):
@@ -249,13 +260,14 @@ def test_an_exact_mesh_has_an_error_map_too(ax, roof):
 
 @pytest.mark.parametrize("name", ["face:300", "jacksboro:40", "plane"])
 def test_the_front_stands_beside_the_original_and_its_meshes(tmp_path, name):
-    model = open_model(name)
+    surface = HeightSurface(open_model(name))
+    model = surface.model
     rng = np.random.default_rng(3)
     kept = rng.random((3, model.n_vertices)) < np.array([[0.2], [0.5], [0.8]])
     kept[:, model.corners] = True
-    simplified = [simplify(model, row) for row in kept]
+    simplified = [surface.simplify(row) for row in kept]
     F = [[s.quality.error, s.quality.triangles] for s in simplified]
-    figure = front_figure(model, F, [(row, s.faces) for row, s in enumerate(simplified)], knee=1)
+    figure = front_figure(surface, F, [(row, s.faces) for row, s in enumerate(simplified)], knee=1)
     figure.savefig(tmp_path / "front.png")
     assert (tmp_path / "front.png").stat().st_size > 20_000
     front, *panels = figure.axes

@@ -27,8 +27,9 @@ from meshsimp_pymoo.report import page as page_module
 from meshsimp_pymoo.report.document import ASSETS, embedded_array, embedded_faces, html_document
 from meshsimp_pymoo.report.page import FIXED_BYTES, PAGE_BYTES, simplification_page, write_page
 from meshsimp_pymoo.storage import mesh_arrays, read_front
-from meshsimp_pymoo.surface.score import mesh_quality
+from meshsimp_pymoo.surface.measures import MEASURES
 
+ERRORS = ["mean_error", "max_error", "rms_error", "error"]
 SIDE = 24  # samples along a side of the model
 
 
@@ -123,7 +124,7 @@ def unlike(a, b):
 
 def test_the_page_opens_with_the_chosen_solution_and_says_all_its_numbers(visit, front):
     assert shown(visit.page) == 2
-    for name in ("error", "triangles", "vertices", "mean_error", "rms_error", "max_error", "uncovered"):
+    for name in MEASURES:
         assert number(visit.page, name) == getattr(front[2], name)
     text = visit.page.locator("#numbers").inner_text()
     assert f"of {len(front.model.faces):,}" in text
@@ -199,7 +200,21 @@ def test_a_search_by_triangles_finds_the_most_accurate(visit, front):
     assert shown(visit.page) == front.best(triangles=limit).solution
 
 
-@pytest.mark.parametrize("measure", ["mean_error", "max_error", "rms_error", "error"])
+def test_every_error_can_be_searched_for_those_that_meshes_are_chosen_by_first(visit):
+    options = visit.page.locator("#measure option")
+    assert [option.get_attribute("value") for option in options.all()] == ERRORS
+    assert options.all_inner_texts() == ["mean error", "max error", "RMS error", "error (sum)"]
+    assert visit.page.locator("#measure").input_value() == "mean_error"
+
+
+def test_the_numbers_begin_with_the_sizes(visit):
+    names = visit.page.locator("#numbers th").all_inner_texts()
+    assert names == [
+        "triangles", "vertices", "error", "mean error", "RMS error", "max error", "uncovered", "solution"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("measure", ERRORS)
 def test_a_search_by_error_finds_the_smallest(visit, front, measure):
     limit = getattr(front[5], measure) * 1.01
     visit.page.select_option("#measure", measure)
@@ -341,7 +356,7 @@ def test_a_downloaded_mesh_has_the_triangles_and_the_error_that_the_page_says(vi
     path = tmp_path / f"small.{suffix}"
     download.value.save_as(path)
     vertices, faces = parsed(path)
-    found = mesh_quality(front.model, vertices, faces)
+    found = front.problem.surface.score(vertices, faces).quality
     assert found.triangles == number(visit.page, "triangles") == front[6].triangles
     assert found.error == pytest.approx(number(visit.page, "error"), rel=1e-9)
     assert found.max_error == pytest.approx(number(visit.page, "max_error"), rel=1e-9)
@@ -431,7 +446,9 @@ EVIL = "</script><img src=http://127.0.0.1:9/x onerror=alert(1)><script>window.h
 def test_names_cannot_run_anything_or_call_anyone(browser, folder, front, tmp_path):
     stored = replace(read_front(folder), meshes=(EVIL,) * len(front), series={EVIL: front.F})
     stored.run["model"]["name"] = f"{EVIL}.ply"
-    stored.run["settings"] = {"patch": EVIL}
+    stored.run["options"] = {"patch": EVIL}
+    stored.run["rules"] = {"pin": [EVIL]}
+    stored.run["settings"] = {"pick": EVIL}
     path = tmp_path / "report.html"
     path.write_text(
         simplification_page(stored, front.problem, folder=f"; rm -rf {EVIL}", knee=3),
@@ -531,7 +548,7 @@ def test_a_large_original_is_drawn_thinned_but_its_meshes_stay_exact(browser, fo
         with visit.page.expect_download() as download:
             visit.page.click("#downloads button[value=ply]")
         download.value.save_as(tmp_path / "small.ply")
-        found = mesh_quality(front.model, *parsed(tmp_path / "small.ply"))
+        found = front.problem.surface.score(*parsed(tmp_path / "small.ply")).quality
         assert found.error == pytest.approx(front[6].error, rel=1e-9)
         visit.check()
     finally:

@@ -32,7 +32,7 @@ from meshsimp_pymoo.search.operators import OAX
 from meshsimp_pymoo.search.presets import PRESETS
 
 WHAT = {"model": "roof"}
-ALGORITHMS = {name: row.function for name, row in PRESETS.items()} | {"nsga3": nsga3}
+ALGORITHMS = {name: preset.function for name, preset in PRESETS.items()} | {"nsga3": nsga3}
 
 
 @pytest.fixture(scope="module")

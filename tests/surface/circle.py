@@ -153,8 +153,8 @@ class Circle:
         return Refitted(mesh.faces, rows, self.points[rows], error, error, 0.0)
 
     def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return the row of each point in the file."""
-        return {"source_index": self.model.source_index}
+        """Return nothing: the row of each point in the file says it all."""
+        return {}
 
     def ground(self) -> Any | None:
         """Return the points and the measure."""
@@ -185,6 +185,23 @@ def circle(n: int, *, seed: int = 1, kind: type[Circle] = Circle, **rules: Any) 
 def fan(rows: IntArray) -> IntArray:
     """Return the triangles (n - 2, 3) from the first of n rows to each two that follow each other."""
     return np.array([[rows[0], a, b] for a, b in itertools.pairwise(rows[1:])], np.int32).reshape(-1, 3)
+
+
+def least_errors(surface: Surface) -> FloatArray:
+    """Return the least error of a subset of each number of triangles, (N - 1,), by going once round the circle.
+
+    The pinned point 0 begins and ends the way; no step goes past a pinned one.
+    """
+    n, xy, pinned = surface.n_vertices, surface.places, surface.pinned
+    least = np.full((n + 1, n + 1), np.inf)  # [number of steps so far, where]
+    least[0, 0] = 0.0
+    for b in range(1, n + 1):
+        for a in range(b - 1, -1, -1):
+            cost = sum(_to_segment(xy[i], xy[a], xy[b % n]) for i in range(a + 1, b))
+            least[1:, b] = np.minimum(least[1:, b], least[:-1, a] + cost)
+            if pinned[a]:
+                break
+    return least[2:, n]
 
 
 # ------------------------------------------------------------------------------------------------ what loops ask

@@ -120,7 +120,7 @@ KILLER = """
 import os, random, shutil, signal, sys, time
 from pathlib import Path
 import matplotlib.backends.backend_agg, matplotlib.figure  # all that a call imports, before it is forked
-import meshsimp_pymoo.cli.simplify, meshsimp_pymoo.report.figures
+import meshsimp_pymoo.cli.searching, meshsimp_pymoo.report.figures
 from meshsimp_pymoo.cli import main
 
 folder, seed, moments, call = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:]
@@ -182,7 +182,7 @@ def test_killed_between_taking_the_old_folder_away_and_putting_the_new_one_there
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", killed)
-    monkeypatch.setattr("meshsimp_pymoo.tiles.output._remove", lambda partial: None)
+    monkeypatch.setattr("meshsimp_pymoo.files.shutil.rmtree", lambda *_, **__: None)
     assert main(command(path, out)) == 130
     monkeypatch.undo()
     left = sorted(entry.suffix for entry in tmp_path.iterdir())
@@ -225,7 +225,10 @@ def test_a_disk_that_is_full_or_read_only_is_named_and_what_was_finished_stays(
     assert contents(out) == whole
 
 
-@pytest.mark.parametrize("name", ["write_mesh", "write_csv", "write_npz", "put_in_place"])
+@pytest.mark.parametrize(
+    "name",
+    ["tiles.output.write_mesh", "tiles.output.write_csv", "tiles.output.write_npz", "files._put_in_place"],
+)
 def test_a_disk_that_is_full_when_the_result_is_written_leaves_all_tiles(
     path, whole, tmp_path, capsys, monkeypatch, name
 ):
@@ -234,7 +237,7 @@ def test_a_disk_that_is_full_when_the_result_is_written_leaves_all_tiles(
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(f"meshsimp_pymoo.tiles.output.{name}", full)
+    monkeypatch.setattr(f"meshsimp_pymoo.{name}", full)
     assert main(command(path, out)) == 2
     refused(capsys, str(out), "No space left on device", "the same call goes on")
     monkeypatch.undo()
@@ -320,7 +323,7 @@ def test_an_output_folder_that_goes_away_meanwhile_is_named_and_what_is_there_in
 def test_a_folder_put_there_when_all_is_thinned_is_not_replaced(path, tmp_path, capsys, monkeypatch):
     out = tmp_path / "out"
     monkeypatch.setattr(
-        "meshsimp_pymoo.cli.tiled.tiled_front",
+        "meshsimp_pymoo.cli.tiling.tiled_front",
         lambda *args, **kwargs: (tiled_front(*args, **kwargs), (out / "mine.txt").write_text("mine"))[0],
     )
     assert main(command(path, out)) == 2
@@ -393,7 +396,7 @@ def test_a_damaged_record_of_what_the_tiles_belong_to_is_named(path, whole, tmp_
 LIMITED = """
 import resource, sys
 from pathlib import Path
-import meshsimp_pymoo.cli.simplify
+import meshsimp_pymoo.cli.searching
 from meshsimp_pymoo.cli import main
 used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 limit = used + (int(sys.argv[1]) << 20)

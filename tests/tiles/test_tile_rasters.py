@@ -8,7 +8,7 @@ import pytest
 from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.cli import tiled as tiled_command
+from meshsimp_pymoo.cli import tiling as tiled_command
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats import geotiff as raster_module
@@ -92,7 +92,7 @@ def test_a_window_of_a_mapped_array_has_the_places_and_rows_of_the_whole(tmp_pat
 
 def test_heights_are_read_in_any_order_as_from_an_array(path, monkeypatch):
     monkeypatch.setattr(raster_module, "BAND_SAMPLES", 700)
-    heights = RasterHeights(path, "dem", window=WINDOW)
+    heights = RasterHeights(path, "dem", Options(window=WINDOW))
     column, row, columns, rows = WINDOW
     part = HEIGHTS[row : row + rows, column : column + columns].astype(float)
     rng = np.random.default_rng(1)
@@ -127,7 +127,7 @@ def test_a_raster_becomes_a_front_in_its_own_coordinates_and_any_mesh_is_picked(
     model = open_model(path, Options(window=WINDOW))
     assert record["model"]["georeference"] == json.loads(json.dumps(model.georeference))
     assert record["model"]["georeference"]["epsg"] == 25832
-    assert record["settings"]["window"] == list(WINDOW)
+    assert record["options"]["window"] == list(WINDOW)
     chosen = read_source(out / "chosen.ply")
     assert b"comment crs EPSG:25832" in (out / "chosen.ply").read_bytes()[:400]
     assert find_cracks(chosen.points, chosen.faces) == 0

@@ -10,7 +10,7 @@ import pytest
 from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.cli import tiled as tiled_command
+from meshsimp_pymoo.cli import tiling as tiled_command
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.options import Options
@@ -172,7 +172,7 @@ def again(path, target):
 
 def test_killed_and_started_again_it_goes_on_and_ends_with_the_same_bytes(out, path, tmp_path, monkeypatch):
     target = tmp_path / "out"
-    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo.cli", *again(path, target)])
+    child = subprocess.Popen([sys.executable, "-m", "meshsimp_pymoo", *again(path, target)])
     deadline = time.monotonic() + 120
     while len(list((target / "tiles").glob("*.npz"))) < 3 and child.poll() is None:
         assert time.monotonic() < deadline

@@ -26,6 +26,7 @@ from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))
 GRID = open_grid(MODEL)
+SURFACE = HeightSurface(MODEL)
 SMALL = build_model(load("jacksboro:12"))
 SMALL_GRID = open_grid(SMALL)
 
@@ -176,7 +177,7 @@ def test_what_tiles_remove_changes_the_error_of_the_whole_by_what_they_say(share
     assert len(np.unique(removed)) == len(removed)
     assert np.isin(removed, kept).all()
     rest = np.setdiff1d(kept, removed)
-    table = HeightSurface(MODEL).evaluate(np.array([as_chromosome(GRID, kept), as_chromosome(GRID, rest)]))
+    table = SURFACE.evaluate(np.array([as_chromosome(GRID, kept), as_chromosome(GRID, rest)]))
     assert table[1, 0] - table[0, 0] == pytest.approx(change, rel=1e-6, abs=1e-6 * table[1, 0])
     if share >= 0.2 and limit == np.inf:
         assert len(removed) > 0.4 * share * GRID.shape[1] * (high - low)
@@ -220,7 +221,7 @@ def test_every_solution_but_the_smallest_is_a_subset_of_the_finer_one_and_all_ha
         if front.moved[row] is None:
             assert np.isin(front.kept(row), front.kept(row - 1)).all() or triangles[row] == 2
     rows = range(0, len(front), 5)
-    table = HeightSurface(MODEL).evaluate(np.array([as_chromosome(GRID, front.kept(row)) for row in rows]))
+    table = SURFACE.evaluate(np.array([as_chromosome(GRID, front.kept(row)) for row in rows]))
     for row, found in zip(rows, table, strict=True):
         assert found[0] == pytest.approx(front.quality[row].error, rel=1e-9)
         assert found[1] == front.quality[row].triangles
@@ -247,7 +248,7 @@ def test_any_size_can_be_taken_out_of_the_front(front, wanted):
     again, same_row = more.with_triangles(wanted)
     assert (again is more, same_row) == (True, row)
     kept = as_chromosome(GRID, more.kept(row))
-    assert HeightSurface(MODEL).evaluate(kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
+    assert SURFACE.evaluate(kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
 
 
 def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size(front):
@@ -260,7 +261,7 @@ def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size
     assert np.array_equal(move(task), rows)
     moved = weld(GRID, coarse.samples[rows])
     assert 198 <= moved.n_triangles <= 200
-    whole = thinning(HeightSurface(MODEL))
+    whole = thinning(SURFACE)
     assert measure(GRID, moved).error < 0.97 * np.interp(200, whole.triangles, whole.error)
 
 
@@ -274,7 +275,7 @@ def test_a_front_that_begins_with_small_meshes_is_thinned_from_finer_ones(front)
     small = tiled_front(GRID, tile=64, most=300)
     assert 200 < small.quality[0].triangles <= 340
     assert small.quality[0].triangles == pytest.approx(2 * len(small.samples), rel=0.2)
-    whole = thinning(HeightSurface(MODEL))
+    whole = thinning(SURFACE)
     assert small.quality[0].error < 1.03 * np.interp(small.quality[0].triangles, whole.triangles, whole.error)
 
 

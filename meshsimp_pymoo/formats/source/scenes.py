@@ -17,7 +17,7 @@ from meshsimp_pymoo.formats.source.numbers import rgba_of
 if TYPE_CHECKING:
     import trimesh
 
-    from meshsimp_pymoo.formats.table import OutMesh
+    from meshsimp_pymoo.formats.outmesh import OutMesh
 
 # trimesh logs what it cannot parse; without a handler Python would print that to stderr. Users' own handlers still get
 # it.

@@ -20,6 +20,7 @@ function describe(row) {
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
 const named = (column) => measures[column]?.label ?? column.replace("_", " ");
 const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
+const isSize = ({ name }) => name in model; // what the original has too
 const percent = (share) => `${d3.format(share < 0.0995 ? ".2~f" : ".1~f")(100 * share)} %`;
 
 // -------------------------------------------------------------------------------------------------------- picking
@@ -101,7 +102,8 @@ function numbers(row) {
     mean_error: (value) => `${percent(value / model.diagonal)} of the model's diagonal`,
   };
   const rows = [
-    ...data.measures.map(({ name, meaning }) => [name, columns[name][row], notes[name]?.(columns[name][row]) ?? meaning]),
+    ...[...data.measures.filter(isSize), ...data.measures.filter((measure) => !isSize(measure))].map(
+      ({ name, meaning }) => [name, columns[name][row], notes[name]?.(columns[name][row]) ?? meaning]),
     ...refitted(row),
     ["solution", columns.solution[row], data.meshes[row] ? `stored as ${data.meshes[row]}` : "not stored as a mesh"],
   ];

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mating import call, evaluated_pairs, opposite_pairs
 from numpy.testing import assert_array_equal
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.population import Population
-from stand_in_problem import GridProblem, call, evaluated_pairs, opposite_pairs
+from stand_in_problem import GridProblem
 
 from meshsimp_pymoo.search.operators import OAX
 from meshsimp_pymoo.search.operators.oax import ORTHOGONAL_ARRAYS, child_levels, first_objective, orthogonal_array
@@ -17,6 +18,7 @@ from meshsimp_pymoo.search.operators.segments import random_cuts
 
 # As printed in the public code of Ho's group.
 L4 = ["000", "011", "101", "110"]
+
 L8 = ["0000000", "0001111", "0110011", "0111100", "1010101", "1011010", "1100110", "1101001"]
 
 

@@ -1,4 +1,4 @@
-"""Each region of the mesh from the parent that does it for less."""
+"""Regions come from the parent that does them for less."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_child_takes_each_half_from_the_parent_that_is_good_there() -> None:
     problem = MeshProblem("peaks:21", regions=2)
     half = np.arange(problem.n_var) * 2 // problem.n_var == 0
     rng = np.random.default_rng(3)
-    good = thinning(problem.surface).kept(40)
+    good = thinning(problem.model).kept(40)
     poor = problem.pinned.copy()
     for side in (half, ~half):
         rows = np.flatnonzero(side & ~problem.pinned)

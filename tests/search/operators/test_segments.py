@@ -1,4 +1,4 @@
-"""Where chromosomes are cut."""
+"""Where the vector is cut."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Subsets that become a little larger or smaller."""
+"""How far sizes go, and by which vertices."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshsimp_pymoo import MeshProblem
-from meshsimp_pymoo.search.operators import Relocation, SizeStep
+from meshsimp_pymoo.search.operators import SizeStep
 
 
 @pytest.mark.parametrize("step", [0.02, 0.3])
@@ -48,12 +48,3 @@ def test_a_size_step_at_either_end_stays_there_or_comes_back() -> None:
 def test_an_impossible_step_is_refused_with_its_value() -> None:
     with pytest.raises(ValueError, match=r"step = -0\.1 is no number"):
         SizeStep(-0.1)
-
-
-@pytest.mark.parametrize("mutation", [Relocation, SizeStep])
-def test_what_lowers_sums_refuses_the_maximum_and_impossible_probabilities(mutation: type) -> None:
-    with pytest.raises(ValueError, match=r"prob = 1\.2 is not a probability"):
-        mutation(prob=1.2)
-    problem = MeshProblem("peaks:6", objectives=("max_error", "triangles"))
-    with pytest.raises(ValueError, match=r"the first objective is the maximum, 'max_error'; use objectives="):
-        mutation()._do(problem, np.ones((2, problem.n_var), bool), random_state=np.random.default_rng(1))

@@ -1,12 +1,13 @@
-"""Genes exchanged at random, one by one."""
+"""Half of the genes go to the other child."""
 
 from __future__ import annotations
 
 import numpy as np
+from mating import call, evaluated_pairs
 from numpy.testing import assert_array_equal
-from stand_in_problem import GridProblem, call, evaluated_pairs
+from stand_in_problem import GridProblem
 
-from meshsimp_pymoo.search.operators import OAX, SubsetUniformCrossover
+from meshsimp_pymoo.search.operators import SubsetUniformCrossover
 
 
 def test_uniform_crossover_exchanges_half_of_the_genes_and_loses_none() -> None:
@@ -24,12 +25,3 @@ def test_uniform_crossover_exchanges_half_of_the_genes_and_loses_none() -> None:
         ~problem.pinned
     ]
     assert abs(per_gene - 0.5).max() < 4.5 * np.sqrt(0.25 / 35)
-
-
-def test_with_one_child_it_is_the_first_of_the_two() -> None:
-    problem = GridProblem(8)
-    pairs = evaluated_pairs(problem, 10, seed=1)
-    for operator in (OAX, SubsetUniformCrossover):
-        two, _ = call(operator(prob=1.0), problem, pairs, seed=2)
-        one, _ = call(operator(prob=1.0, n_offsprings=1), problem, pairs, seed=2)
-        assert_array_equal(one[0], two[0])

@@ -3,31 +3,64 @@
 from __future__ import annotations
 
 import argparse
-import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
+if TYPE_CHECKING:
+    from meshsimp_pymoo.formats.options import Options
+
+HELP = "say what a model is and whether it can be simplified"
+DESCRIPTION = """\
+Say what MODEL is, whether it is a height field, and what would be refused. Without a
+MODEL: list the built-in models."""
+EXAMPLES = """\
+examples:
+  meshsimp info
+      the built-in models
+  meshsimp info face.ply
+      is it a height field, and seen from where?
+  meshsimp info head.ply --patch front --up y
+      and its front alone?
+"""
 
 
-def info(args: argparse.Namespace) -> int:
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_model, add_shown
+    from meshsimp_pymoo.formats.options import Options
+
+    add_model(parser, Options, nargs="?")
+    add_shown(parser, quiet=False)
+
+
+def run(args: argparse.Namespace) -> int:
     """Describe ``args.model``; without one, list the built-in models."""
-    from meshsimp_pymoo import datasets
+    import json
 
-    if args.model is None:
-        lines = datasets.describe()
-        print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
-        return OK
+    from meshsimp_pymoo import datasets
+    from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.terminal import OK
+    from meshsimp_pymoo.formats.options import Options
+
+    if args.model is not None:
+        return _describe(args.model, settings_from(args, Options), as_json=args.json)
+
+    lines = datasets.describe()
+    print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
+    return OK
+
+
+def _describe(model: str, options: Options, *, as_json: bool) -> int:
+    import json
     from dataclasses import asdict
 
     import numpy as np
 
+    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
     from meshsimp_pymoo.errors import ModelError
-    from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.opening import open_source
-    from meshsimp_pymoo.settings import taken
     from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
 
-    source = open_source(args.model, taken(Options, None, dict(vars(args))))
+    source = open_source(model, options)
     used = source.points[np.unique(source.faces)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     content: dict[str, Any] = {
@@ -49,7 +82,7 @@ def info(args: argparse.Namespace) -> int:
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
     try:
-        up = up_direction(source, args.up)
+        up = up_direction(source, options.up)
     except ModelError as problem:
         refusal: str | None = str(problem)
     else:
@@ -66,7 +99,7 @@ def info(args: argparse.Namespace) -> int:
             "folded over": f"{facts.folds + facts.hidden:,} faces ({facts.fold_share:.2%})",
         }
     rows["verdict"] = "refused" if refusal else "usable: an open height field"
-    if args.json:
+    if as_json:
         print(json.dumps(content | {"refusal": refusal}, indent=2))
     else:
         print(source.name)

@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import argparse
 
-import shtab
+HELP = "print what makes a shell complete these commands"
+DESCRIPTION = "Print a script that makes a shell complete the commands, options and files of meshsimp."
+EXAMPLES = """\
+examples:
+  eval "$(meshsimp completion bash)"
+      in this session; the same line in ~/.bashrc: always
+  meshsimp completion zsh > "${fpath[1]}/_meshsimp"
+      zsh, always
+"""
 
-from meshsimp_pymoo.cli.arguments import make_parser
-from meshsimp_pymoo.cli.terminal import OK
-
+SHELLS = ("bash", "zsh", "tcsh")
 # Arguments that are files or folders, by their place in ``args``.
 PATHS = ("model", "output", "other", "front", "config", "models")
 
 
-def completion(args: argparse.Namespace) -> int:
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    parser.add_argument("shell", metavar="SHELL", choices=SHELLS, help=" or ".join(SHELLS))
+
+
+def run(args: argparse.Namespace) -> int:
     """Print the script for ``args.shell``."""
-    parser = make_parser()
-    for action in _arguments(parser):
+    import shtab
+
+    from meshsimp_pymoo.cli.terminal import OK
+
+    for action in _arguments(args.parser):
         if action.dest in PATHS and action.choices is None:
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    print(shtab.complete(parser, shell=args.shell))
+    print(shtab.complete(args.parser, shell=args.shell))
     return OK
 
 
@@ -30,5 +44,6 @@ def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
         found.append(action)
         if isinstance(action, argparse._SubParsersAction):
             for command in action.choices.values():
+                command.fill()
                 found += _arguments(command)
     return found

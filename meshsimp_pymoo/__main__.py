@@ -1,4 +1,4 @@
-"""``python -m meshsimp_pymoo.cli`` is the shell command ``meshsimp``."""
+"""``python -m meshsimp_pymoo`` is the shell command ``meshsimp``."""
 
 import sys
 

@@ -1,0 +1,101 @@
+"""``meshsimp pick``: one mesh out of a stored front."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from meshsimp_pymoo.cli.requests import Wish
+
+HELP = "take one mesh out of a front that is stored"
+DESCRIPTION = """\
+Take one mesh out of the front in OUT, which `meshsimp simplify` wrote. No search
+is repeated: a mesh that is stored is copied, others are made from the model,
+which must be the very same."""
+EXAMPLES = """\
+examples:
+  meshsimp pick out --triangles 500 -o small.ply
+      the most accurate of at most 500 triangles
+  meshsimp pick out --max-error 0.1 -o small.obj
+      the smallest that deviates nowhere by more than 0.1
+  meshsimp pick out --knee
+      only say what the best compromise is
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_shown, add_wishes, whole
+    from meshsimp_pymoo.formats.table import written_suffixes
+
+    parser.add_argument("front", metavar="OUT", help="the folder of a front")
+    wanted = parser.add_argument_group("which one").add_mutually_exclusive_group(required=True)
+    add_wishes(wanted)
+    wanted.add_argument("--knee", action="store_true", help="the best compromise: the knee of the front")
+    wanted.add_argument("--solution", type=whole(0), metavar="K", help="the one of this number in front.csv")
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help=f"mesh to write; its suffix is its format: {', '.join(written_suffixes())} (default: nothing is written)",
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
+    parser.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
+    add_shown(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Say which solution of the front in ``args.front`` is meant, and write its mesh if a file is named."""
+    from meshsimp_pymoo.cli.arguments import wishes_of
+    from meshsimp_pymoo.cli.requests import Wish
+    from meshsimp_pymoo.cli.tiling import pick_tiled
+    from meshsimp_pymoo.files import claim_file
+    from meshsimp_pymoo.formats.table import written_suffixes
+    from meshsimp_pymoo.tiles.output import is_tiled
+
+    path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
+    wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
+    if is_tiled(args.front):
+        return pick_tiled(args.front, args.model, wish, args.solution, path, **shown)
+    return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
+
+
+def _pick(
+    folder: str,
+    model: str | None,
+    wish: Wish,
+    number: int | None,
+    path: Path | None,
+    overwrite: bool,
+    *,
+    quiet: bool,
+    as_json: bool,
+) -> int:
+    import json
+    from dataclasses import asdict
+
+    from meshsimp_pymoo.cli.arguments import numbered
+    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
+    from meshsimp_pymoo.front import Front
+
+    front = Front.load(folder, model=model)
+    solution: Any
+    if number is not None:
+        solution, missed = front[numbered(folder, len(front), number)], ""
+    else:
+        solution, missed = wish.of(front)
+    if solution is None:
+        say(f"{folder}: {missed}; nothing is written")
+        return TARGET_MISSED
+    if path is not None:
+        solution.save(path, overwrite=overwrite)
+    if as_json:
+        mesh = None if path is None else str(path)
+        print(json.dumps({"mesh": mesh, "solution": solution.solution, **asdict(solution.quality)}, indent=2))
+    elif not quiet:
+        print(f"solution {solution.solution} of {folder}: {described(solution.quality)}")
+        print(f"written: {path}" if path else "nothing is written; name a file with -o")
+    return OK

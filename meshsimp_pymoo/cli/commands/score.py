@@ -1,0 +1,139 @@
+"""``meshsimp score``: the error of any tool's mesh."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.front import Front
+    from meshsimp_pymoo.surface.rules import Rules
+
+HELP = "measure a mesh that another tool simplified"
+DESCRIPTION = """\
+Measure OTHER, any simplified mesh of MODEL, by the error of this package: the sum,
+mean, RMS and maximum of the deviations at all vertices of MODEL, and how many of
+them no triangle covers."""
+EXAMPLES = """\
+examples:
+  meshsimp score face.ply decimated.ply
+      its error by the measure of this package
+  meshsimp score face.ply decimated.ply --front face_front
+      and where it lies against a stored front
+  meshsimp score face.ply decimated.ply -o error.png
+      and a picture of the error
+"""
+
+PICTURES = (".png", ".svg", ".pdf")
+# A mesh of the front itself, measured from its file, differs by less.
+ROUNDING = 1e-9
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import add_model, add_settings, add_shown
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
+
+    add_model(parser, Options, help="the original")
+    parser.add_argument("other", metavar="OTHER", help="the simplified mesh, in the same frame and units")
+    parser.add_argument("--front", metavar="OUT", help="folder of a front of MODEL to compare with")
+    parser.add_argument("-o", "--output", metavar="FILE", help="picture of the error to write: png, svg or pdf")
+    parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
+    add_settings(parser, Rules, only=("outside", "weights"), outside="nearest, or as in the front")
+    add_shown(parser, quiet=False)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure ``args.other`` against ``args.model``, place it against a front, and draw its error."""
+    import json
+
+    from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.terminal import OK
+    from meshsimp_pymoo.files import claim_file
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
+
+    path = None if args.output is None else claim_file(args.output, PICTURES, overwrite=args.overwrite)
+    options, rules = settings_from(args, Options), settings_from(args, Rules)
+    summary, lines = _scored(args.model, options, rules, args.outside, args.other, args.front, path)
+    print(json.dumps(summary, indent=2) if args.json else "\n".join(lines))
+    return OK
+
+
+def _scored(
+    model: str, options: Options, rules: Rules, outside: str | None, other: str, folder: str | None, path: Path | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Return what is said of a mesh, as numbers and in words; draw its error if a file is named."""
+    from dataclasses import asdict
+    from pathlib import Path
+
+    from meshsimp_pymoo.cli.terminal import described
+    from meshsimp_pymoo.errors import UsageError
+    from meshsimp_pymoo.front import Front
+    from meshsimp_pymoo.opening import open_model, open_source
+    from meshsimp_pymoo.surface.height import HeightSurface
+
+    surface: Any = HeightSurface(open_model(model, options), rules)
+    front = None
+    if folder is not None:
+        front = Front.load(folder, model=surface.model)
+        surface = front.problem.surface  # with the weights of the front
+        if outside not in (None, surface.rules.outside):
+            raise UsageError(
+                f"{folder}: its errors are those of --outside {surface.rules.outside}; leave --outside out to compare"
+            )
+    source = open_source(other)
+    try:
+        scored = surface.score(source.points, source.faces)
+    except ValueError as problem:
+        raise UsageError(f"{other}: cannot be measured against {surface.model.name}: {problem}") from None
+    quality, name = scored.quality, surface.model.name
+    summary: dict[str, Any] = {
+        "model": name, "other": str(other), "outside": surface.rules.outside, **asdict(quality)
+    }  # fmt: skip
+    lines = [f"{other}: {described(quality)}"]
+    if quality.uncovered > surface.n_vertices // 2:
+        share = quality.uncovered / surface.n_vertices
+        lines.append(f"{share:.0%} of the vertices of {name} are uncovered; are both in one frame and unit?")
+    if front is not None:
+        compared, line = _against(front, quality.triangles, quality.error)
+        summary["front"] = {"folder": str(folder), **compared}
+        lines.append(f"{folder}: {line}")
+    if path is not None:
+        title = f"{Path(other).name}: {quality.triangles:,} triangles, mean error {quality.mean_error:.3g}"
+        _draw(surface, scored, title, path)
+        summary["picture"] = str(path)
+        lines.append(f"written: {path}")
+    return summary, lines
+
+
+def _draw(surface: Any, scored: Any, title: str, path: Path) -> None:
+    from meshsimp_pymoo.files import new_file
+    from meshsimp_pymoo.report.figures import error_figure
+
+    with new_file(path) as unfinished:
+        error_figure(surface, scored.deviation, scored.covered, title=title).savefig(unfinished)
+
+
+def _against(front: Front, triangles: int, error: float) -> tuple[dict[str, Any], str]:
+    """Return where a mesh lies against a front: as numbers, and in words."""
+    try:
+        rival = front.best(triangles=triangles)
+    except LookupError:
+        smallest = f"its smallest has {front[0].triangles}"
+        return {"solution": None}, f"holds no mesh of at most {triangles:,} triangles; {smallest}"
+    ratio = error / rival.error if rival.error > 0 else None
+    facts = {"solution": rival.solution, "triangles": rival.triangles, "error": rival.error, "error_ratio": ratio}
+    smaller = next((s for s in front if s.error <= error * (1 + ROUNDING)), None)
+    facts["triangles_for_this_error"] = None if smaller is None else smaller.triangles
+    own = f"solution {rival.solution}, with {rival.triangles:,} triangles, has the error {rival.error:.6g}"
+    if ratio is None:
+        compared = "both are exact" if error == 0 else "that is exact"
+    else:
+        compared = f"the error of this mesh is {ratio:.3g} times that"
+    needed = "" if smaller is None else f"; for this error the front needs {smaller.triangles:,} triangles"
+    return facts, f"{own}; {compared}{needed}"

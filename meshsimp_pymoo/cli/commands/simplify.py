@@ -1,0 +1,143 @@
+"""``meshsimp simplify``: search the front of a model and write it."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "write the front of simplified meshes of a model"
+DESCRIPTION = """\
+Find the front of simplified meshes of MODEL and write it to a new folder:
+report.html (the page to look and choose), front.csv (the numbers), meshes/ (one mesh
+per solution), front.png, front.npz, run.json, and the chosen mesh if one is asked for."""
+EXAMPLES = """\
+examples:
+  meshsimp simplify face.ply
+      the front, in the new folder face_front
+  meshsimp simplify face.ply -o out --triangles 500
+      and the most accurate mesh of at most 500 triangles
+  meshsimp simplify dem.asc --time 60s --pick knee
+      search for a minute, take the best compromise
+  meshsimp simplify scan.obj --max-error 0.1 --format obj
+      the smallest that deviates nowhere by more than 0.1
+  meshsimp simplify grid.npy --spacing 30 --nodata=-9999
+      a height grid
+  meshsimp simplify scan.laz --max-edge 5 --format landxml
+      a point cloud with bays and holes, as a TIN for GIS programs
+  meshsimp simplify huge.npy --tile 512 --triangles 200000
+      a height grid that is too big for one piece
+"""
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    from meshsimp_pymoo.cli.arguments import (
+        add_checkpoint,
+        add_model,
+        add_settings,
+        add_shown,
+        add_wishes,
+        add_workers,
+        duration,
+        mesh_count,
+        tile,
+        whole,
+    )
+    from meshsimp_pymoo.cli.requests import Output, Search
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.formats.table import written_formats
+    from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
+    from meshsimp_pymoo.surface.measures import OBJECTIVES
+    from meshsimp_pymoo.surface.rules import Rules
+
+    parser.add_argument("-o", "--output", metavar="OUT", help="folder to make (default: MODEL_front, here)")
+    parser.add_argument("--overwrite", action="store_true", help="replace results that are in OUT already")
+
+    wanted = parser.add_argument_group(
+        "the mesh you want, written to OUT/chosen.ply beside the front"
+    ).add_mutually_exclusive_group()
+    add_wishes(wanted)
+    wanted.add_argument("--pick", choices=("knee",), help="the best compromise: the knee of the front")
+
+    budget = parser.add_argument_group(
+        f"how long to search (default: one sweep over all sizes; other algorithms: {DEFAULT_GENERATIONS} generations)"
+    ).add_mutually_exclusive_group()
+    budget.add_argument(
+        "--time", type=duration, metavar="T", help="60s, 10min, 1h (results then depend on the machine)"
+    )
+    budget.add_argument("--evaluations", type=whole(1), metavar="N", help="stop after the generation that reaches N")
+    budget.add_argument("--generations", type=whole(1), metavar="N")
+
+    search = parser.add_argument_group("how to search")
+    search.add_argument(
+        "--algorithm",
+        choices=[name for name, preset in PRESETS.items() if preset.whole_front],
+        default=Search.algorithm,
+        help="preset (default: %(default)s)",
+    )
+    search.add_argument(
+        "--population", type=whole(2), default=Search.population, metavar="N", help="(default: %(default)s)"
+    )
+    search.add_argument(
+        "--seed", type=whole(0), default=Search.seed, metavar="N", help="same seed, same results (default: %(default)s)"
+    )
+    search.add_argument(
+        "--threads", type=whole(1), metavar="N", help="(default: all cores; the results do not depend on it)"
+    )
+    add_checkpoint(search, "the state of the search is saved in OUT", " (tiles are always saved)")
+
+    tiles = parser.add_argument_group("big height grids, thinned tile by tile in bounded memory")
+    tiles.add_argument(
+        "--tile",
+        type=tile,
+        metavar="N|none",
+        help="samples along one side of a tile (default: 512, for .npy, .asc and .tif from 2 million samples on)",
+    )
+    tiles.add_argument("--pieces", action="store_true", help="write the chosen mesh in pieces, one for each tile")
+    add_workers(tiles)
+
+    add_model(parser, Options)
+    rules = parser.add_argument_group("what counts")
+    add_settings(rules, Rules)
+    spelled = {measure.minimised: name for name, measure in OBJECTIVES.items()}
+    rules.add_argument(
+        "--measure",
+        type=str.lower,
+        choices=list(spelled),
+        default=next(iter(spelled)),
+        help="error that is made small beside the triangles: the sum of the deviations, their root mean square or "
+        "their maximum (default: %(default)s)",
+    )
+
+    output = parser.add_argument_group("what is written and shown")
+    output.add_argument(
+        "--format",
+        type=str.lower,
+        choices=list(written_formats()),
+        default=Output.format,
+        help="of the meshes (default: %(default)s)",
+    )
+    output.add_argument(
+        "--meshes",
+        type=mesh_count,
+        default=Output.meshes,
+        metavar="all|N|none",
+        help="write at most N meshes, an even selection of the front (default: %(default)s)",
+    )
+    output.add_argument(
+        "--refit",
+        action="store_true",
+        help="write each mesh once more in OUT/refitted, its vertices raised or lowered to where the sum of the "
+        "deviations is least; front.csv says refitted_error",
+    )
+    output.add_argument(
+        "--no-page", dest="page", action="store_false", help="do not write OUT/report.html, the page to look and choose"
+    )
+    add_shown(output)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Search the front of ``args.model`` and write it to a new folder."""
+    from meshsimp_pymoo.cli.requests import request_of
+    from meshsimp_pymoo.cli.searching import simplify
+
+    return simplify(request_of(args))

@@ -1,0 +1,380 @@
+"""A search from the shell: from a request to a folder of results, with checkpoints, progress and Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import time
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pymoo.termination.max_eval import MaximumFunctionCallTermination
+from pymoo.termination.max_gen import MaximumGenerationTermination
+from pymoo.termination.max_time import TimeBasedTermination
+
+from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
+from meshsimp_pymoo.cli.terminal import (
+    BAD_INPUT,
+    INTERRUPTED,
+    OK,
+    TARGET_MISSED,
+    described,
+    progress,
+    say,
+    stop_if_interrupted,
+)
+from meshsimp_pymoo.cli.tiling import simplify_tiled, wants_tiles
+from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
+from meshsimp_pymoo.files import locked, put_back
+from meshsimp_pymoo.formats.table import format_to_write, shared_frame
+from meshsimp_pymoo.front import Front, FrontSolution, starting_front
+from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.search.checkpoint import (
+    CheckpointError,
+    Checkpoints,
+    NotResumable,
+    difference,
+    read_checkpoint,
+    restore,
+)
+from meshsimp_pymoo.search.memetic import sweep_generations
+from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
+from meshsimp_pymoo.settings import plain
+from meshsimp_pymoo.storage import CHECKPOINT, claim_output, is_unfinished, package_versions
+from meshsimp_pymoo.surface.measures import OBJECTIVES
+
+
+def simplify(request: Request) -> int:
+    """Search the front of a model and write it to a new folder; return the exit code."""
+    search, output = request.search, request.output
+    if wants_tiles(request):
+        try:
+            return simplify_tiled(request)
+        except NoFullGrid as reason:
+            if request.tiling.tile is not None:
+                raise
+            # nobody asked for tiles
+            if not output.quiet:
+                why = re.split("; only|, and tiles", str(reason))[0]
+                say(f"{why}; so it is not cut into tiles but searched in one piece")
+    _claim(output, search)
+    if PRESETS[search.algorithm].sums_only and not OBJECTIVES[request.rules.measure].is_sum:
+        raise UsageError(
+            "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
+            "use --algorithm nsga2_v1 with it, or --measure rms"
+        )
+    problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
+    format_to_write(output.format).check(problem.model)
+    _refuse_impossible(problem, request.wish)
+    with Keeper(problem, search, output) as keeper:
+        found = _search(problem, keeper, quiet=output.quiet)
+        if found is None:
+            say("interrupted before the first generation was complete; nothing is written")
+            return INTERRUPTED
+        return _write(found, request, keeper)
+
+
+def _claim(output: Output, search: Search) -> None:
+    """Check the folder to make: a new one, one with a checkpoint, or with ``--overwrite`` one with old results."""
+    put_back(output.folder)
+    goes_on = search.checkpoint is not None or not (output.folder / CHECKPOINT).exists()
+    if not (is_unfinished(output.folder) and goes_on):
+        claim_output(output.folder, overwrite=output.overwrite)
+
+
+def _refuse_impossible(problem: MeshProblem, wish: Wish) -> None:
+    """Stop before the search if no subset of the vertices is a mesh, or none can meet the target."""
+    table = problem.evaluate_subsets(np.array([np.ones(problem.n_var, dtype=bool), problem.pinned]))
+    whole, bare = (problem.as_quality(row) for row in table)
+    if whole.triangles == 0:
+        raise UsageError(
+            f"{problem.model.name}: has no triangle with an area as seen from "
+            f"{problem.surface.view.rotation[2].tolist()}; choose another viewing side with --up"
+        )
+    # With open bays, more vertices can mean fewer triangles, but never none.
+    bays = problem.surface.rules.footprint != "hull"
+    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles
+    if wish.triangles is not None and wish.triangles < least:
+        raise UsageError(
+            f"--triangles {wish.triangles} is impossible: {problem.model.name} has {least} to "
+            f"{whole.triangles} triangles with its pinned vertices"
+        )
+
+
+# ----------------------------------------------------------------------------------------------------------- the search
+
+
+@dataclass
+class _Found:
+    """What a search came back with."""
+
+    front: Front
+    generations: int
+    evaluations: int
+    seconds: float
+    interrupted: bool
+
+
+def budget(search: Search) -> dict[str, float]:
+    """Return the budget of a search by kind; where none is given, generations as is usual for its algorithm."""
+    given: dict[str, float | None] = {
+        "time": search.time, "evaluations": search.evaluations, "generations": search.generations
+    }  # fmt: skip
+    found = {kind: amount for kind, amount in given.items() if amount is not None}
+    if found:
+        return found
+    sweeps = PRESETS[search.algorithm].sweeps
+    return {"generations": sweep_generations(search.population) if sweeps else DEFAULT_GENERATIONS}
+
+
+def _set_up(problem: MeshProblem, search: Search) -> Any:
+    """Return the algorithm before its first generation."""
+    terminations = {
+        "time": TimeBasedTermination,
+        "evaluations": MaximumFunctionCallTermination,
+        "generations": MaximumGenerationTermination,
+    }
+    ((kind, amount),) = budget(search).items()
+    algorithm = PRESETS[search.algorithm].function(pop_size=search.population)
+    return algorithm.setup(problem, termination=terminations[kind](amount), seed=search.seed)
+
+
+def _search(problem: MeshProblem, keeper: Keeper, *, quiet: bool) -> _Found | None:
+    """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
+    algorithm, before = keeper.begin()
+    start = time.perf_counter()
+    found, generations, interrupted = algorithm.opt, (algorithm.n_iter or 1) - 1, False
+    with progress(quiet, problem.model) as show:
+        try:
+            while algorithm.has_next():
+                stop_if_interrupted()
+                algorithm.next()
+                found, generations = algorithm.opt, algorithm.n_iter - 1
+                show(algorithm.termination.perc, algorithm.evaluator.n_eval, found.get("F"))
+                keeper.keep()
+            keeper.keep(last=True)
+        except KeyboardInterrupt:
+            interrupted = True
+    if found is None:
+        return None
+    try:
+        # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
+        front = Front.from_subsets(problem, np.asarray(found.get("X"), dtype=bool), ends=True)
+    except LookupError:
+        raise UsageError(
+            f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "
+            "inside its outline; search longer, or pass --footprint hull"
+        ) from None
+    front.series |= starting_front(problem, algorithm)
+    return _Found(front, generations, algorithm.evaluator.n_eval, before + time.perf_counter() - start, interrupted)
+
+
+class Keeper:
+    """The checkpoints of a search, in the folder of its results; it holds the folder as long as there is one.
+
+    Parameters
+    ----------
+    problem : MeshProblem
+        What is searched.
+    search : Search
+        How.
+    output : Output
+        Where the results go, and whether old ones give way.
+    """
+
+    def __init__(self, problem: MeshProblem, search: Search, output: Output) -> None:
+        self.problem = problem
+        self.search = search
+        self.output = output
+        self.path = output.folder / CHECKPOINT
+        self.is_held = False
+        self._checkpoints: Checkpoints | None = None
+        self._until_done = ExitStack()
+        self._warned = False
+
+    def __enter__(self) -> Keeper:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._until_done.close()
+
+    @property
+    def what(self) -> dict[str, Any]:
+        """What the search is: all that decides its results."""
+        search, versions = self.search, package_versions()
+        return {
+            "model": self.problem.model.hash,
+            **plain(self.problem.surface.rules),
+            "algorithm": search.algorithm,
+            "population": search.population,
+            "seed": search.seed,
+            **budget(search),
+            **{name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")},
+        }
+
+    def begin(self) -> tuple[Any, float]:
+        """Return the algorithm, where its checkpoint left it if there is one, and the seconds it took before."""
+        algorithm, before, interval = _set_up(self.problem, self.search), 0.0, self.search.checkpoint
+        if interval is None:
+            return algorithm, before
+        if self.path.exists():
+            self._hold()
+            try:
+                before = self._go_on(algorithm)
+            except CheckpointError as problem:
+                if not self.output.overwrite:
+                    raise ResultError(
+                        f"{problem}; name another folder, or allow overwriting (--overwrite) to begin anew"
+                    ) from None
+                algorithm = _set_up(self.problem, self.search)
+        try:
+            self._checkpoints = Checkpoints(self.path, algorithm, self.what, interval=interval, before=before)
+        except NotResumable as problem:
+            self._warn(problem)
+        return algorithm, before
+
+    def _go_on(self, algorithm: Any) -> float:
+        """Bring the algorithm to where the checkpoint left it; return the seconds that took."""
+        stored = read_checkpoint(self.path)
+        if other := difference(stored.what, self.what):
+            raise CheckpointError(f"{self.path}: belongs to another search ({other})")
+        restore(stored, algorithm)
+        if not self.output.quiet:
+            say(
+                f"{self.output.folder} holds a search that was stopped after {algorithm.n_iter - 1} generations, "
+                f"{algorithm.evaluator.n_eval:,} evaluations, {stored.seconds:.0f} s; going on from there"
+            )
+        return stored.seconds
+
+    def keep(self, *, last: bool = False) -> None:
+        """Save the state if it is time; at the end of the search, if it was long enough to be worth it."""
+        checkpoints = self._checkpoints
+        if checkpoints is None or not (checkpoints.due() or (last and self.is_held)):
+            return
+        try:
+            self._hold()
+            checkpoints.save()
+        except (CheckpointError, NotResumable, OSError) as problem:
+            self._warn(problem)
+
+    def _warn(self, problem: Exception) -> None:
+        """Say once what is wrong with the checkpoints; the search is worth more."""
+        if not self._warned:
+            say(f"warning: {problem}; the search goes on without a checkpoint")
+        self._warned = True
+
+    def _hold(self) -> None:
+        """Make the folder, if need be, and keep other processes away from it."""
+        if not self.is_held:
+            folder = self.output.folder
+            folder.mkdir(parents=True, exist_ok=True)
+            self._until_done.enter_context(locked(folder))
+            self.is_held = True
+            put_back(folder, tidy=True)
+
+
+# ---------------------------------------------------------------------------------------------------------- the results
+
+
+def _write(found: _Found, request: Request, keeper: Keeper) -> int:
+    """Write what was found, say so, and return the exit code."""
+    search, output = request.search, request.output
+    folder, front = output.folder, found.front
+    chosen, missed = request.wish.of(front)
+    run = {
+        "settings": request.recorded | budget(search),
+        "seed": search.seed,
+        "generations": found.generations,
+        "evaluations": found.evaluations,
+        "seconds": round(found.seconds, 3),
+        "interrupted": found.interrupted,
+    }
+    try:
+        front.save(
+            folder,
+            # the folder of our own checkpoint gives way to the results
+            overwrite=output.overwrite or keeper.is_held or (is_unfinished(folder) and not keeper.path.exists()),
+            meshes=output.meshes,
+            mesh_format=output.format,
+            chosen=chosen,
+            refit=output.refit,
+            page=output.page,
+            run=run,
+        )
+    except (ResultError, KeyboardInterrupt) as stop:
+        if not (keeper.is_held and keeper.path.exists()):
+            raise
+        reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
+        say(f"{reason}; the same command goes on from the checkpoint in {folder}")
+        return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
+    _summarise(found, search, output, chosen)
+    if found.interrupted:
+        say(f"interrupted after {found.generations} generations; {folder} holds the front so far")
+        return INTERRUPTED
+    if missed:
+        say(f"{folder} holds a front, but no chosen mesh: {missed}; search longer (--generations, --time)")
+        return TARGET_MISSED
+    return OK
+
+
+def _summarise(found: _Found, search: Search, output: Output, chosen: FrontSolution | None) -> None:
+    front, folder = found.front, output.folder
+    model, quality = front.model, front.quality
+    kind = format_to_write(output.format)
+    chosen_path = None if chosen is None else str(folder / f"chosen{kind.suffix}")
+    origin = shared_frame(kind, model.file_points, name=model.name, georeference={})["origin"].tolist()
+    if output.json:
+        summary = {
+            "model": {
+                "name": model.name,
+                "vertices": model.n_vertices,
+                "triangles": len(model.faces),
+                "hash": model.hash,
+            },
+            "front": str(folder / "front.csv"),
+            "solutions": len(quality),
+            "smallest": asdict(quality[0]),
+            "most_accurate": asdict(quality[-1]),
+            "chosen": None
+            if chosen is None
+            else {"mesh": chosen_path, "solution": chosen.solution, **asdict(chosen.quality)},
+            "evaluations": found.evaluations,
+            "seconds": round(found.seconds, 3),
+            "seed": search.seed,
+        }
+        if any(origin):
+            summary["mesh_origin"] = origin
+        print(json.dumps(summary, indent=2))
+        return
+    if output.quiet:
+        return
+    few, many = quality[0], quality[-1]
+    print(f"{Path(model.name).name}: {model.n_vertices:,} vertices, {len(model.faces):,} triangles")
+    print(
+        f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
+        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g} "
+        f"({found.evaluations:,} evaluations, {found.seconds:.1f} s, seed {search.seed})"
+    )
+    if chosen is not None:
+        print(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
+    written = len(list(folder.glob("meshes/*")))
+    fitted = f", {written} in refitted" if output.refit and written else ""
+    page = ", report.html" if output.page else ""
+    print(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + fitted)
+    if any(origin):
+        place = ", ".join(f"{value:.15g}" for value in origin)
+        print(f"origin of the glb meshes: ({place}); each file puts itself back there")
+    if chosen is None:
+        size = _round_size(front)
+        print(f"take one of them: meshsimp pick {shlex.quote(str(folder))} --triangles {size} -o small.ply")
+
+
+def _round_size(front: Front) -> int:
+    """Return a size worth an example: that of the knee, rounded up."""
+    triangles: int = front.knee().triangles
+    step = 10 ** max(len(str(triangles)) - 2, 0)
+    return -(-triangles // step) * step

@@ -1,0 +1,260 @@
+"""Tiles from the shell: height grids too big for one piece, thinned tile by tile."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from meshsimp_pymoo.cli.arguments import numbered
+from meshsimp_pymoo.cli.requests import Output, Request, Search, Tiling, Wish
+from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
+from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
+from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import format_to_write
+from meshsimp_pymoo.indicators import knee
+from meshsimp_pymoo.settings import plain
+from meshsimp_pymoo.storage import claim_output
+from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
+from meshsimp_pymoo.tiles.grid import count_samples, open_grid
+from meshsimp_pymoo.tiles.memory import check_memory
+from meshsimp_pymoo.tiles.output import (
+    WORK,
+    clear_up,
+    read_tiled_front,
+    restore,
+    stored_model,
+    write_tiled_front,
+    write_welded,
+)
+from meshsimp_pymoo.workers import EngineError, open_engine
+
+# From this many samples on, a grid is thinned tile by tile without being asked.
+TILED_FROM = 2_000_000
+# What tiles do not know; refused where it is not what asks for nothing.
+UNKNOWN: dict[type[Any], tuple[str, ...]] = {
+    Search: ("time", "evaluations", "generations", "algorithm"),
+    Rules: ("pin", "weights", "measure"),
+    Options: ("max_edge", "patch"),
+    Output: ("refit",),
+}
+
+
+def wants_tiles(request: Request) -> bool:
+    """Tell whether the model is to be thinned tile by tile: because it was asked for, or because it is big."""
+    if request.tiling.tile is None:
+        count = count_samples(request.model, window=request.options.window)
+        return count is not None and count >= TILED_FROM
+    return bool(request.tiling.tile)
+
+
+def simplify_tiled(request: Request) -> int:
+    """Thin a height grid tile by tile and write its front to a new folder; return the exit code."""
+    _refuse_unknown(request)
+    wish, output, tiling = request.wish, request.output, request.tiling
+    out = output.folder
+    restore(out)
+    _claim(output)
+    start = time.perf_counter()
+    grid = open_grid(request.model, request.options)
+    if grid.model is not None:
+        format_to_write(output.format).check(grid.model)
+    tile = tiling.tile or TILE
+    most = max(wish.triangles or 2, usual_most(grid))
+    jobs = tiling.jobs or os.cpu_count() or 1
+    check_memory(grid, tile=tile, most=most, jobs=jobs, remote=tiling.dask is not None)
+    try:
+        what = settings(grid, tile=tile, most=most)
+    except ValueError as problem:
+        if isinstance(problem, ModelError):
+            raise
+        raise UsageError(str(problem)) from None
+    made_now = not out.exists()
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        with locked(out), open_engine(jobs, tiling.dask) as engine, bar(output.quiet, Path(grid.name).name) as show:
+            clear_up(out)
+            if output.overwrite:
+                _forget_other(out / WORK, what)
+            threads = request.search.threads or os.cpu_count() or 1
+            store = Folder(out / WORK, what)
+            front = tiled_front(
+                grid, tile=tile, most=what["most"], engine=engine, store=store, threads=threads, progress=show
+            )
+            front, chosen, missed = _choose(wish, front, threads)
+            run = {
+                "options": plain(request.options),
+                "settings": request.recorded | {"tile": tile, "most": what["most"]},
+                "seconds": round(time.perf_counter() - start, 3),
+            }
+            _claim(output)  # somebody may have put something else there meanwhile, which would be replaced
+            write_tiled_front(
+                out,
+                front,
+                meshes=output.meshes,
+                mesh_format=output.format,
+                chosen=chosen,
+                piece_size=tile if tiling.pieces else None,
+                run=run,
+                extra=lambda unfinished: _draw(front, chosen, unfinished / "front.png"),
+            )
+    except EngineError as problem:
+        goes_on = f"; finished tiles are in {out}, the same command goes on" if _has_pieces(out) else ""
+        raise ResultError(f"{problem}{goes_on}") from None
+    except MemoryError:
+        raise ResultError(
+            f"{grid.name}: the work does not fit into memory; use smaller tiles (--tile {max(LEAST_TILE, tile // 2)}), "
+            "fewer processes (--jobs 1) or fewer triangles"
+        ) from None
+    except OSError as problem:
+        raise ResultError(f"{out}: cannot be used ({problem.strerror or problem}); name another folder") from None
+    except KeyboardInterrupt:
+        if made_now and not _has_pieces(out):
+            raise
+        say(f"interrupted; finished tiles are in {out}, the same command goes on")
+        return INTERRUPTED
+    finally:
+        if made_now and _is_unfinished(out) and not _has_pieces(out):
+            shutil.rmtree(out, ignore_errors=True)
+    _summarise(output, tiling, front, chosen, time.perf_counter() - start)
+    if missed:
+        say(f"{out} holds a front, but no chosen mesh: {missed}")
+        return TARGET_MISSED
+    return OK
+
+
+def _draw(front: TiledFront, chosen: int | None, path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    from meshsimp_pymoo.report.figures import plot_front
+
+    grid = front.grid
+    figure = Figure(figsize=(7.0, 5.0), dpi=110, layout="constrained")
+    axes = figure.subplots()
+    plot_front(front, axes, knee=int(knee(front.F)), chosen=chosen, n_points=grid.n_samples)
+    rows, columns = grid.shape
+    axes.set_title(f"{Path(grid.name).name}: {rows:,} x {columns:,} samples", loc="left")
+    figure.savefig(path)
+
+
+def _has_pieces(out: Path) -> bool:
+    return any((out / WORK).glob("*.npz"))
+
+
+def _refuse_unknown(request: Request) -> None:
+    for part in (request.search, request.rules, request.options, request.output):
+        for name in UNKNOWN[type(part)]:
+            if getattr(part, name) != getattr(type(part), name):
+                raise UsageError(
+                    f"--{name.replace('_', '-')} does not go with tiles, which are thinned and not searched; leave it "
+                    "out, or do without tiles (--tile none)"
+                )
+    if request.wish.triangles == 1:
+        raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
+
+
+def _claim(output: Output) -> None:
+    """Check the folder to make: a new one, one with unfinished tiles, or with ``--overwrite`` an old one."""
+    if not _is_unfinished(output.folder):
+        claim_output(output.folder, overwrite=output.overwrite)
+
+
+def _is_unfinished(out: Path) -> bool:
+    return out.is_dir() and {entry.name for entry in out.iterdir()} <= {WORK, ".lock"}
+
+
+def _forget_other(work: Path, what: dict[str, Any]) -> None:
+    """Remove unfinished tiles of another grid or of other settings."""
+    try:
+        Folder(work, what)
+    except ResultError:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def pick_tiled(
+    folder: str, model: str | None, wish: Wish, number: int | None, path: Path | None, *, quiet: bool, as_json: bool
+) -> int:
+    """Say which solution of a tiled front is meant, and write its mesh if a file is named; return the exit code."""
+    stored, options = stored_model(folder)
+    front = read_tiled_front(folder, open_grid(model or stored, options))
+    if number is not None:
+        chosen: int | None = len(front) - 1 - numbered(folder, len(front), number)
+    else:
+        front, chosen, missed = _choose(wish, front, os.cpu_count() or 1)
+        if chosen is None:
+            say(f"{folder}: {missed}; nothing is written")
+            return TARGET_MISSED
+    assert chosen is not None
+    if path is not None:
+        write_welded(path, front, chosen)
+    quality = front.quality[chosen]
+    if as_json:
+        # a size between two solutions is none of the stored ones
+        known = None if wish.triangles is not None else len(front) - 1 - chosen
+        mesh = None if path is None else str(path)
+        print(json.dumps({"mesh": mesh, "solution": known, **asdict(quality)}, indent=2))
+    elif not quiet:
+        print(f"of {folder}: {described(quality)}")
+        print(f"written: {path}" if path else "nothing is written; name a file with -o")
+    return OK
+
+
+def _choose(wish: Wish, front: TiledFront, threads: int) -> tuple[TiledFront, int | None, str]:
+    """Return the front, the solution that was asked for, if one was, and why there is none, if so."""
+    quality = front.quality
+    if wish.knee:
+        return front, int(knee(front.F)), ""
+    for name, limit in wish.limits.items():
+        if name == "triangles":
+            if limit < quality[-1].triangles:
+                return front, None, f"its smallest mesh has {quality[-1].triangles} triangles"
+            return *front.with_triangles(int(limit), threads=threads), ""
+        fine = [k for k, q in enumerate(quality) if getattr(q, name) <= limit]
+        if not fine:
+            least = min(getattr(q, name) for q in quality)
+            return front, None, f"its least {MEASURES[name].label} is {least:.4g}, and {limit:g} was asked for"
+        return front, fine[-1], ""
+    return front, None, ""
+
+
+def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | None, seconds: float) -> None:
+    out = output.folder
+    grid, quality = front.grid, front.quality
+    solution = None if chosen is None else len(front) - 1 - chosen
+    path = str(out / "chosen") if tiling.pieces else str(out / f"chosen{format_to_write(output.format).suffix}")
+    if output.json:
+        summary = {
+            "model": {
+                "name": grid.name,
+                "vertices": grid.n_samples,
+                "triangles": grid.n_triangles,
+                "hash": grid.hash,
+            },
+            "front": str(out / "front.csv"),
+            "solutions": len(quality),
+            "smallest": asdict(quality[-1]),
+            "most_accurate": asdict(quality[0]),
+            "chosen": None if chosen is None else {"mesh": path, "solution": solution, **asdict(quality[chosen])},
+            "seconds": round(seconds, 3),
+        }
+        print(json.dumps(summary, indent=2))
+        return
+    if output.quiet:
+        return
+    few, many = quality[-1], quality[0]
+    print(f"{grid.name}: {grid.shape[0]:,} x {grid.shape[1]:,} samples, thinned tile by tile")
+    print(
+        f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
+        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g} ({seconds:.1f} s)"
+    )
+    if chosen is not None:
+        print(f"chosen: {path} (solution {solution}): {described(quality[chosen])}")
+    written = len(list(out.glob("meshes/*")))
+    print(f"written: {out}: front.csv, nested.npz, front.png" + (f", {written} in meshes" if written else ""))

@@ -1,0 +1,100 @@
+"""LAS and LAZ: coordinates, classes, colours, reference systems, and forgeries."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from clouds import as_sets, scattered
+from numpy.testing import assert_array_equal
+
+from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.source.points import cloud_source
+from meshsimp_pymoo.formats.table import read_source
+
+
+@pytest.fixture
+def las(tmp_path):
+    laspy = pytest.importorskip("laspy")
+
+    def write(name, points, **options):
+        header = laspy.LasHeader(point_format=options.get("kind", 3), version=options.get("version", "1.2"))
+        header.scales, header.offsets = [0.001] * 3, np.floor(points.min(axis=0))
+        for record in options.get("records", ()):
+            header.vlrs.append(record)
+        cloud = laspy.LasData(header)
+        cloud.x, cloud.y, cloud.z = points.T
+        for key, values in options.get("fields", {}).items():
+            cloud[key] = values
+        cloud.write(tmp_path / name)
+        return tmp_path / name
+
+    return write
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@pytest.mark.parametrize(("kind", "version"), [(3, "1.2"), (7, "1.4")])
+def test_las_and_laz_keep_coordinates_classes_and_colours(las, name, kind, version):
+    points = np.round(scattered(), 3)
+    n = len(points)
+    fields = {"classification": np.arange(n) % 9, "intensity": np.arange(n), "red": np.arange(n) * 100}
+    source = read_source(las(name, points, kind=kind, version=version, fields=fields))
+    np.testing.assert_allclose(source.points, points, rtol=0, atol=1e-9)
+    assert_array_equal(source.attributes["classification"], fields["classification"])
+    assert_array_equal(source.attributes["intensity"], fields["intensity"])
+    assert_array_equal(source.attributes["color"][:, 0], fields["red"] >> 8)
+    assert as_sets(source.faces) == as_sets(cloud_source(source.points).faces)
+    assert source.georeference["scales"] == [0.001] * 3
+
+
+def test_points_marked_as_withheld_are_left_out_and_counted(las):
+    points = np.round(scattered(50), 3)
+    withheld = np.arange(50) % 10 == 0
+    path = las("a.las", points, fields={"withheld": withheld})
+    with pytest.warns(ModelWarning, match="5 points are marked as withheld"):
+        assert len(read_source(path).points) == 45
+
+
+def test_the_reference_system_of_a_las_is_kept(las):
+    from laspy.vlrs.known import GeoKeyDirectoryVlr, WktCoordinateSystemVlr
+
+    path = las("a.las", scattered(9), kind=7, version="1.4", records=[WktCoordinateSystemVlr('PROJCS["x"]')])
+    assert read_source(path).georeference["crs"] == 'PROJCS["x"]'
+    keys = GeoKeyDirectoryVlr()
+    keys.parse_record_data(struct.pack("<8H", 1, 1, 0, 1, 3072, 0, 1, 25832))
+    assert read_source(las("b.las", scattered(9), records=[keys])).georeference["epsg"] == 25832
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_a_las_that_declares_what_it_cannot_hold_is_refused_at_once(las, tmp_path, name):
+    content = bytearray(las(name, scattered(40)).read_bytes())
+    for place, value, said in [
+        (107, 4_000_000_000, "declares 4000000000 points"),
+        (96, 2_000_000_000, "from byte 2000000000 on"),
+        (100, 4_000_000_000, "declares 4000000000 and 0 records"),
+        (0, 0, "does not begin with 'LASF'"),
+    ]:
+        changed = content.copy()
+        changed[place : place + 4] = struct.pack("<I", value)
+        (tmp_path / name).write_bytes(changed)
+        with pytest.raises(ModelError, match=said):
+            read_source(tmp_path / name)
+    for size in range(0, len(content), 23):
+        (tmp_path / name).write_bytes(content[: size + 1])
+        with pytest.raises(ModelError):
+            read_source(tmp_path / name)
+
+
+def test_a_laz_whose_table_of_chunks_is_a_forgery_is_refused_before_it_is_allocated(las, tmp_path):
+    content = bytearray(las("a.laz", scattered(40)).read_bytes())
+    start = struct.unpack_from("<I", content, 96)[0]
+    table = struct.unpack_from("<q", content, start)[0]
+    content[table + 4 : table + 8] = struct.pack("<I", 0xF0000000)
+    (tmp_path / "b.laz").write_bytes(content)
+    with pytest.raises(ModelError, match="declares 4026531840 chunks"):
+        read_source(tmp_path / "b.laz")
+    content[start : start + 8] = struct.pack("<q", 1 << 40)
+    (tmp_path / "b.laz").write_bytes(content)
+    with pytest.raises(ModelError, match="table of its chunks at byte 1099511627776"):
+        read_source(tmp_path / "b.laz")

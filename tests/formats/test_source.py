@@ -1,0 +1,92 @@
+"""What any file becomes: checked arrays, or one line that says what is wrong with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.testing import assert_array_equal
+from pyramid import COLORS, FACES, POINTS, ascii_ply, refusal, write
+
+from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source.scenes import from_trimesh
+
+
+def test_a_trimesh_object_keeps_rows_colours_and_attributes_and_is_not_changed():
+    mesh = trimesh.Trimesh(np.vstack([POINTS, POINTS]), FACES, process=False)
+    mesh.visual.vertex_colors = np.vstack([COLORS, COLORS])
+    mesh.vertex_attributes["age"] = np.arange(10)
+    before = mesh.vertices.copy()
+    source = from_trimesh(mesh, name="twice")
+    assert_array_equal(source.points, before)
+    assert_array_equal(source.attributes["color"][5:], COLORS)
+    assert_array_equal(source.attributes["age"], np.arange(10))
+    source.points[0] = 99
+    assert_array_equal(mesh.vertices, before)
+    assert "color" not in from_trimesh(trimesh.Trimesh(POINTS, FACES)).attributes
+
+
+def test_faces_that_name_a_vertex_twice_are_dropped_with_their_number():
+    with pytest.warns(ModelWarning, match=r"^named: 2 of 6 faces name a vertex twice"):
+        source = build_source(POINTS, [*FACES.tolist(), [0, 0, 1], [2, 3, 2]], name="named")
+    assert_array_equal(source.faces, FACES)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
+def test_coordinates_that_are_no_numbers_are_counted_and_the_first_is_named(tmp_path, value):
+    lines = ascii_ply().splitlines()
+    start = lines.index("end_header") + 1
+    for row in (2, 3):
+        lines[start + row] = " ".join([value, *lines[start + row].split()[1:]])
+    message = refusal(write(tmp_path, "a.ply", "\n".join(lines)))
+    assert "2 of 5 vertices" in message
+    assert "vertex 2" in message
+    obj = "\n".join(f"v {value} 0 0" if k == 1 else f"v {k} 0 1" for k in range(4)) + "\nf 1 2 3\n"
+    assert "1 of 4 vertices" in refusal(write(tmp_path, "a.obj", obj))
+
+
+def test_words_among_the_numbers_are_named(tmp_path):
+    assert "'banana'" in refusal(
+        write(tmp_path, "a.ply", ascii_ply().replace("0.25", "banana", 1).replace("3 0 1 4", "3 0 banana 4"))
+    )
+    assert "'banana'" in refusal(write(tmp_path, "a.obj", "v 0 0 banana\nv 0 1 0\nf 1 2 3\n"))
+    assert "whole number" in refusal(write(tmp_path, "b.ply", ascii_ply().replace("3 0 1 4", "3 0 1.5 4")))
+
+
+@pytest.mark.parametrize(("index", "where"), [("5", "5"), ("-1", "-1"), ("4000000", "4000000")])
+def test_faces_that_name_missing_vertices_are_refused(tmp_path, index, where):
+    text = ascii_ply().replace("3 1 2 4", f"3 1 2 {index}")
+    message = refusal(write(tmp_path, "a.ply", text))
+    assert f"face 1, (1, 2, {where}), of 5 vertices" in message
+    obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+    assert "do not exist" in refusal(write(tmp_path, "a.obj", obj + "f 1 2 5\n"))
+    assert "do not exist" in refusal(write(tmp_path, "b.obj", obj + "f 1 2 -5\n"))
+    assert "vertex 0" in refusal(write(tmp_path, "c.obj", obj + "f 0 1 2\n"))
+
+
+def test_too_few_vertices_and_no_faces_are_refused(tmp_path):
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    assert "3 vertices" in refusal(write(tmp_path, "three.obj", triangle))
+    assert "no faces" in refusal(write(tmp_path, "cloud.obj", "v 0 0 0\n" * 5))
+    assert "no faces" in refusal(write(tmp_path, "cloud.off", "OFF\n5 0 0\n" + "0 0 0\n" * 5))
+    cloud = ascii_ply().replace("element face 4", "element face 0").split("3 0 1 4")[0]
+    assert "no faces" in refusal(write(tmp_path, "cloud.ply", cloud))
+    head, rest = ascii_ply().split("element face 4\nproperty list uchar int vertex_indices\n")
+    assert "no faces" in refusal(write(tmp_path, "faceless.ply", head + rest.split("3 0 1 4")[0]))
+    with pytest.raises(ModelError, match="all 1 faces"):
+        build_source(POINTS, [[1, 1, 1]])
+
+
+def test_arrays_of_another_shape_or_size_are_refused():
+    for points, faces, attributes in [
+        (POINTS[:, :2], FACES, {}),
+        (POINTS, FACES[:, :2], {}),
+        (POINTS, FACES.astype(float), {}),
+        (POINTS, FACES, {"age": np.arange(4)}),
+        (POINTS * 1e90, FACES, {}),
+    ]:
+        with pytest.raises(ModelError, match=r"^mesh: .*; "):
+            build_source(points, faces, attributes)
+    with pytest.raises(ValueError, match="rows has 4 entries"):
+        SourceMesh(POINTS, FACES, {}, "mesh", rows=np.arange(4))
