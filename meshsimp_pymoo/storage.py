@@ -155,7 +155,7 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
         partial_folder(parent / target.name).rmdir()
     except OSError as problem:
         raise ResultError(
-            f"{folder}: cannot be written in {parent} ({problem.strerror}); name another folder"
+            f"{folder}: cannot be written in {parent} ({reason_of(problem)}); name another folder"
         ) from None
     return folder
 
@@ -290,8 +290,8 @@ def write_front(
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        rows = model.source_index.astype(np.int64)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=rows, **surface.stored_arrays())
+        own = {"source_index": model.source_index.astype(np.int64)} | surface.stored_arrays()
+        write_npz(partial / "front.npz", F=F[order], kept=packed, **own)
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,

@@ -21,6 +21,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, Thr
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
+from meshsimp_pymoo.errors import reason_of
+
 __all__ = ["DaskEngine", "Engine", "EngineError", "Processes", "Serial", "open_engine", "thread_pool"]
 
 # How often a task is tried whose worker dies.
@@ -251,10 +253,8 @@ class DaskEngine:
         try:
             self.client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, ValueError) as problem:
-            reason = str(problem).strip().splitlines()
             raise EngineError(
-                f"{address}: no Dask scheduler answers ({reason[0] if reason else type(problem).__name__}); start one, "
-                "or use processes (--jobs)"
+                f"{address}: no Dask scheduler answers ({reason_of(problem)}); start one, or use processes (--jobs)"
             ) from None
         self.jobs = max(1, sum(self.client.nthreads().values()))
 

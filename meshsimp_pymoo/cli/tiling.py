@@ -13,7 +13,7 @@ from typing import Any
 from meshsimp_pymoo.cli.arguments import numbered
 from meshsimp_pymoo.cli.requests import Output, Request, Search, Tiling, Wish
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
-from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
+from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import format_to_write
@@ -114,7 +114,7 @@ def simplify_tiled(request: Request) -> int:
             "fewer processes (--jobs 1) or fewer triangles"
         ) from None
     except OSError as problem:
-        raise ResultError(f"{out}: cannot be used ({problem.strerror or problem}); name another folder") from None
+        raise ResultError(f"{out}: cannot be used ({reason_of(problem)}); name another folder") from None
     except KeyboardInterrupt:
         if made_now and not _has_pieces(out):
             raise

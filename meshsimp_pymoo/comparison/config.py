@@ -43,7 +43,7 @@ import numpy as np
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
-from meshsimp_pymoo.errors import InputError, ModelError
+from meshsimp_pymoo.errors import InputError, ModelError, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem
@@ -916,7 +916,7 @@ def _read(path: Path) -> Entry:
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file") from None
     except OSError as problem:
-        raise ConfigError(f"{path}: cannot be read ({problem.strerror})") from None
+        raise ConfigError(f"{path}: cannot be read ({reason_of(problem)})") from None
     except UnicodeDecodeError as problem:
         raise ConfigError(f"{path}: is no text in UTF-8 (byte {problem.start})") from None
     try:
@@ -928,7 +928,7 @@ def _read(path: Path) -> Entry:
         said = " ".join(str(problem.problem or problem.context).split())
         raise ConfigError(f"{path}{line}: is no YAML: {said}") from None
     except yaml.YAMLError as problem:
-        raise ConfigError(f"{path}: is no YAML: {' '.join(str(problem).split())}") from None
+        raise ConfigError(f"{path}: is no YAML: {reason_of(problem)}") from None
     except RecursionError:
         raise ConfigError(f"{path}: is nested too deeply for a configuration") from None
     if node is None:

@@ -117,7 +117,7 @@ def claim_experiment(out: str | os.PathLike[str]) -> Path:
         for name in ("runs", "models"):
             (folder / name).mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise ResultError(f"{folder}: cannot be made ({problem.strerror}); name another folder") from None
+        raise ResultError(f"{folder}: cannot be made ({reason_of(problem)}); name another folder") from None
     return folder
 
 

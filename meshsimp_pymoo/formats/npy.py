@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, reason_of
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
@@ -44,10 +44,8 @@ def _mapped(path: Path, name: str) -> AnyArray:
             warnings.simplefilter("ignore")  # about the header's spelling
             heights = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as problem:  # its header is Python text: anything may break
-        reason = str(problem).strip().splitlines()
         raise ModelError(
-            f"{name}: is not a whole NumPy array file ({reason[0] if reason else type(problem).__name__}); "
-            "save or copy it again"
+            f"{name}: is not a whole NumPy array file ({reason_of(problem)}); save or copy it again"
         ) from None
     if not isinstance(heights, np.ndarray):
         raise ModelError(f"{name}: holds several arrays; save the heights alone with numpy.save")

@@ -48,7 +48,7 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
 
-from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, read_npz
 
 __all__ = ["CheckpointError", "Checkpoints", "NotResumable", "Stored", "difference", "read_checkpoint", "restore"]
@@ -221,10 +221,8 @@ def read_checkpoint(path: Path) -> Stored:
             raise ModelError(f"it has the format {content['format']!r}, this version reads {FORMAT}")
         return Stored(path, content["what"], content["facts"], float(content["seconds"]), content, arrays)
     except Exception as problem:  # a damaged archive may break in any way
-        reason = getattr(problem, "strerror", None) or str(problem) or type(problem).__name__
-        if isinstance(problem, KeyError):
-            reason = f"it holds no {problem}"
-        raise CheckpointError(f"{path}: is no checkpoint, or a damaged one ({reason.splitlines()[0]})") from None
+        reason = f"it holds no {problem}" if isinstance(problem, KeyError) else reason_of(problem)
+        raise CheckpointError(f"{path}: is no checkpoint, or a damaged one ({reason})") from None
 
 
 def difference(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
@@ -258,8 +256,7 @@ def restore(stored: Stored, algorithm: Algorithm) -> None:
     try:
         _Reader(stored, algorithm.problem.n_var).restore(algorithm)
     except Exception as problem:  # nonsense may break anything
-        reason = (str(problem) or type(problem).__name__).splitlines()[0]
-        raise CheckpointError(f"{stored.path}: does not fit this search ({reason})") from None
+        raise CheckpointError(f"{stored.path}: does not fit this search ({reason_of(problem)})") from None
 
 
 # ------------------------------------------------------------------------------------------------------------- writing
@@ -276,9 +273,8 @@ def _write(path: Path, content: dict[str, Any], arrays: Arrays) -> None:
         with new_file(path) as partial:
             partial.write_bytes(packed.getbuffer())
     except (OSError, ResultError) as problem:
-        cause = problem if isinstance(problem, OSError) else problem.__context__
-        reason = getattr(cause, "strerror", None) or str(cause)
-        raise CheckpointError(f"{path}: cannot be written ({reason})") from None
+        cause = problem if isinstance(problem, OSError) else problem.__context__ or problem
+        raise CheckpointError(f"{path}: cannot be written ({reason_of(cause)})") from None
 
 
 def _checksum(arrays: Arrays) -> bytes:

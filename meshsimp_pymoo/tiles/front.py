@@ -35,7 +35,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.files import new_file
 from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
 from meshsimp_pymoo.tiles.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
@@ -218,7 +218,7 @@ class Folder:
             path.mkdir(parents=True, exist_ok=True)
             found = record.read_bytes() if record.exists() else None
         except OSError as problem:
-            raise ResultError(f"{path}: cannot be made ({problem.strerror}); name another folder") from None
+            raise ResultError(f"{path}: cannot be made ({reason_of(problem)}); name another folder") from None
         if found not in (None, text):
             raise ResultError(
                 f"{path}: holds unfinished tiles of another model or of other settings; name another folder, or allow "

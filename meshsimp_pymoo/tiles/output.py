@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
@@ -244,8 +244,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
             rows, level, slope = file["rows"], file["level"], file["slope"]
             moved, start = file["moved"], file["moved_start"]
     except Exception as problem:  # absent, cut off or with flipped bits
-        reason = str(problem).splitlines()[0] if str(problem) else type(problem).__name__
-        raise ResultError(f"{path}: cannot be read ({reason}); simplify again") from None
+        raise ResultError(f"{path}: cannot be read ({reason_of(problem)}); simplify again") from None
     fits = rows.shape == level.shape and len(slope) == len(columns["error"]) == len(start) - 1
     if not fits or {rows.dtype.kind, moved.dtype.kind, start.dtype.kind} != {"i"} or start[-1] != len(moved):
         raise ResultError(f"{path}: does not belong to front.csv; simplify again")
