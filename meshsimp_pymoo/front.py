@@ -136,7 +136,7 @@ class FrontSolution:
             if stored is not None and stored.suffix == suffix:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.problem.model, self.faces)
+                write_solution(unfinished, self.front.problem.surface, self.faces)
         return path
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:

@@ -189,10 +189,23 @@ class Pins:
         return text if text in self.names else [Whole(0).from_text(part) for part in text.split(",")]
 
     def from_plain(self, value: Any) -> Any:
-        """Return a name or a list."""
-        if not isinstance(value, (str, list)):
+        """Return a name, a row or a list."""
+        if not isinstance(value, (str, int, list)) or isinstance(value, bool):
             raise ValueError(f"expected {', '.join(self.names)}, or a list of file rows or positions")
         return value
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The name of numbers, or the numbers themselves."""
+
+    def from_text(self, text: str) -> str:
+        """Return the name."""
+        return text
+
+    def from_plain(self, value: Any) -> Any:
+        """Return the name or the list."""
+        return value if isinstance(value, list) and value else Text().from_plain(value)
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,10 +50,6 @@ from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
 from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
-
-if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.model import OpenModel
-
 
 FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
@@ -411,8 +407,8 @@ def mesh_arrays(
     return model.file_points[used], compact.reshape(-1, 3), attributes
 
 
-def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
-    """Write a mesh of a model, its triangles (M, 3) in vector order, in the format of the path's suffix.
+def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
+    """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
 
     Raises
     ------
@@ -424,10 +420,10 @@ def write_solution(path: Path, model: OpenModel, faces: IntArray) -> None:
     ModelWarning
         If single precision moves vertices by more than rounding.
     """
-    kind = format_of_output(path)
+    kind, model = format_of_output(path), surface.model
     kind.check(model)
     arrays = mesh_arrays(model, faces)
-    warn_of_shift(kind, model.name, model.diagonal, single_precision_shift(arrays[0]))
+    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0]))
     write_mesh(path, *arrays, **shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference))
 
 

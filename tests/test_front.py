@@ -498,3 +498,25 @@ def test_errors_at_sizes_are_those_of_the_best_small_enough():
     assert errors_at(F, [4, 9, 10, 100]).tolist() == [9, 9, 5, 5]
     assert np.isnan(errors_at(F, [3])).all()
     assert usual_sizes(8) == [2]
+
+
+@pytest.mark.parametrize(
+    "pin", [[12, 7], 12, (1, 2), np.array([3, 4]), np.array([[0.0, 0.5]]), "hull", ["hull", 12]], ids=str
+)
+def test_what_is_pinned_is_pinned_again_when_the_front_is_read(pin, tmp_path):
+    problem = MeshProblem("roof:5", pin=pin)
+    Front.from_subsets(problem, problem.pinned, ends=True).save(tmp_path / "out", page=False)
+    again = Front.load(tmp_path / "out").problem
+    np.testing.assert_array_equal(again.pinned, problem.pinned)
+    if str(pin) == "[12, 7]":
+        assert again.pinned.sum() == 6
+
+
+@pytest.mark.parametrize("weights", [np.arange(25.0), list(range(25)), np.arange(25).reshape(5, 5)], ids=str)
+def test_weights_by_number_count_again_when_the_front_is_read(weights, tmp_path):
+    problem = MeshProblem("roof:5", weights=weights)
+    front = Front.from_subsets(problem, problem.pinned, ends=True)
+    front.save(tmp_path / "out")
+    again = Front.load(tmp_path / "out")
+    assert again.quality == front.quality
+    assert again.problem.evaluate(problem.pinned).tolist() == problem.evaluate(problem.pinned).tolist()

@@ -50,6 +50,8 @@ LEVELS, UNCOVERED_LEVEL = 254, 255
 SCALE_QUANTILE = 0.98
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
 RECORDED = ("algorithm", "seed", "generations", "evaluations", "interrupted")
+# A setting of more values than these (one weight a vertex) is counted on the page, not listed.
+MOST_LISTED = 100
 
 
 @dataclass(frozen=True)
@@ -311,6 +313,12 @@ def _settings(run: Mapping[str, Any]) -> list[tuple[str, str]]:
     said = [(key, value) for key, value in said if key not in (*run, *derived, "threads")]  # which change no result
     for key, value in [*said, ("objectives", run.get("objectives"))]:
         if value not in (None, False):
-            rows.append((key.replace("_", " "), ", ".join(map(str, value)) if isinstance(value, list) else str(value)))
+            rows.append((key.replace("_", " "), _in_words(value)))
     version = (run.get("versions") or {}).get("meshsimp-pymoo")
     return rows + ([("meshsimp-pymoo", version)] if version else [])
+
+
+def _in_words(value: Any) -> str:
+    if not isinstance(value, list):
+        return str(value)
+    return ", ".join(map(str, value)) if len(value) <= MOST_LISTED else f"{len(value)} values"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from meshsimp_pymoo.settings import Choice, Pins, Text, setting
+from meshsimp_pymoo.settings import Choice, Pins, Weights, setting
 from meshsimp_pymoo.surface.measures import OBJECTIVES, require_measure
 
 FOOTPRINTS = ("model", "hull")
@@ -52,7 +52,7 @@ class Rules:
     )
     weights: Any = setting(
         None,
-        kind=Text(),
+        kind=Weights(),
         accepts="str or array, optional",
         doc="How much each vertex counts in the error: one number for each row of the file, or the name of one of its "
         "per-vertex attributes; see :meth:`~meshsimp_pymoo.surface.model.OpenModel.with_weights`. 1 by default.",

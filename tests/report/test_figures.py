@@ -149,6 +149,17 @@ def test_the_kept_vertices_are_drawn_by_the_rules():
     assert paths[0] < paths[1]
 
 
+def test_the_mesh_of_a_subset_is_drawn_by_the_rules_of_its_problem(ax):
+    """All vertices of a horseshoe and its convex hull: the bay is covered too, as the problem says."""
+    problem = MeshProblem("horseshoe:150", footprint="hull")
+    everything = np.ones(problem.n_var, bool)
+    assert problem.quality(everything).triangles == 255
+    assert len(polygons(plot_mesh(problem, ax, kept=everything)).get_paths()) == 255
+    with pytest.raises(TypeError, match=r"which a OpenModel does not have; give the problem or problem\.surface"):
+        plot_mesh(problem.model, ax, kept=everything)
+
+
+
 def test_the_colours_of_a_trimesh_show(ax, roof):
     colours = np.tile(np.array([255, 0, 0, 255], dtype=np.uint8), (roof.n_vertices, 1))
     plot_mesh(trimesh.Trimesh(roof.points, roof.faces, vertex_colors=colours, process=False), ax)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from samples import surface
 
+from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
@@ -120,3 +121,15 @@ def test_pins_and_counts_that_are_none_are_refused():
         thinning(surface(model), np.arange(4))
     with pytest.raises(ValueError, match="most=-1"):
         greedy_insertion(surface(model), most=-1)
+
+
+def test_passes_over_a_problem_s_surface_follow_its_rules_and_a_model_has_none():
+    problem = MeshProblem("horseshoe:150", footprint="hull", outside="ignore", pin="hull")
+    front = thinning(problem.surface)
+    assert front.F.shape == (108, 2)
+    assert front.F[np.argmin(front.triangles)] == pytest.approx([6.430010872, 41])
+    assert front.kept(0)[problem.pinned].all()
+    np.testing.assert_allclose(front.F, problem.evaluate(np.array([front.kept(k) for k in range(108)])), atol=1e-12)
+    for method in METHODS.values():
+        with pytest.raises(TypeError, match=r"a OpenModel has no rules; give a surface, such as problem\.surface"):
+            method(problem.model)

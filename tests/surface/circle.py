@@ -1,312 +1,381 @@
-"""A second kind of surface, small enough that its whole front is known: a ring of heights round a hub.
+"""A second kind of surface, tiny and exactly known: points of a circle, whose mesh is a fan.
 
-Vertex 0 is the hub at height 0; vertices 1 to n stand on a circle round it. The mesh of a subset is the fan of the hub
-and each two kept vertices of the circle that follow each other; what is left out between them deviates from the line
-that joins their heights. Nothing of it is Delaunay, and nothing of it is planned for in the package.
+The mesh of a subset is the fan over the kept points from the first of them, T = n - 2 triangles. A dropped point costs
+its distance to the chord between the kept points on either side of it, which is its distance to the mesh. Three points
+are pinned. Nothing here is quick: every question looks at the whole circle.
 """
 
 from __future__ import annotations
 
+import hashlib
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.surface import moves
-from meshsimp_pymoo.surface.measures import as_quality
+from meshsimp_pymoo.surface.measures import OBJECTIVES, REGIONS, as_quality
 from meshsimp_pymoo.surface.moves import answers
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
+from meshsimp_pymoo.workers import thread_pool
 
 
-class Ring(NamedTuple):
-    """What does not change: heights (n + 1,), that of the hub first."""
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """N points in convex position, counter-clockwise."""
 
-    height: np.ndarray
+    file_points: FloatArray
+    name: str = "a circle"
+    attributes: dict[str, AnyArray] = field(default_factory=dict)
+    georeference: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def n_vertices(self) -> int:
+        """Number N of points."""
+        return len(self.file_points)
 
-class Kept(NamedTuple):
-    """What changes: which vertices are sites, those before and after each on the circle, and two sums."""
+    @property
+    def faces(self) -> IntArray:
+        """The fan over all of them."""
+        return fan(np.arange(self.n_vertices))
 
-    site: np.ndarray  # (n + 1,) bool
-    before: np.ndarray  # (n + 1,)
-    after: np.ndarray  # (n + 1,)
-    cost: np.ndarray  # (1,)
-    count: np.ndarray  # (1,) sites on the circle
+    @property
+    def source_index(self) -> IntArray:
+        """The points are in the order of the file."""
+        return np.arange(self.n_vertices)
 
-
-@njit
-def deviation_at(ring: Ring, a: int, b: int, p: int) -> float:
-    """Return how far vertex p, between a and b in the sense of the circle, is from the line that joins them."""
-    n = len(ring.height) - 1
-    share = ((p - a) % n) / ((b - a) % n) if a != b else 0.0
-    return abs(ring.height[a] + share * (ring.height[b] - ring.height[a]) - ring.height[p])
-
-
-@njit
-def arc_cost(ring: Ring, a: int, b: int) -> float:
-    """Return the sum of the deviations between two kept vertices."""
-    n, cost = len(ring.height) - 1, 0.0
-    p = a % n + 1
-    while p != b:
-        cost += deviation_at(ring, a, b, p)
-        p = p % n + 1
-    return cost
+    @property
+    def hash(self) -> str:
+        """A checksum of the points."""
+        return hashlib.sha256(np.ascontiguousarray(self.file_points).tobytes()).hexdigest()
 
 
-@answers(moves.exchange, Ring)
-@njit
-def exchange(ring: Ring, kept: Kept, v: int, w: int) -> bool:
-    """Unlink v and link w; three vertices must stay."""
-    if v >= 0:
-        if v == 0 or kept.count[0] - 1 + (w >= 0) < 3:
-            return False
-        a, b = kept.before[v], kept.after[v]
-        kept.cost[0] += arc_cost(ring, a, b) - arc_cost(ring, a, v) - arc_cost(ring, v, b)
-        kept.after[a], kept.before[b], kept.site[v] = b, a, False
-        kept.count[0] -= 1
-    if w >= 0:
-        n = len(ring.height) - 1
-        a = (w - 2) % n + 1
-        while not kept.site[a]:
-            a = (a - 2) % n + 1
-        b = kept.after[a]
-        kept.cost[0] += arc_cost(ring, a, w) + arc_cost(ring, w, b) - arc_cost(ring, a, b)
-        kept.after[a], kept.before[w], kept.after[w], kept.before[b], kept.site[w] = w, a, b, w, True
-        kept.count[0] += 1
-    return True
+class Circle:
+    """A curve and the rules, of which only the measure counts here."""
 
-
-@answers(moves.try_exchange, Ring)
-@njit
-def try_exchange(ring: Ring, kept: Kept, v: int, w: int, limit: float) -> tuple[float, int]:
-    """Do it, look, and undo it."""
-    cost, count = kept.cost[0], kept.count[0]
-    if not exchange(ring, kept, v, w):
-        return np.inf, 0
-    change, more = kept.cost[0] - cost, kept.count[0] - count
-    exchange(ring, kept, w, v)
-    kept.cost[0] = cost
-    return change, more
-
-
-@answers(moves.total_cost, Ring)
-@njit
-def total_cost(ring: Ring, kept: Kept) -> float:
-    """Return the sum that is kept up to date."""
-    return kept.cost[0]
-
-
-@answers(moves.n_triangles, Ring)
-@njit
-def n_triangles(ring: Ring, kept: Kept) -> int:
-    """Return one triangle for each kept vertex of the circle."""
-    return kept.count[0]
-
-
-@answers(moves.n_sites, Ring)
-@njit
-def n_sites(ring: Ring, kept: Kept) -> int:
-    """Return the number of kept vertices, with the hub."""
-    return kept.count[0] + 1
-
-
-@answers(moves.is_site, Ring)
-@njit
-def is_site(ring: Ring, kept: Kept, v: int) -> bool:
-    """Tell whether vertex v is kept."""
-    return kept.site[v]
-
-
-@answers(moves.is_taken, Ring)
-@njit
-def is_taken(ring: Ring, kept: Kept, w: int) -> bool:
-    """Tell whether vertex w is kept: no two are at one place."""
-    return kept.site[w]
-
-
-@njit
-def arc_of(ring: Ring, kept: Kept, v: int) -> int:
-    """Return the kept vertex at the beginning of the arc in which v lies."""
-    n = len(ring.height) - 1
-    while not kept.site[v]:
-        v = (v - 2) % n + 1
-    return v
-
-
-@answers(moves.urgency, Ring)
-@njit
-def urgency(ring: Ring, kept: Kept, v: int) -> float:
-    """Return the cost of the arc."""
-    a = arc_of(ring, kept, v)
-    return arc_cost(ring, a, kept.after[a])
-
-
-@answers(moves.sites_around, Ring)
-@njit
-def sites_around(ring: Ring, kept: Kept, v: int, found: np.ndarray) -> int:
-    """Return the two neighbours on the circle."""
-    found[0], found[1] = kept.before[v], kept.after[v]
-    return 2
-
-
-@answers(moves.n_cells, Ring)
-@njit
-def n_cells(ring: Ring, kept: Kept) -> int:
-    """Return the number of numbers of arcs: an arc is called after the vertex where it begins."""
-    return len(ring.height)
-
-
-@answers(moves.worst_in, Ring)
-@njit
-def worst_in(ring: Ring, kept: Kept, cell: int) -> tuple[int, float, float]:
-    """Return the worst vertex of an arc."""
-    worst, most, whole = -1, 0.0, 0.0
-    if cell == 0 or not kept.site[cell]:
-        return worst, most, whole
-    n, b = len(ring.height) - 1, kept.after[cell]
-    p = cell % n + 1
-    while p != b:
-        d = deviation_at(ring, cell, b, p)
-        whole += d
-        if d > most:
-            worst, most = p, d
-        p = p % n + 1
-    return worst, most, whole
-
-
-@answers(moves.cells_around, Ring)
-@njit
-def cells_around(ring: Ring, kept: Kept, v: int, found: np.ndarray) -> int:
-    """Return the arcs at both sides."""
-    found[0], found[1] = kept.before[v], v
-    return 2
-
-
-class RingModel:
-    """The original mesh, as files know it."""
-
-    def __init__(self, height: np.ndarray) -> None:
-        n = len(height)
-        angle = 2 * np.pi * np.arange(n) / n
-        rim = np.arange(1, n + 1)
-        self.name = "ring of heights"
-        self.n_vertices = n + 1
-        self.file_points = np.vstack([np.zeros(3), np.column_stack([np.cos(angle), np.sin(angle), height])])
-        self.faces = np.column_stack([np.zeros(n, int), rim, np.roll(rim, -1)]).astype(np.int32)
-        self.source_index = np.arange(n + 1)
-        self.attributes: dict[str, Any] = {}
-        self.georeference: dict[str, Any] = {}
-        self.hash = "ring"
-
-
-class RingSurface:
-    """A ring of heights with rules; the first, the middle and two more vertices are pinned beside the hub."""
-
-    def __init__(self, height: np.ndarray, rules: Rules | None = None) -> None:
-        self.model = RingModel(np.asarray(height, float))
+    def __init__(self, model: Curve, rules: Rules | None = None) -> None:
+        self.model = model
         self.rules = rules or Rules()
-        self.n_vertices = n = self.model.n_vertices
-        self.points, self.faces = self.model.file_points, self.model.faces
-        self.pinned = np.zeros(n, bool)
-        self.pinned[[0, 1, 1 + (n - 1) // 3, 1 + 2 * (n - 1) // 3]] = True
-        self.diagonal = float(np.linalg.norm(np.ptp(self.points, axis=0)))
-        self.total_weight = float(n)
-        rim = np.arange(1, n)
-        rings = [rim, *(np.array([0, (v - 2) % (n - 1) + 1, v % (n - 1) + 1]) for v in rim)]
-        self.neighbours = (np.cumsum([0, *map(len, rings)]), np.concatenate(rings))
-        self.border = rim
-        self.places = self.points[:, :2]
-        self.view = View(self.points, 1.0, np.eye(3), np.zeros(3))
+        self.pinned: BoolArray = np.zeros(model.n_vertices, bool)
+        self.pinned[[0, model.n_vertices // 3, 2 * model.n_vertices // 3]] = True
 
-    def simplify(self, kept: np.ndarray) -> Simplified:
-        """Return the fan of the kept vertices."""
-        rim = np.flatnonzero(kept[1:]) + 1
-        if len(rim) < 3 or not kept[0]:
-            raise ValueError(f"{int(kept.sum())} vertices make no fan")
-        follow = np.roll(rim, -1)
-        deviation = np.zeros(self.n_vertices)
-        n = self.n_vertices - 1
-        for a, b in zip(rim, follow, strict=True):
-            for step in range(1, (b - a) % n):
-                p = (a - 1 + step) % n + 1
-                share = step / ((b - a) % n)
-                deviation[p] = abs((1 - share) * self.points[a, 2] + share * self.points[b, 2] - self.points[p, 2])
-        faces = np.column_stack([np.zeros(len(rim), int), rim, follow]).astype(np.int32)
-        numbers = [deviation.sum(), len(rim), len(rim) + 1, (deviation**2).sum(), deviation.max(), 0]
-        quality = as_quality(np.array(numbers), self.total_weight)
-        return Simplified(faces, quality, deviation, np.ones(self.n_vertices, bool))
+    @property
+    def n_vertices(self) -> int:
+        """Number N of points."""
+        return self.model.n_vertices
 
-    def evaluate(self, kept: np.ndarray, *, threads: int = 1, regions: int = 0) -> np.ndarray:
-        """Return the numbers of each subset; 0 triangles where it has no mesh."""
-        table = np.zeros((len(kept), 6 + regions))
-        ends = np.linspace(0, self.n_vertices, regions + 1).astype(int)
-        for row, chromosome in zip(table, kept, strict=True):
-            try:
-                found = self.simplify(chromosome)
-            except ValueError:
-                row[6:] = np.inf
-                continue
-            d = found.deviation
-            row[:6] = d.sum(), len(found.faces), found.quality.vertices, (d**2).sum(), d.max(), 0
-            row[6:] = [d[a:b].sum() for a, b in pairwise(ends)]
-        return table
+    @property
+    def points(self) -> FloatArray:
+        """The points, as in the file."""
+        return self.model.file_points
 
-    def score(self, points: np.ndarray, faces: np.ndarray) -> Scored:
-        """Nothing here measures the meshes of others."""
-        raise NotImplementedError
+    @property
+    def faces(self) -> IntArray:
+        """The fan over all of them."""
+        return self.model.faces
 
-    def refit(self, kept: np.ndarray) -> Refitted:
-        """Return the mesh as it is: no vertex moves."""
-        found = self.simplify(kept)
-        rows = np.unique(found.faces)
-        error = found.quality.error
-        return Refitted(found.faces, rows, self.points[rows], error, error, 0.0)
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of their bounding box."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
-    def stored_arrays(self) -> dict[str, Any]:
-        """Return nothing: rows are those of the file."""
+    @property
+    def total_weight(self) -> float:
+        """All points count alike."""
+        return float(self.n_vertices)
+
+    @property
+    def neighbours(self) -> Csr:
+        """The points before and after each."""
+        i = np.arange(self.n_vertices)
+        return 2 * np.arange(self.n_vertices + 1), np.sort(np.c_[i - 1, i + 1] % self.n_vertices, axis=1).ravel()
+
+    @property
+    def border(self) -> IntArray:
+        """Any point brings one triangle only."""
+        return np.arange(self.n_vertices)
+
+    @property
+    def places(self) -> FloatArray:
+        """The points in the plane."""
+        return self.points[:, :2]
+
+    @property
+    def view(self) -> View:
+        """From above."""
+        return View(self.points, 1.0, np.eye(3), self.points.min(axis=0))
+
+    def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
+        """Return the table of numbers of subsets (P, N)."""
+
+        def row(subset: BoolArray) -> FloatArray:
+            n, n_all = int(subset.sum()), self.n_vertices
+            if n < 3:
+                return np.r_[[np.inf, 0, 0, np.inf, np.inf, n_all], np.full(regions, np.inf)]
+            d = _deviations(self.places.ravel(), subset)
+            region = np.bincount(np.arange(n_all) * regions // n_all, d, minlength=regions)[:regions]
+            return np.r_[[d.sum(), n - 2, n, (d * d).sum(), d.max(), n_all - n], region]
+
+        rows = np.atleast_2d(kept)
+        found = list(thread_pool(threads).map(row, rows) if threads > 1 else map(row, rows))
+        return np.array(found).reshape(len(rows), REGIONS + regions)
+
+    def simplify(self, kept: BoolArray) -> Simplified:
+        """Return the fan over the kept points."""
+        if kept.sum() < 3:
+            raise ValueError(f"{int(kept.sum())} points of {self.model.name} span no triangle")
+        quality = as_quality(self.evaluate(kept)[0], self.total_weight)
+        return Simplified(fan(np.flatnonzero(kept)), quality, _deviations(self.places.ravel(), kept), kept.copy())
+
+    def score(self, points: FloatArray, faces: IntArray) -> Scored:
+        """Measure any mesh in the plane: the distance of each point to its nearest triangle."""
+        d = np.full(self.n_vertices, np.inf)
+        for corners in np.asarray(points, float)[np.asarray(faces)][:, :, :2]:
+            for i, p in enumerate(self.places):
+                sides = [_cross(corners[k], corners[(k + 1) % 3], p) for k in range(3)]
+                near = min(_to_segment(p, corners[k], corners[(k + 1) % 3]) for k in range(3))
+                d[i] = min(d[i], 0.0 if min(sides) >= 0 or max(sides) <= 0 else near)
+        covered = d == 0
+        row = [d.sum(), len(faces), len(np.unique(faces)), (d * d).sum(), d.max(), (~covered).sum()]
+        return Scored(as_quality(np.array(row, float), self.total_weight), d, covered)
+
+    def refit(self, kept: BoolArray) -> Refitted:
+        """Return the fan as it is: nothing moves here."""
+        mesh = self.simplify(kept)
+        rows = np.flatnonzero(kept)
+        error = mesh.quality.error
+        return Refitted(mesh.faces, rows, self.points[rows], error, error, 0.0)
+
+    def stored_arrays(self) -> dict[str, AnyArray]:
+        """Return nothing: the row of each point in the file says it all."""
         return {}
 
-    def ground(self) -> Ring | None:
-        """Return the heights."""
-        return Ring(self.points[:, 2].copy())
+    def ground(self) -> Any | None:
+        """Return the points and the measure."""
+        return Round(np.ascontiguousarray(self.places.ravel()), OBJECTIVES[self.rules.measure].squared)
 
     @contextmanager
-    def books(self, kept: np.ndarray, *, fixed: np.ndarray | None = None) -> Iterator[Kept]:
-        """Link the kept vertices."""
-        n = self.n_vertices
-        rim = np.flatnonzero(kept[1:]) + 1
-        books = Kept(kept.copy(), np.zeros(n, int), np.zeros(n, int), np.zeros(1), np.full(1, len(rim)))
-        books.after[rim], books.before[rim] = np.roll(rim, -1), np.roll(rim, 1)
-        books.cost[0] = self.simplify(kept).quality.error
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Any]:
+        """Lend a record of the kept points; all are at places of their own."""
+        books = Kept(kept.copy(), np.zeros(1))
+        books.total[0] = _cost_of(self.ground(), books.site)
         yield books
 
 
-class StillRing(RingSurface):
-    """The same without compiled moves."""
+class UnmovableCircle(Circle):
+    """The same without moves: its meshes can be evaluated, that is all."""
 
     def ground(self) -> None:
-        """Return nothing: no vertex of it can be moved."""
-        return None
+        """Return that there is none."""
+        return
 
 
-def least_errors(surface: RingSurface) -> np.ndarray:
-    """Return the least error of a subset of each number of triangles, (n + 1,), by going once round the circle.
+def circle(n: int, *, seed: int = 1, kind: type[Circle] = Circle, **rules: Any) -> Surface:
+    """Return a circle of n points at random angles."""
+    angle = np.sort(np.random.default_rng(seed).random(n)) * 2 * np.pi
+    return kind(Curve(np.c_[np.cos(angle), np.sin(angle), np.zeros(n)]), Rules(**rules))
 
-    The pinned vertex 1 begins and ends the way; no step goes past a pinned one.
+
+def fan(rows: IntArray) -> IntArray:
+    """Return the triangles (n - 2, 3) from the first of n rows to each two that follow each other."""
+    return np.array([[rows[0], a, b] for a, b in itertools.pairwise(rows[1:])], np.int32).reshape(-1, 3)
+
+
+def least_errors(surface: Surface) -> FloatArray:
+    """Return the least error of a subset of each number of triangles, (N - 1,), by going once round the circle.
+
+    The pinned point 0 begins and ends the way; no step goes past a pinned one.
     """
-    z, pinned = np.append(surface.points[1:, 2], surface.points[1, 2]), surface.pinned[1:]
-    n = len(z) - 1
+    n, xy, pinned = surface.n_vertices, surface.places, surface.pinned
     least = np.full((n + 1, n + 1), np.inf)  # [number of steps so far, where]
     least[0, 0] = 0.0
     for b in range(1, n + 1):
         for a in range(b - 1, -1, -1):
-            line = np.interp(np.arange(a, b + 1), [a, b], [z[a], z[b]])
-            cost = np.abs(line - z[a : b + 1]).sum()
+            cost = sum(_to_segment(xy[i], xy[a], xy[b % n]) for i in range(a + 1, b))
             least[1:, b] = np.minimum(least[1:, b], least[:-1, a] + cost)
-            if a < n and pinned[a]:
+            if pinned[a]:
                 break
-    return least[:, n]
+    return least[2:, n]
+
+
+# ------------------------------------------------------------------------------------------------ what loops ask
+
+
+class Round(NamedTuple):
+    """What does not change."""
+
+    xy: np.ndarray  # (2 N,) the points
+    squared: bool  # whether the cost is the square of the distance
+
+
+class Kept(NamedTuple):
+    """What changes."""
+
+    site: np.ndarray  # (N,) whether a point is kept
+    total: np.ndarray  # (1,) the sum of the costs
+
+
+@njit
+def _cross(a: Any, b: Any, p: Any) -> float:
+    return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+
+
+@njit(nogil=True)
+def _to_segment(p: Any, a: Any, b: Any) -> float:
+    ux, uy, px, py = b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1]
+    t = min(max((px * ux + py * uy) / (ux * ux + uy * uy), 0.0), 1.0)
+    return np.hypot(px - t * ux, py - t * uy)
+
+
+@njit(nogil=True)
+def _next(site: np.ndarray, v: int, step: int) -> int:
+    """Return the kept point after v (step 1) or before it (-1)."""
+    v = (v + step) % len(site)
+    while not site[v]:
+        v = (v + step) % len(site)
+    return v
+
+
+@njit(nogil=True)
+def _deviation(xy: np.ndarray, site: np.ndarray, i: int) -> float:
+    if site[i]:
+        return 0.0
+    a, b = _next(site, i, -1), _next(site, i, 1)
+    return _to_segment(xy[2 * i : 2 * i + 2], xy[2 * a : 2 * a + 2], xy[2 * b : 2 * b + 2])
+
+
+@njit(nogil=True)
+def _deviations(xy: np.ndarray, site: np.ndarray) -> np.ndarray:
+    return np.array([_deviation(xy, site, i) for i in range(len(site))])
+
+
+@njit(nogil=True)
+def _cost(ground: Round, site: np.ndarray, i: int) -> float:
+    d = _deviation(ground.xy, site, i)
+    return d * d if ground.squared else d
+
+
+@njit(nogil=True)
+def _cost_of(ground: Round, site: np.ndarray) -> float:
+    if site.sum() < 3:
+        return np.inf
+    total = 0.0
+    for i in range(len(site)):
+        total += _cost(ground, site, i)
+    return total
+
+
+@njit(nogil=True)
+def _swap(site: np.ndarray, gone: int, come: int) -> None:
+    if gone >= 0:
+        site[gone] = False
+    if come >= 0:
+        site[come] = True
+
+
+@answers(moves.total_cost, Round)
+@njit(nogil=True)
+def _total_cost(ground: Round, books: Kept) -> float:
+    return books.total[0]
+
+
+@answers(moves.n_triangles, Round)
+@njit(nogil=True)
+def _n_triangles(ground: Round, books: Kept) -> int:
+    return max(books.site.sum() - 2, 0)
+
+
+@answers(moves.n_sites, Round)
+@njit(nogil=True)
+def _n_sites(ground: Round, books: Kept) -> int:
+    return books.site.sum()
+
+
+@answers(moves.is_site, Round)
+@njit(nogil=True)
+def _is_site(ground: Round, books: Kept, v: int) -> bool:
+    return books.site[v]
+
+
+@answers(moves.is_taken, Round)
+@njit(nogil=True)
+def _is_taken(ground: Round, books: Kept, w: int) -> bool:
+    return books.site[w]
+
+
+@njit(nogil=True)
+def _cell_cost(ground: Round, books: Kept, a: int) -> float:
+    """Return the cost of the cell of site a: the arc from it to the next one."""
+    total = 0.0
+    i = (a + 1) % len(books.site)
+    while not books.site[i]:
+        total += _cost(ground, books.site, i)
+        i = (i + 1) % len(books.site)
+    return total
+
+
+@answers(moves.urgency, Round)
+@njit(nogil=True)
+def _urgency(ground: Round, books: Kept, v: int) -> float:
+    return _cell_cost(ground, books, _next(books.site, v, -1))
+
+
+@answers(moves.try_exchange, Round)
+@njit(nogil=True)
+def _try_exchange(ground: Round, books: Kept, v: int, w: int, limit: float) -> tuple[float, int]:
+    _swap(books.site, v, w)
+    change = _cost_of(ground, books.site) - books.total[0]
+    _swap(books.site, w, v)
+    return change, (1 if w >= 0 else 0) - (1 if v >= 0 else 0)
+
+
+@answers(moves.exchange, Round)
+@njit(nogil=True)
+def _exchange(ground: Round, books: Kept, v: int, w: int) -> bool:
+    _swap(books.site, v, w)
+    if books.site.sum() < 3:
+        _swap(books.site, w, v)
+        return False
+    books.total[0] = _cost_of(ground, books.site)
+    return True
+
+
+@answers(moves.sites_around, Round)
+@njit(nogil=True)
+def _sites_around(ground: Round, books: Kept, v: int, found: np.ndarray) -> int:
+    found[0], found[1] = _next(books.site, v, -1), _next(books.site, v, 1)
+    return 2
+
+
+@answers(moves.n_cells, Round)
+@njit(nogil=True)
+def _n_cells(ground: Round, books: Kept) -> int:
+    return len(books.site)
+
+
+@answers(moves.worst_in, Round)
+@njit(nogil=True)
+def _worst_in(ground: Round, books: Kept, cell: int) -> tuple[int, float, float]:
+    n, worst, most = len(books.site), -1, 0.0
+    if not books.site[cell]:
+        return worst, most, 0.0
+    i = (cell + 1) % n
+    while not books.site[i]:
+        cost = _cost(ground, books.site, i)
+        if cost > most:
+            worst, most = i, cost
+        i = (i + 1) % n
+    return worst, most, _cell_cost(ground, books, cell)
+
+
+@answers(moves.cells_around, Round)
+@njit(nogil=True)
+def _cells_around(ground: Round, books: Kept, v: int, found: np.ndarray) -> int:
+    found[0], found[1] = v, _next(books.site, v, -1)
+    return 2

@@ -1,0 +1,177 @@
+"""Files and folders appear whole or not at all, and what a killed process leaves is put back."""
+
+from __future__ import annotations
+
+import errno
+import os
+
+import pytest
+
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import left_beside, new_file, new_folder, put_back, put_text
+
+
+def entries(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+def write(manager, trouble=None):
+    """Write something to what a context manager gives, and have trouble then."""
+    with manager as partial:
+        if partial.is_dir():
+            (partial / "new").touch()
+        else:
+            partial.write_text("new")
+        if trouble is not None:
+            raise trouble
+
+
+def full():
+    """Return the error of a full disk."""
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+TROUBLES = [ValueError("no"), KeyboardInterrupt(), SystemExit(1)]
+
+
+# --------------------------------------------------------------------------------------------------------- files
+
+
+@pytest.mark.parametrize("flush", [True, False])
+def test_a_file_takes_its_place_when_it_is_whole(tmp_path, flush):
+    path = tmp_path / "mesh.ply"
+    path.write_text("old")
+    with new_file(path, flush=flush) as partial:
+        assert partial.parent == tmp_path
+        assert partial.name.startswith(".mesh.")
+        assert partial.suffix == ".ply"  # whoever writes it may ask for that
+        partial.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert entries(tmp_path) == ["mesh.ply"]
+
+
+@pytest.mark.parametrize("trouble", TROUBLES, ids=repr)
+def test_a_file_that_is_not_finished_leaves_nothing_and_the_error_is_the_writer_s(tmp_path, trouble):
+    path = tmp_path / "mesh.ply"
+    path.write_text("old")
+    with pytest.raises(type(trouble)) as raised:
+        write(new_file(path), trouble)
+    assert raised.value is trouble
+    assert path.read_text() == "old"
+    assert entries(tmp_path) == ["mesh.ply"]
+
+
+def test_a_file_that_cannot_be_written_is_one_line_with_the_way_out(tmp_path):
+    path = tmp_path / "mesh.ply"
+    with pytest.raises(ResultError, match=r"mesh\.ply: cannot be written \([^\n]*\); name another file$"):
+        write(new_file(path), full())
+    with pytest.raises(ResultError, match=r"cannot be written \(.*\); make room$"), new_file(path, way_out="make room"):
+        pass  # nothing was written
+    with pytest.raises(ResultError, match=r"no/mesh\.ply: cannot be written"):
+        write(new_file(tmp_path / "no" / "mesh.ply"))
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(ResultError, match="folder: cannot be written"):
+        write(new_file(tmp_path / "folder"))
+    assert entries(tmp_path) == ["folder"]
+
+
+def test_a_text_is_written_in_bytes_as_it_is(tmp_path):
+    put_text(tmp_path / "a.txt", "\u00e9\n", flush=True)
+    assert (tmp_path / "a.txt").read_bytes() == b"\xc3\xa9\n"
+
+
+# ------------------------------------------------------------------------------------------------------- folders
+
+
+@pytest.mark.parametrize("flush", [True, False])
+def test_a_folder_takes_its_place_when_it_is_whole_and_parents_are_made(tmp_path, flush):
+    out = tmp_path / "results" / "one"
+    with new_folder(out, flush=flush) as partial:
+        (partial / "meshes").mkdir()
+        (partial / "meshes" / "a.ply").write_text("a")
+        assert not out.exists()
+    assert entries(tmp_path) == ["results", "results/one", "results/one/meshes", "results/one/meshes/a.ply"]
+
+
+def test_a_folder_gives_way_in_one_step_and_only_if_it_may(tmp_path):
+    out = tmp_path / "out"
+    for content in ("old", "new"):
+        with new_folder(out, replace=True) as partial:
+            (partial / content).touch()
+            assert out.exists() == (content == "new")
+    assert entries(tmp_path) == ["out", "out/new"]
+    with pytest.raises(ResultError, match=r"out: cannot be put in place \(.*\); name another folder$"):
+        write(new_folder(out))
+    assert entries(tmp_path) == ["out", "out/new"]
+
+
+@pytest.mark.parametrize("trouble", TROUBLES, ids=repr)
+def test_a_folder_that_is_not_finished_leaves_the_old_one(tmp_path, trouble):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "old").touch()
+    with pytest.raises(type(trouble)) as raised:
+        write(new_folder(out, replace=True), trouble)
+    assert raised.value is trouble
+    assert entries(tmp_path) == ["out", "out/old"]
+
+
+def test_a_folder_that_cannot_be_written_or_made_is_one_line_with_the_way_out(tmp_path):
+    out = tmp_path / "out"
+    way_out = "make room, or name another folder"
+    with pytest.raises(ResultError, match=rf"out: cannot be written \([^\n]*\); {way_out}$"):
+        write(new_folder(out), full())
+    assert entries(tmp_path) == []
+    (tmp_path / "file").touch()
+    with (
+        pytest.raises(ResultError, match=rf"below: cannot be made \(.*\); {way_out}$"),
+        new_folder(tmp_path / "file" / "below"),
+    ):
+        pass
+    assert entries(tmp_path) == ["file"]
+
+
+def test_a_failed_change_of_places_puts_the_old_folder_back(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "old").touch()
+    rename = type(out).rename
+
+    def fails(path, target):
+        if path.suffix == ".partial":
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return rename(path, target)
+
+    monkeypatch.setattr(type(out), "rename", fails)
+    with pytest.raises(ResultError, match="cannot be put in place"):
+        write(new_folder(out, replace=True))
+    assert entries(tmp_path) == ["out", "out/old"]
+
+
+# ---------------------------------------------------------------------------------------------- after a killed process
+
+
+def test_the_old_folder_comes_back_where_a_process_was_killed_between_two_renames(tmp_path):
+    (tmp_path / ".out.0123abcd.old").mkdir()
+    (tmp_path / ".out.0123abcd.old" / "front.csv").touch()
+    (tmp_path / ".out.4567abcd.partial").mkdir()
+    assert [path.name for path in left_beside(tmp_path / "out", "old")] == [".out.0123abcd.old"]
+    put_back(tmp_path / "out")
+    assert entries(tmp_path) == [".out.4567abcd.partial", "out", "out/front.csv"]
+    put_back(tmp_path / "out", tidy=True)
+    assert entries(tmp_path) == ["out", "out/front.csv"]
+    put_back(tmp_path / "other", tidy=True)  # nothing to do
+    assert entries(tmp_path) == ["out", "out/front.csv"]
+
+
+def test_only_a_folder_s_own_remains_are_touched(tmp_path):
+    others = [".out.2.0123abcd.partial", ".outer.0123abcd.partial", ".out.0123abc.partial", ".out.0123abcg.partial"]
+    for name in others:
+        (tmp_path / name).mkdir()
+    put_back(tmp_path / "out", tidy=True)
+    assert entries(tmp_path) == sorted(others)
+    (tmp_path / ".[ab].0123abcd.old").mkdir()
+    put_back(tmp_path / "a")  # the name is no pattern
+    put_back(tmp_path / "[ab]")
+    assert entries(tmp_path) == sorted([*others, "[ab]"])

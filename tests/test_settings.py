@@ -1,0 +1,260 @@
+"""Settings: what each kind reads, and that what is stored of them is read back."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import pydoc
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.settings import (
+    MOST_REAL,
+    MOST_WHOLE,
+    Choice,
+    Direction,
+    Part,
+    Pins,
+    Real,
+    Steps,
+    Text,
+    Weights,
+    Whole,
+    defaults_of,
+    documentation,
+    plain,
+    read_back,
+    setting,
+    settings_of,
+    taken,
+)
+from meshsimp_pymoo.surface.measures import OBJECTIVES
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES, PINS, Rules
+
+# ------------------------------------------------------------------------------------------------------- kinds
+
+TEXTS = [
+    (Choice(("hull", "model")), "hull", "hull"),
+    (Text(), "importance", "importance"),
+    (Weights(), "importance", "importance"),
+    (Whole(), "12", 12),
+    (Whole(-3), "-3", -3),
+    (Real(), "-1.5e3", -1500.0),
+    (Real(0), "0", 0.0),
+    (Steps(), "2.5", (2.5, 2.5)),
+    (Steps(), "2,3", (2.0, 3.0)),
+    (Part(), "0,1,20,30", (0, 1, 20, 30)),
+    (Direction(), "-x", "-x"),
+    (Direction(), "0,1,1", "0,1,1"),
+    (Pins(PINS), "hull", "hull"),
+    (Pins(PINS), "7,12", [7, 12]),
+]
+WRONG_TEXTS = [
+    (Choice(("hull", "model")), "hul", r"unknown \(did you mean 'hull'\?\); expected one of hull, model"),
+    (Choice(("hull", "model")), "xyz", "^expected one of hull, model"),
+    (Whole(), "1.0", "'1.0' is not a whole number of at least 0"),
+    (Whole(2), "1", "'1' is not a whole number of at least 2"),
+    (Whole(), "-1", "at least 0"),
+    (Real(), "many", "'many' is not a finite number"),
+    (Real(), "nan", "'nan' is not a finite number"),
+    (Real(), "inf", "'inf' is not a finite number"),
+    (Real(0), "-1", "'-1' is below 0"),
+    (Real(0, strict=True), "0", "'0' is not positive"),
+    (Real(2, strict=True), "2", "'2' is not above 2"),
+    (Steps(), "1,2,3", "'1,2,3' is not one or two positive numbers"),
+    (Steps(), "-1", "not one or two positive numbers"),
+    (Steps(), "a", "'a' is not a finite number"),
+    (Part(), "1,2,3", "'1,2,3' is not COLUMN,ROW,COLUMNS,ROWS"),
+    (Part(), "0,0,1,5", "'1' is not a whole number of at least 2"),
+    (Pins(PINS), "7,-1", "'-1' is not a whole number of at least 0"),
+    (Pins(PINS), "border", "'border' is not a whole number"),
+]
+PLAIN = [
+    (Choice(("hull", "model")), "model", "model"),
+    (Text(), "importance", "importance"),
+    (Weights(), "importance", "importance"),
+    (Weights(), [1, 2.5], [1, 2.5]),
+    (Weights(), [[1, 2], [3, 4]], [[1, 2], [3, 4]]),
+    (Whole(), MOST_WHOLE, MOST_WHOLE),
+    (Real(), 3, 3.0),
+    (Steps(), 2, (2.0, 2.0)),
+    (Steps(), [2, 3.5], (2.0, 3.5)),
+    (Part(), [0, 1, 20, 30], (0, 1, 20, 30)),
+    (Direction(), "auto", "auto"),
+    (Direction(), [0, 0, 2], [0.0, 0.0, 2.0]),
+    (Pins(PINS), "hull", "hull"),
+    (Pins(PINS), 7, 7),
+    (Pins(PINS), [7, "hull", [0.5, 1.5]], [7, "hull", [0.5, 1.5]]),
+]
+WRONG_PLAIN = [
+    (Choice(("hull", "model")), "Hull", r"did you mean 'hull'\?"),
+    (Choice(("hull", "model")), None, "expected one of hull, model"),
+    (Text(), " ", "expected a text"),
+    (Text(), 3, "expected a text"),
+    (Weights(), [], "expected a text"),
+    (Weights(), 3, "expected a text"),
+    (Whole(), True, "expected a whole number of at least 0"),
+    (Whole(), 1.0, "expected a whole number"),
+    (Whole(), MOST_WHOLE + 1, r"at least 0 and at most 2\*\*53"),
+    (Real(), "3", "^expected a number$"),
+    (Real(), False, "expected a number"),
+    (Real(), math.nan, "expected a number"),
+    (Real(), math.inf, "below 1e\\+300"),
+    (Real(0), -1, "expected a number of at least 0"),
+    (Real(0, strict=True), 0, "expected a number of more than 0"),
+    (Real(), MOST_REAL, r"below 1e\+300"),
+    (Steps(), [], r"expected one number or two, \[dx, dy\]"),
+    (Steps(), [1, 2, 3], r"expected one number or two"),
+    (Steps(), 0, "more than 0"),
+    (Part(), [1, 2, 3], r"expected \[column, row, columns, rows\]"),
+    (Part(), "0,0,2,2", "expected .column, row"),
+    (Direction(), [0, 0, 0], "three numbers that are not all 0"),
+    (Direction(), [0, 1], "expected an axis"),
+    (Direction(), "", "expected an axis"),
+    (Pins(PINS), 1.5, "expected corners, hull, or a list"),
+    (Pins(PINS), True, "expected corners, hull, or a list"),
+]
+
+
+def same(one, other):
+    return one == other and type(one) is type(other)
+
+
+@pytest.mark.parametrize(("kind", "text", "value"), TEXTS)
+def test_a_word_of_a_command_line_is_read(kind, text, value):
+    assert same(kind.from_text(text), value)
+
+
+@pytest.mark.parametrize(("kind", "given", "value"), PLAIN)
+def test_plain_data_are_read(kind, given, value):
+    assert same(kind.from_plain(given), value)
+
+
+@pytest.mark.parametrize(("kind", "text", "message"), WRONG_TEXTS)
+def test_a_word_that_is_none_is_refused_with_what_was_expected(kind, text, message):
+    with pytest.raises(ValueError, match=message):
+        kind.from_text(text)
+
+
+@pytest.mark.parametrize(("kind", "given", "message"), WRONG_PLAIN)
+def test_data_that_are_none_are_refused_with_what_was_expected(kind, given, message):
+    with pytest.raises(ValueError, match=message):
+        kind.from_plain(given)
+
+
+# ------------------------------------------------------------------------------------------ stored and read back
+
+reals = st.floats(-1e299, 1e299)
+positive = st.floats(1e-300, 1e299)
+wholes = st.integers(0, 10**6)
+directions = st.lists(st.floats(-10, 10), min_size=3, max_size=3).filter(any)
+positions = st.lists(reals, min_size=2, max_size=3)
+pins = st.one_of(
+    st.sampled_from(PINS),
+    wholes,
+    st.lists(st.one_of(wholes, st.sampled_from(PINS), positions), max_size=4),
+)
+names = st.text(min_size=1).filter(str.strip)
+SETTINGS = {
+    "up": st.one_of(st.sampled_from(["auto", "z", "-x"]), directions),
+    "patch": st.none() | st.just("front"),
+    "spacing": st.none() | st.tuples(positive, positive),
+    "nodata": st.none() | reals,
+    "window": st.none() | st.tuples(wholes, wholes, wholes, wholes),
+    "max_edge": st.none() | positive,
+    "footprint": st.sampled_from(FOOTPRINTS),
+    "outside": st.sampled_from(OUTSIDES),
+    "pin": st.none() | pins,
+    "weights": st.none() | names | st.lists(reals, min_size=1),
+    "measure": st.sampled_from(list(OBJECTIVES)),
+}
+
+
+@pytest.mark.parametrize("kind", [Options, Rules])
+@given(data=st.data())
+def test_what_is_stored_of_settings_is_read_back(kind, data):
+    assert set(settings_of(Options)) | set(settings_of(Rules)) == set(SETTINGS), "a new setting: draw it here too"
+    settings = kind(**{name: data.draw(SETTINGS[name], label=name) for name in settings_of(kind)})
+    stored = json.loads(json.dumps(plain(settings), allow_nan=False))
+    assert list(stored) == list(settings_of(kind))
+    assert read_back(kind, stored) == settings
+
+
+@given(values=st.lists(reals, min_size=3, max_size=3))
+def test_arrays_tuples_and_numbers_of_numpy_are_stored_as_plain_data(values):
+    assume(any(values))
+    for up in (np.array(values), tuple(values), list(np.array(values))):
+        assert json.loads(json.dumps(plain(Options(up=up))))["up"] == values
+    rules = Rules(pin=(np.int64(3), np.array([[1.0, 2.0]])), weights=np.arange(3.0))
+    assert plain(rules)["pin"] == [3, [[1.0, 2.0]]]
+    assert read_back(Rules, plain(rules)).weights == [0.0, 1.0, 2.0]
+
+
+def test_defaults_are_read_back_and_missing_settings_have_them():
+    for kind in (Options, Rules):
+        assert read_back(kind, {}) == read_back(kind, plain(kind())) == kind()
+        assert defaults_of(kind) == vars(kind())
+
+
+@pytest.mark.parametrize(
+    ("stored", "message"),
+    [
+        (None, "None holds no rules"),
+        ([1], r"\[1\] holds no rules"),
+        ({"foot": "hull"}, "'foot' is none of the rules: footprint, outside, pin, weights, measure"),
+        ({"footprint": "hul"}, r"footprint is 'hul': unknown \(did you mean 'hull'\?\)"),
+        ({"pin": {}}, "pin is {}: expected corners, hull, or a list"),
+        ({"weights": 3}, "weights is 3: expected a text"),
+    ],
+)
+def test_what_was_stored_of_nothing_like_it_is_refused(stored, message):
+    with pytest.raises(ValueError, match=message):
+        read_back(Rules, stored)
+
+
+def test_settings_are_taken_out_of_arguments_and_replace_those_of_an_object():
+    arguments = {"footprint": "hull", "seed": 3}
+    base = Rules(outside="ignore")
+    assert taken(Rules, base, arguments) == Rules(footprint="hull", outside="ignore")
+    assert arguments == {"seed": 3}
+    assert taken(Rules, None, arguments) == Rules()
+
+
+# ------------------------------------------------------------------------------------------------- documentation
+
+
+@dataclass(frozen=True)
+class Toy:
+    """Two settings."""
+
+    size: int = setting(3, kind=Whole(), accepts="int", doc="How many. " + "And so on. " * 20, help="how many")
+    hidden: int = setting(3, kind=Whole(), accepts="int", doc="Follows.", help="", derived=True)
+
+
+def test_settings_document_themselves_as_parameters_of_a_docstring():
+    lines = documentation(Toy, indent="  ").splitlines()
+    assert lines[0] == "  size : int"
+    assert all(line.startswith("      ") and len(line) < 120 for line in lines[1:])
+    assert " ".join(" ".join(lines[1:]).split()) == ("How many. " + "And so on. " * 20).strip()
+
+
+def test_help_names_every_setting_of_a_problem_with_its_default_and_meaning():
+    said = pydoc.render_doc(MeshProblem, renderer=pydoc.plaintext)
+    signature = inspect.signature(MeshProblem)
+    for kind in (Options, Rules):
+        for name, known in settings_of(kind).items():
+            if known.derived:
+                assert name not in signature.parameters
+                continue
+            assert signature.parameters[name].default == defaults_of(kind)[name]
+            assert f"{name}={defaults_of(kind)[name]!r}" in said
+            assert f" {name} : {known.accepts}" in said
+            assert " ".join(known.doc.split()) in " ".join(said.replace("|", " ").split())
+    assert "SETTINGS" not in said
