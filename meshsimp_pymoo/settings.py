@@ -13,8 +13,8 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from dataclasses import field
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 # A whole number beyond this is not exact as a float any more; a real one beyond MOST_REAL overflows when squared twice.
 MOST_WHOLE = 2**53
@@ -33,8 +33,7 @@ class Kind(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """One of a few words."""
 
     names: tuple[str, ...]
@@ -52,7 +51,6 @@ class Choice:
         raise ValueError(f"{meant}expected one of {', '.join(self.names)}")
 
 
-@dataclass(frozen=True)
 class Text:
     """A name."""
 
@@ -67,8 +65,7 @@ class Text:
         return value
 
 
-@dataclass(frozen=True)
-class Whole:
+class Whole(NamedTuple):
     """A whole number."""
 
     least: int = 0
@@ -87,8 +84,7 @@ class Whole:
         return value
 
 
-@dataclass(frozen=True)
-class Real:
+class Real(NamedTuple):
     """A finite number, at least (or, with ``strict``, above) the least."""
 
     least: float | None = None
@@ -122,7 +118,6 @@ class Real:
         return float(value)
 
 
-@dataclass(frozen=True)
 class Steps:
     """One or two positive numbers, as a pair."""
 
@@ -141,7 +136,6 @@ class Steps:
         return steps[0], steps[-1]
 
 
-@dataclass(frozen=True)
 class Part:
     """A part of a grid: column, row, columns, rows."""
 
@@ -159,7 +153,6 @@ class Part:
         return tuple(Whole(0).from_plain(part) for part in value)
 
 
-@dataclass(frozen=True)
 class Direction:
     """A direction in space: "auto", an axis with or without a sign, or three numbers."""
 
@@ -178,8 +171,7 @@ class Direction:
         raise ValueError("expected an axis such as z or -x, 'auto', or three numbers that are not all 0")
 
 
-@dataclass(frozen=True)
-class Pins:
+class Pins(NamedTuple):
     """Which vertices: names of sets of them, rows of the file, positions, or a list of these."""
 
     names: tuple[str, ...]
@@ -195,7 +187,6 @@ class Pins:
         return value
 
 
-@dataclass(frozen=True)
 class Weights:
     """The name of numbers, or the numbers themselves."""
 
@@ -208,8 +199,7 @@ class Weights:
         return value if isinstance(value, list) and value else Text().from_plain(value)
 
 
-@dataclass(frozen=True)
-class Setting:
+class Setting(NamedTuple):
     """What is known of a setting beside its name and default.
 
     Attributes

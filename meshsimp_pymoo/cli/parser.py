@@ -7,11 +7,11 @@ import difflib
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
 from types import ModuleType
 from typing import Any, NoReturn
 
 from meshsimp_pymoo.cli import commands
+from meshsimp_pymoo.discovery import modules_in
 from meshsimp_pymoo.errors import UsageError
 
 # The order in which the commands are listed; one that is not named here comes last.
@@ -103,7 +103,7 @@ def make_parser() -> Parser:
 
 
 def _commands() -> Iterator[tuple[str, ModuleType]]:
-    names = [module.name for module in iter_modules(commands.__path__)]
+    names = modules_in(commands.__path__)
     for name in sorted(names, key=lambda name: (ORDER.index(name) if name in ORDER else len(ORDER), name)):
         yield name, import_module(f"{commands.__name__}.{name}")
 

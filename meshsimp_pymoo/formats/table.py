@@ -15,14 +15,13 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from meshsimp_pymoo import formats
+from meshsimp_pymoo.discovery import modules_in
 from meshsimp_pymoo.errors import ModelError, ModelWarning, reason_of
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
@@ -55,8 +54,7 @@ class Held(Protocol):
         """Triangles (T, 3)."""
 
 
-@dataclass(frozen=True)
-class Format:
+class Format(NamedTuple):
     """All that is known of a format of files.
 
     Attributes
@@ -146,9 +144,8 @@ def all_formats() -> tuple[Format, ...]:
 
 @cache
 def _import_all(folders: tuple[str, ...]) -> None:
-    for module in iter_modules(folders):
-        if not module.ispkg:
-            import_module(f"{formats.__name__}.{module.name}")
+    for name in modules_in(folders):
+        import_module(f"{formats.__name__}.{name}")
 
 
 def written_formats() -> dict[str, Format]:

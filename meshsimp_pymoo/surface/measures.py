@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 # Columns of the table that evaluation fills, one row a subset.
 ERROR, TRIANGLES, VERTICES, SQUARES, MAXIMUM, UNCOVERED = range(6)
@@ -20,8 +20,7 @@ ERROR, TRIANGLES, VERTICES, SQUARES, MAXIMUM, UNCOVERED = range(6)
 REGIONS = 6
 
 
-@dataclass(frozen=True)
-class Measure:
+class Measure(NamedTuple):
     """A row of the table.
 
     Attributes
