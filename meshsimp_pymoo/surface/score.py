@@ -12,7 +12,17 @@ from meshsimp_pymoo.plane.hilbert import hilbert_keys
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
 from meshsimp_pymoo.surface.ground import Ground
-from meshsimp_pymoo.surface.measures import Quality, as_quality
+from meshsimp_pymoo.surface.measures import (
+    ERROR,
+    MAXIMUM,
+    REGIONS,
+    SQUARES,
+    TRIANGLES,
+    UNCOVERED,
+    VERTICES,
+    Quality,
+    as_quality,
+)
 
 
 def mesh_quality(
@@ -20,16 +30,9 @@ def mesh_quality(
 ) -> Quality:
     """Return what is said of a mesh with these deviations (N,), cover (N,) and triangles (M, 3)."""
     w = np.ones(len(deviation)) if weights is None else weights
-    row = np.array(
-        [
-            (w * deviation).sum(),
-            len(faces),
-            len(np.unique(faces)),
-            (w * deviation**2).sum(),
-            deviation[w > 0].max(),
-            len(covered) - covered.sum(),
-        ]
-    )
+    row = np.full(REGIONS, np.nan)
+    row[ERROR], row[SQUARES], row[MAXIMUM] = (w * deviation).sum(), (w * deviation**2).sum(), deviation[w > 0].max()
+    row[TRIANGLES], row[VERTICES], row[UNCOVERED] = len(faces), len(np.unique(faces)), len(covered) - covered.sum()
     return as_quality(row, total_weight)
 
 

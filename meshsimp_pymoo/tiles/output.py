@@ -23,7 +23,6 @@ import os
 import shutil
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -231,7 +230,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     ResultError
         If a file is missing or damaged, or the grid is another one.
     """
-    from meshsimp_pymoo.surface.measures import Quality
+    from meshsimp_pymoo.surface.measures import MEASURES, quality_of
 
     folder = Path(folder)
     columns = read_front_csv(folder / "front.csv")[0]
@@ -248,9 +247,8 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     fits = rows.shape == level.shape and len(slope) == len(columns["error"]) == len(start) - 1
     if not fits or {rows.dtype.kind, moved.dtype.kind, start.dtype.kind} != {"i"} or start[-1] != len(moved):
         raise ResultError(f"{path}: does not belong to front.csv; simplify again")
-    names = list(asdict(Quality(0.0, 0, 0, 0.0, 0.0, 0.0, 0)))
-    table = zip(*(columns[name].tolist() for name in names), strict=True)
-    quality = tuple(Quality(**dict(zip(names, row, strict=True))) for row in table)
+    table = zip(*(columns[name].tolist() for name in MEASURES), strict=True)
+    quality = tuple(quality_of(zip(MEASURES, row, strict=True)) for row in table)
     samples: IntArray = grid.samples_of_rows(rows)
     found = [grid.samples_of_rows(part) if len(part) else None for part in np.split(moved, start[1:-1])]
     return TiledFront(grid, samples, level, slope[::-1].copy(), quality[::-1], tuple(found[::-1]))

@@ -119,7 +119,7 @@ def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Qualit
     else:
         with ThreadPoolExecutor(n_threads) as pool:
             list(pool.map(do, range(n_threads)))
-    row = np.empty(REGIONS)
+    row = np.full(REGIONS, np.nan)
     row[ERROR], row[SQUARES], row[MAXIMUM] = table[:, 0].sum(), table[:, 1].sum(), table[:, 2].max()
     row[TRIANGLES], row[VERTICES], row[UNCOVERED] = mesh.n_triangles, len(mesh.samples), 0
     return as_quality(row, grid.n_samples)
