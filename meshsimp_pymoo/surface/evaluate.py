@@ -330,7 +330,7 @@ def evaluate_subsets(ground: Ground, kept: BoolArray, *, n_threads: int = 1, reg
 
     Returns
     -------
-    (P, 6 + regions) float array
+    (P, REGIONS + regions) float array
         Columns ERROR, TRIANGLES, VERTICES, SQUARES (sum of w_p d_p squared, that is, w_p times the square of d_p),
         MAXIMUM, UNCOVERED, then the error of each region. A subset that emits no triangle has error, squares, maximum
         and regions inf.
@@ -371,14 +371,14 @@ def triangulate_subset(ground: Ground, kept: BoolArray) -> tuple[IntArray, Float
     -------
     faces : (M, 3) int32 array
         The triangles as rows of the model, the least row first, sorted; none where no triangle is emitted.
-    row : (6,) float array
+    row : (REGIONS,) float array
         The subset's row of the table of :func:`evaluate_subsets`.
     deviation, covered : (N,) arrays
         d_p at every vertex [model units], and whether a triangle covers it.
     """
     n = len(ground.z)
     arrays = _workspace(n).arrays
-    row, deviation, covered = np.empty(6), np.zeros(n), np.zeros(n, np.bool_)
+    row, deviation, covered = np.empty(REGIONS), np.zeros(n), np.zeros(n, np.bool_)
     end = _evaluate_one(ground, arrays, kept, row, deviation, covered)
     sites, mesh, emitted = arrays[0], arrays[5], arrays[6]
     records = mesh[:end].reshape(-1, RECORD)[emitted[: end // RECORD] == 1, :3].astype(np.int64)
