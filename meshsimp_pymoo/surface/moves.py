@@ -20,7 +20,7 @@ Examples
 ... @njit
 ... def fixed_cost(ground, books):
 ...     return ground.cost
->>> @loop
+>>> @njit
 ... def twice(ground, books):
 ...     return 2.0 * total_cost(ground, books)
 >>> twice(Fixed(1.5), 0)
