@@ -28,6 +28,10 @@ class UsageError(InputError):
     """Options that do not go together, or a command line that cannot be understood."""
 
 
+class CodeWarning(UserWarning):
+    """Compiled code cannot be kept or read: nothing is wrong but the time it takes to make it again."""
+
+
 class ModelWarning(UserWarning):
     """The input is usable, but something in it was dropped or is doubtful."""
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, triangulate
+from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, triangulate_once
 
 
 def rational(xy):
@@ -32,7 +32,7 @@ def faces_of(xy, *, first=(-1,), order=(), exact=True):
     n = len(xy)
     mesh = np.empty(16 * max(n, 4), np.uint32)
     ranges = exact_ranges(xy) if exact else (0.0, 0.0)
-    end = triangulate(
+    end = triangulate_once(
         xy.ravel(),
         n,
         np.asarray(first, np.int64),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import inner
 
 from meshsimp_pymoo.plane.footprint import inside
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE
@@ -12,7 +13,7 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE
 SLIVER_HEIGHT = 1e-9
 
 
-@njit(cache=True, nogil=True)
+@inner
 def is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bool:
     """Whether a triangle is lower than ``min_height`` over its longest edge; the same for all its rotations."""
     a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
@@ -29,7 +30,7 @@ def is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bo
     return area <= 0.0 or area * area < min_height * min_height * longest
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def sum_of_three(a: float, b: float, c: float) -> float:
     """Their sum, rounded the same way in whatever order they come."""
     low = a if a < b else b
@@ -41,7 +42,7 @@ def sum_of_three(a: float, b: float, c: float) -> float:
     return lowest + middle + highest
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def emit(
     xy: np.ndarray,
     mesh: np.ndarray,
@@ -92,7 +93,7 @@ def emit(
     return n_triangles
 
 
-@njit(cache=True, nogil=True)
+@inner
 def outline(mesh: np.ndarray, end: int, emitted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """List halfedges between an emitted triangle and another, as (start, end, third) sites, with their rank.
 

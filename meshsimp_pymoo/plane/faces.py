@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from scipy.sparse import coo_array
 
 from meshsimp_pymoo.arrays import Csr, IntArray
 
@@ -69,35 +69,9 @@ def border_vertices(faces: IntArray) -> IntArray:
     return np.unique(table.ends[table.n_triangles == 1])
 
 
-@njit(cache=True)
-def _ring_lists(faces: np.ndarray, indptr: np.ndarray, raw: np.ndarray) -> None:
-    for f in range(len(faces)):
-        for k in range(3):
-            a = faces[f, k]
-            raw[indptr[a]] = faces[f, (k + 1) % 3]
-            raw[indptr[a] + 1] = faces[f, (k + 2) % 3]
-            indptr[a] += 2
-
-
-@njit(cache=True)
-def _unique_rings(start: np.ndarray, raw: np.ndarray, indptr: np.ndarray, indices: np.ndarray) -> None:
-    m = 0
-    for i in range(len(start) - 1):
-        ring = np.sort(raw[start[i] : start[i + 1]])
-        for k in range(len(ring)):
-            if k == 0 or ring[k] != ring[k - 1]:
-                indices[m] = ring[k]
-                m += 1
-        indptr[i + 1] = m
-
-
 def one_rings(faces: IntArray, n: int) -> Csr:
     """Return the neighbours of each of n vertices on the edges of faces (T, 3), ascending, in CSR form."""
-    start = np.zeros(n + 1, np.int64)
-    np.cumsum(2 * np.bincount(faces.ravel(), minlength=n), out=start[1:])
-    raw = np.empty(start[-1], np.int32)
-    _ring_lists(faces, start.copy(), raw)
-    indptr = np.zeros(n + 1, np.int64)
-    indices = np.empty(len(raw), np.int32)
-    _unique_rings(start, raw, indptr, indices)
-    return indptr, indices[: indptr[-1]].copy()
+    ends, others = faces[:, [0, 1, 2, 1, 2, 0]].ravel(), faces[:, [1, 2, 0, 0, 1, 2]].ravel()
+    table = coo_array((np.ones(len(ends), np.int8), (ends, others)), shape=(n, n)).tocsr()
+    table.sort_indices()
+    return table.indptr.astype(np.int64), table.indices.astype(np.int32, copy=False)

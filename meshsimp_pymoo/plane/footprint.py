@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 
 OUTSIDE, INSIDE, MIXED = 0, 1, 2
 
@@ -39,7 +40,7 @@ class Footprint(NamedTuple):
     faces: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _left_of(xy: np.ndarray, a: int, b: int, x3: float, y3: float) -> float:
     """Which side of the line from a to b a third of (x3, y3) lies on: positive on the left, 0 on the line.
 
@@ -51,7 +52,7 @@ def _left_of(xy: np.ndarray, a: int, b: int, x3: float, y3: float) -> float:
     return -((3.0 * xy[2 * b] - x3) * (3.0 * xy[2 * a + 1] - y3) - (3.0 * xy[2 * b + 1] - y3) * (3.0 * xy[2 * a] - x3))
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x3: float, y3: float) -> bool:
     u = _left_of(xy, faces[f, 0], faces[f, 1], x3, y3)
     v = _left_of(xy, faces[f, 1], faces[f, 2], x3, y3)
@@ -61,7 +62,7 @@ def _in_face(xy: np.ndarray, faces: np.ndarray, f: int, x3: float, y3: float) ->
     return (u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _in_some_face(
     xy: np.ndarray, start: np.ndarray, items: np.ndarray, faces: np.ndarray, cell: int, x3: float, y3: float
 ) -> bool:
@@ -71,7 +72,7 @@ def _in_some_face(
     return False
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def inside(
     xy: np.ndarray,
     side: int,
@@ -91,7 +92,7 @@ def inside(
     return kind == INSIDE
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _cell_span(low: float, high: float, side: int) -> tuple[int, int]:
     """First and last cell that [low, high] touches, with a margin for rounding."""
     margin = 1e-12
@@ -100,7 +101,7 @@ def _cell_span(low: float, high: float, side: int) -> tuple[int, int]:
     return first, last
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _row_span(ax: float, ay: float, bx: float, by: float, row: int, side: int) -> tuple[int, int]:
     """Columns that the segment a-b touches in a row of cells; the outermost rows reach to infinity."""
     low = min(ax, bx)
@@ -121,7 +122,7 @@ def _row_span(ax: float, ay: float, bx: float, by: float, row: int, side: int) -
     return _cell_span(low, high, side)
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _mark_outline(xy: np.ndarray, edges: np.ndarray, side: int, state: np.ndarray) -> None:
     for k in range(len(edges)):
         a = edges[k, 0]
@@ -134,7 +135,7 @@ def _mark_outline(xy: np.ndarray, edges: np.ndarray, side: int, state: np.ndarra
                 state[row * side + column] = MIXED
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _apart(xy: np.ndarray, a: int, b: int, c: int, x: float, y: float, size: float) -> bool:
     """Whether a line along an edge of face (a, b, c) separates it from a cell; the cell is taken a little larger."""
     margin = 1e-3 * size
@@ -150,7 +151,7 @@ def _apart(xy: np.ndarray, a: int, b: int, c: int, x: float, y: float, size: flo
     return False
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _face_cells(
     xy: np.ndarray, faces: np.ndarray, side: int, state: np.ndarray, start: np.ndarray, items: np.ndarray, fill: bool
 ) -> None:

@@ -6,13 +6,14 @@ D. Hilbert, "Ueber die stetige Abbildung einer Linie auf ein Flaechenstueck", Ma
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry
 
 # Resolution in bits along one side: finer than any raster, and two of them fit an int64.
 HILBERT_BITS = 26
 
 
-@njit(cache=True, nogil=True)
+@entry
 def hilbert_keys(xy: np.ndarray) -> np.ndarray:
     """Return the place of each point on the curve through the unit square.
 

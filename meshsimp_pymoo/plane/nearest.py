@@ -8,13 +8,14 @@ lengths.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import inner
 
 # Segments in one leaf.
 LEAF = 4
 
 
-@njit(cache=True, nogil=True)
+@inner
 def build_tree(xy: np.ndarray, ends: np.ndarray, m: int) -> np.ndarray:
     """Return the boxes of a tree over ``m`` segments, listed so that neighbours are close.
 
@@ -60,7 +61,7 @@ def build_tree(xy: np.ndarray, ends: np.ndarray, m: int) -> np.ndarray:
     return boxes
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _to_segment(xy: np.ndarray, a: int, b: int, x: float, y: float) -> tuple[float, float]:
     """Squared distance from (x, y) to the segment a-b and the parameter of its nearest point."""
     ax = xy[2 * a]
@@ -75,7 +76,7 @@ def _to_segment(xy: np.ndarray, a: int, b: int, x: float, y: float) -> tuple[flo
     return dx * dx + dy * dy, t
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _to_box(boxes: np.ndarray, node: int, x: float, y: float) -> float:
     """Squared distance from (x, y) to a node's box; a little less, so that rounding hides no segment."""
     dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 1])
@@ -83,7 +84,7 @@ def _to_box(boxes: np.ndarray, node: int, x: float, y: float) -> float:
     return (dx * dx + dy * dy) * (1.0 - 1e-9)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def nearest_segment(
     xy: np.ndarray,
     ends: np.ndarray,

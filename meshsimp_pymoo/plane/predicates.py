@@ -19,8 +19,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from meshsimp_pymoo.compiling.functions import inner
 
 # Shewchuk's bounds, section 4; the differences are exact here, so they hold with room to spare.
 ORIENT_BOUND = 3.3306690738754716e-16
@@ -40,14 +42,14 @@ def _fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), codegen
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _two_sum(a: float, b: float) -> tuple[float, float]:
     s = a + b
     bb = s - a
     return s, (a - (s - bb)) + (b - bb)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _product_difference(a: float, b: float, c: float, d: float, out: np.ndarray) -> None:
     """Write ``a*b - c*d`` into ``out[:4]`` as an expansion: four doubles, increasing, whose sum is exact."""
     p = a * b
@@ -65,7 +67,7 @@ def _product_difference(a: float, b: float, c: float, d: float, out: np.ndarray)
     out[3] = x3
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _add_double(expansion: np.ndarray, n: int, b: float) -> int:
     """Grow an expansion of ``n`` components by ``b`` in place, dropping zeros; return its new length."""
     q = b
@@ -81,7 +83,7 @@ def _add_double(expansion: np.ndarray, n: int, b: float) -> int:
     return m
 
 
-@njit(cache=True, nogil=True)
+@inner
 def circle_sign_exact(adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy: float) -> int:
     """Return the sign of the incircle determinant of exact differences, by expansions without error."""
     minor = np.empty(4)
@@ -111,7 +113,7 @@ def circle_sign_exact(adx: float, ady: float, bdx: float, bdy: float, cdx: float
     return 1 if total[n - 1] > 0.0 else -1
 
 
-@njit(cache=True, nogil=True)
+@inner
 def orient_sign_exact(adx: float, ady: float, bdx: float, bdy: float) -> int:
     """Return the sign of ``adx*bdy - ady*bdx`` without error."""
     p = adx * bdy
@@ -125,7 +127,7 @@ def orient_sign_exact(adx: float, ady: float, bdx: float, bdy: float) -> int:
     return 1 if p_low > q_low else -1
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def orient_sign(adx: float, ady: float, bdx: float, bdy: float, exact_area: float) -> int:
     """Return +1 if p lies left of the line from a to b, -1 if right, 0 if on it; always the exact answer.
 
@@ -155,7 +157,7 @@ def orient_sign(adx: float, ady: float, bdx: float, bdy: float, exact_area: floa
     return orient_sign_exact(adx, ady, bdx, bdy)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _circle_sign_slow(
     adx: float,
     ady: float,
@@ -195,7 +197,7 @@ def _circle_sign_slow(
     return circle_sign_exact(adx, ady, bdx, bdy, cdx, cdy)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def circle_sign(adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy: float, exact_lift: float) -> int:
     """Return +1 if p lies inside the circle through a, b, c (counter-clockwise), -1 outside, 0 on it; always exact.
 

@@ -26,7 +26,8 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 
 from meshsimp_pymoo.plane.predicates import circle_sign, orient_sign
 
@@ -41,7 +42,7 @@ SPARSE_ROUND_FROM = 5000
 SPARSE_STEP = 8
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exact_area: float) -> int:
     """Walk from triangle ``start`` to the triangle that holds (x, y), or to the ghost beyond the hull edge it sees."""
     t = start
@@ -88,7 +89,7 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
         t = mesh[h + 4] & TRIANGLE
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _ghost_in_conflict(xy: np.ndarray, u: int, v: int, d: int, x: float, y: float, exact_area: float) -> bool:
     if d > LAST_INDEX:
         # A hull edge with p on its inner side: in conflict only when p lies on the edge itself.
@@ -101,7 +102,7 @@ def _ghost_in_conflict(xy: np.ndarray, u: int, v: int, d: int, x: float, y: floa
     return orient_sign(xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, exact_area) == wanted
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def insert(
     xy: np.ndarray,
     mesh: np.ndarray,
@@ -186,7 +187,7 @@ def insert(
             return t0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def triangulate(
     xy: np.ndarray,
     n: int,
@@ -290,3 +291,18 @@ def triangulate(
                 t = insert(xy, mesh, end, t, p, exact_area, exact_lift)
                 end += 2 * RECORD
     return end
+
+
+@entry
+def triangulate_once(
+    xy: np.ndarray,
+    n: int,
+    first: np.ndarray,
+    order: np.ndarray,
+    inserted: np.ndarray,
+    mesh: np.ndarray,
+    exact_area: float,
+    exact_lift: float,
+) -> int:
+    """Do what :func:`triangulate` does, called from Python."""
+    return triangulate(xy, n, first, order, inserted, mesh, exact_area, exact_lift)

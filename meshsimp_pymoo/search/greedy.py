@@ -21,17 +21,18 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 
 from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.moves import (
     cells_around,
     exchange,
-    loop,
+    is_site,
     n_cells,
     n_triangles,
-    site_mask,
+    snapshot,
     sites_around,
     total_cost,
     try_exchange,
@@ -114,7 +115,7 @@ def thinning(
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
     with surface.books(np.ones(n_all, bool) if kept is None else kept | fixed, fixed=fixed) as books:
-        sites = site_mask(ground, books, n_all)
+        sites, _, _ = snapshot(ground, books, n_all)
         n = int((sites & ~fixed).sum())
         removed, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
         n_removed = thin(ground, books, n_all, fixed, least, np.inf, removed, error, triangles)
@@ -175,7 +176,7 @@ def greedy_insertion(
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
     with surface.books(fixed, fixed=fixed) as books:
-        sites = np.flatnonzero(site_mask(ground, books, n_all))
+        sites = np.flatnonzero(snapshot(ground, books, n_all)[0])
         n = n_all - len(sites) if most is None else min(most, n_all - len(sites))
         inserted, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
         n_inserted = _grow(ground, books, n_all, choose == "point", inserted, error, triangles)
@@ -198,13 +199,13 @@ def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:
 # ------------------------------------------------------------------------------------------------- a heap of keys
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _before(key: np.ndarray, a: int, b: int) -> bool:
     """Order of the heap: by key, then by index, so that ties do not depend on history."""
     return key[a] < key[b] or (key[a] == key[b] and a < b)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _sift_up(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int) -> None:
     v = heap[k]
     while k > 0:
@@ -218,7 +219,7 @@ def _sift_up(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int) -> None:
     at[v] = k
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int) -> None:
     v = heap[k]
     while True:
@@ -236,7 +237,7 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
     at[v] = k
 
 
-@loop
+@entry
 def thin(
     ground: Any,
     books: Any,
@@ -268,13 +269,14 @@ def thin(
     """
     g = borrowed(ground)
     live = borrowed(books)
-    sites = site_mask(g, live, n_all)
-    key = np.full(n_all, np.inf)
+    key = np.empty(n_all, np.float64)
     heap = np.empty(n_all, np.int32)
-    at = np.full(n_all, -1, np.int32)
+    at = np.empty(n_all, np.int32)
     n = 0
     for v in range(n_all):
-        if sites[v] and not fixed[v]:
+        key[v] = np.inf
+        at[v] = -1
+        if is_site(g, live, v) and not fixed[v]:
             key[v], _ = try_exchange(g, live, v, -1, np.inf)
             heap[n] = v
             at[v] = n
@@ -317,7 +319,7 @@ def thin(
     return n_removed
 
 
-@loop
+@entry
 def _grow(
     ground: Any,
     books: Any,
@@ -331,10 +333,14 @@ def _grow(
     g = borrowed(ground)
     live = borrowed(books)
     most_cells = 2 * n_all + 8
-    key = np.full(most_cells, np.inf)  # minus what makes a cell urgent
-    best = np.full(most_cells, -1, np.int32)
+    key = np.empty(most_cells, np.float64)  # minus what makes a cell urgent
+    best = np.empty(most_cells, np.int32)
     heap = np.empty(most_cells, np.int32)
-    at = np.full(most_cells, -1, np.int32)
+    at = np.empty(most_cells, np.int32)
+    for r in range(most_cells):
+        key[r] = np.inf
+        best[r] = -1
+        at[r] = -1
     n = 0
     changed = np.empty(most_cells, np.int64)
     n_changed = n_cells(g, live)

@@ -10,7 +10,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 from numpy.typing import NDArray
 
 from meshsimp_pymoo.arrays import BoolArray
@@ -20,10 +21,9 @@ from meshsimp_pymoo.surface.moves import (
     exchange,
     is_site,
     is_taken,
-    loop,
     n_sites,
     n_triangles,
-    site_mask,
+    snapshot,
     total_cost,
     try_exchange,
     urgency,
@@ -61,7 +61,7 @@ SIZE_TRIES = 12
 FIT_FAILURES = 20
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _next(state: np.ndarray) -> int:
     """Advance a xorshift64* generator (Vigna 2016); 63 bits."""
     x = state[0]
@@ -72,17 +72,17 @@ def _next(state: np.ndarray) -> int:
     return np.int64((x * np.uint64(2685821657736338717)) >> np.uint64(1))
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _below(state: np.ndarray, n: int) -> int:
     return _next(state) % n
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _unit(state: np.ndarray) -> float:
     return ((_next(state) >> 10) + 1) * 2.0**-53
 
 
-@loop
+@inner
 def _urgent(g: Any, live: Any, n: int, state: np.ndarray) -> int:
     """Draw a vertex that is no site, from the triangle with the largest error of a few; -1 if none was met."""
     best = -1
@@ -97,7 +97,13 @@ def _urgent(g: Any, live: Any, n: int, state: np.ndarray) -> int:
     return best
 
 
-@loop
+@inner
+def _copy(to: np.ndarray, values: np.ndarray, n: int) -> None:
+    for k in range(n):
+        to[k] = values[k]
+
+
+@entry
 def _anneal(
     ground: Any,
     books: Any,
@@ -128,7 +134,7 @@ def _anneal(
     now = total_cost(g, live)
     best = now
     n_best = n_movable
-    best_movable[:n_best] = movable[:n_best]
+    _copy(best_movable, movable, n_best)
     kept_best = True  # whether best_movable holds the best state already
     temperature = hot
     for step in range(moves):
@@ -167,7 +173,7 @@ def _anneal(
         if not change <= limit or triangles > slack:
             continue
         if change > 0.0 and not kept_best and now <= best:
-            best_movable[:n_movable] = movable[:n_movable]
+            _copy(best_movable, movable, n_movable)
             n_best = n_movable
             kept_best = True
         if not exchange(g, live, v, w):
@@ -185,12 +191,12 @@ def _anneal(
             best = now
             kept_best = False
     if not kept_best and now <= best:
-        best_movable[:n_movable] = movable[:n_movable]
+        _copy(best_movable, movable, n_movable)
         n_best = n_movable
     return n_best
 
 
-@loop
+@entry
 def _fit(
     ground: Any, books: Any, n: int, fixed: np.ndarray, by_triangles: bool, wanted: int, state: np.ndarray
 ) -> None:
@@ -234,15 +240,8 @@ def _fit(
             failures += 1
 
 
-@loop
-def _state(ground: Any, books: Any) -> tuple[float, int]:
-    return total_cost(ground, books), n_triangles(ground, books)
-
-
 def _thin_to(ground: Any, books: Any, pinned: BoolArray, triangles: int) -> None:
     """Remove the vertices that add the least error until there are at most so many triangles."""
-    if _state(ground, books)[1] <= triangles:
-        return
     n = len(pinned) + 1
     removed, error, counts = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
     thin(ground, books, len(pinned), pinned, triangles, np.inf, removed, error, counts)
@@ -307,11 +306,12 @@ def relocate(
         if size is not None:
             _fit(ground, books, n, pinned, False, size, state)
         if triangles is not None:
-            _thin_to(ground, books, pinned, triangles)
+            if snapshot(ground, books, n)[2] > triangles:
+                _thin_to(ground, books, pinned, triangles)
             _fit(ground, books, n, pinned, True, triangles, state)
-        result: BoolArray = site_mask(ground, books, n)
+        result: BoolArray
+        result, total, n_now = snapshot(ground, books, n)
         rows = np.flatnonzero(result & ~pinned)
-        total, n_now = _state(ground, books)
         if moves > 0 and np.isfinite(total):
             movable = np.empty(n, np.int64)
             movable[: len(rows)] = rows

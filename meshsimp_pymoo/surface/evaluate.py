@@ -20,7 +20,8 @@ import itertools
 import threading
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.plane.emission import emit, outline
@@ -35,6 +36,10 @@ from meshsimp_pymoo.workers import thread_pool
 COVER_TOLERANCE = 1e-9
 
 NO_SITE = 0xFFFFFFFF
+
+# In place of the deviations and the cover of each vertex, where they are not asked for.
+NO_DEVIATION = np.empty(0, np.float64)
+NO_COVER = np.empty(0, np.bool_)
 
 
 class Workspace:
@@ -67,7 +72,7 @@ def _workspace(n_vertices: int) -> Workspace:
     return kept[1]
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _gather(
     xy: np.ndarray,
     z: np.ndarray,
@@ -97,7 +102,21 @@ def _gather(
     return n
 
 
-@njit(cache=True, nogil=True)
+@inner
+def _place_of(sites: np.ndarray, n: int, vertex: int) -> int:
+    """Return where a vertex stands among the first n sites, which ascend; -1 if it is none of them."""
+    low = 0
+    high = n
+    while low < high:
+        middle = (low + high) >> 1
+        if sites[middle] < vertex:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < n and sites[low] == vertex else -1
+
+
+@inner
 def _measure_bare(
     xy: np.ndarray,
     z: np.ndarray,
@@ -157,7 +176,7 @@ def _measure_bare(
             covered[i] = is_covered
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _evaluate_one(
     ground: Ground,
     workspace: tuple,  # type: ignore[type-arg]
@@ -177,8 +196,7 @@ def _evaluate_one(
     n = _gather(xy, z, kept, ground.has_twins, sites, dropped, site_xy, site_z)
     first = np.empty(len(corners), np.int64)
     for k in range(len(corners)):
-        q = np.searchsorted(sites[:n], corners[k])
-        first[k] = q if q < n and sites[q] == corners[k] else -1
+        first[k] = _place_of(sites, n, corners[k])
     end = triangulate(site_xy, n, first, np.empty(0, np.int64), inserted, mesh, exact_area, ground.exact_lift)
     n_triangles = emit(
         site_xy,
@@ -301,17 +319,20 @@ def _evaluate_one(
     return end
 
 
-@njit(cache=True, nogil=True)
-def _evaluate_many(
+@entry
+def _evaluate(
     ground: Ground,
     workspace: tuple,  # type: ignore[type-arg]
     kept: np.ndarray,
     table: np.ndarray,
-) -> None:
-    no_deviation = np.empty(0, np.float64)
-    no_cover = np.empty(0, np.bool_)
+    deviation: np.ndarray,
+    covered: np.ndarray,
+) -> int:
+    """Fill a row of ``table`` for each subset; return the end of the triangles' records of the last."""
+    end = 0
     for k in range(len(kept)):
-        _evaluate_one(ground, workspace, kept[k], table[k], no_deviation, no_cover)
+        end = _evaluate_one(ground, workspace, kept[k], table[k], deviation, covered)
+    return end
 
 
 def evaluate_subsets(ground: Ground, kept: BoolArray, *, n_threads: int = 1, regions: int = 0) -> FloatArray:
@@ -346,7 +367,7 @@ def evaluate_subsets(ground: Ground, kept: BoolArray, *, n_threads: int = 1, reg
     table = np.empty((len(rows), REGIONS + regions))
 
     def evaluate(part: slice) -> None:
-        _evaluate_many(ground, _workspace(n).arrays, rows[part], table[part])
+        _evaluate(ground, _workspace(n).arrays, rows[part], table[part], NO_DEVIATION, NO_COVER)
 
     if n_threads <= 1 or len(rows) < 2 * n_threads:
         evaluate(slice(0, len(rows)))
@@ -379,7 +400,7 @@ def triangulate_subset(ground: Ground, kept: BoolArray) -> tuple[IntArray, Float
     n = len(ground.z)
     arrays = _workspace(n).arrays
     row, deviation, covered = np.empty(REGIONS), np.zeros(n), np.zeros(n, np.bool_)
-    end = _evaluate_one(ground, arrays, kept, row, deviation, covered)
+    end = _evaluate(ground, arrays, kept[None], row[None], deviation, covered)
     sites, mesh, emitted = arrays[0], arrays[5], arrays[6]
     records = mesh[:end].reshape(-1, RECORD)[emitted[: end // RECORD] == 1, :3].astype(np.int64)
     faces = canonical_faces(records) if row[TRIANGLES] else records[:0]

@@ -25,7 +25,8 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.plane.borrow import borrowed
@@ -108,7 +109,7 @@ class Live(NamedTuple):
     amount: np.ndarray  # errors, see the names above
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _turn(xy: np.ndarray, a: int, b: int, c: int, exact_area: float) -> int:
     """Sign of the area of vertices (a, b, c)."""
     x = xy[2 * c]
@@ -116,7 +117,7 @@ def _turn(xy: np.ndarray, a: int, b: int, c: int, exact_area: float) -> int:
     return orient_sign(xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, exact_area)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _ghost_conflict(xy: np.ndarray, a: int, b: int, q: int, exact_area: float) -> bool:
     """Whether q lies beyond the hull edge with exterior left of a -> b, or inside that edge."""
     sign = _turn(xy, a, b, q, exact_area)
@@ -128,7 +129,7 @@ def _ghost_conflict(xy: np.ndarray, a: int, b: int, q: int, exact_area: float) -
     return low < xy[2 * q + k] < high
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _tied_conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float) -> bool:
     """Whether q of four cocircular points counts as inside the circle of (a, b, c): the largest index is cut off."""
     last = max(max(a, b), max(c, q))
@@ -141,7 +142,7 @@ def _tied_conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: f
     return _turn(xy, a, b, q, exact_area) > 0
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float, exact_lift: float) -> bool:
     """Whether vertex q lies inside the circle of triangle (a, b, c), any of which may be the one at infinity."""
     if q > LAST_INDEX:
@@ -162,7 +163,7 @@ def _conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float,
     return _tied_conflict(xy, a, b, c, q, exact_area)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _cavity(
     xy: np.ndarray,
     mesh: np.ndarray,
@@ -202,7 +203,7 @@ def _cavity(
     return n_cavity, n_rim
 
 
-@njit(cache=True, nogil=True)
+@inner
 def triangles_around(mesh: np.ndarray, t: int, p: int, star: np.ndarray, rim: np.ndarray, ring: np.ndarray) -> int:
     """List the triangles around p counter-clockwise, the halfedges outside its ring and the ring's vertices."""
     first = t
@@ -219,7 +220,7 @@ def triangles_around(mesh: np.ndarray, t: int, p: int, star: np.ndarray, rim: np
             return m
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _fill(
     xy: np.ndarray,
     ring: np.ndarray,
@@ -282,7 +283,7 @@ def _fill(
     return n + 1
 
 
-@njit(cache=True, nogil=True)
+@inner
 def weighed_cost(g: Ground, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, if that is not d itself (``g.weighed``)."""
     if g.squared:
@@ -290,7 +291,7 @@ def weighed_cost(g: Ground, d: float, i: int) -> float:
     return d * g.weight[i] if len(g.weight) > 0 else d
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def deviation_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) -> float:
     """d_p of vertex i on the plane of triangle (a, b, c)."""
     ax = xy[2 * a]
@@ -307,7 +308,7 @@ def deviation_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) 
     return abs(((area - wb - wc) * z[a] + wb * z[b] + wc * z[c]) / area - z[i])
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _is_inside(g: Ground, a: int, b: int, c: int) -> bool:
     """Whether the footprint holds the centroid of (a, b, c)."""
     if g.side == 0:
@@ -318,7 +319,7 @@ def _is_inside(g: Ground, a: int, b: int, c: int) -> bool:
     return inside(xy, g.side, g.state, g.start, g.items, g.faces, x3, y3)
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _is_thin(g: Ground, a: int, b: int, c: int) -> bool:
     xy = g.xy
     ux = xy[2 * b] - xy[2 * a]
@@ -335,12 +336,12 @@ def _is_thin(g: Ground, a: int, b: int, c: int) -> bool:
 # Each access to an array of ``live`` costs a counted reference, so what runs often takes the arrays it needs as locals.
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _slot(h: int) -> int:
     return (h >> 3) * 3 + (h & 3)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _set_segment(live: Live, h: int, wanted: bool) -> None:
     """Make halfedge h an outline segment, or no longer one."""
     count = live.tally
@@ -370,7 +371,7 @@ def _set_segment(live: Live, h: int, wanted: bool) -> None:
         count[N_DEAD] += 1
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _forget_bare(live: Live, i: int) -> None:
     at = live.bare_at[i]
     if at < 0:
@@ -383,7 +384,7 @@ def _forget_bare(live: Live, i: int) -> None:
     live.amount[BARE_ERROR] -= live.cost[i]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _note_bare(live: Live, i: int) -> None:
     if live.bare_at[i] >= 0:
         return
@@ -394,7 +395,7 @@ def _note_bare(live: Live, i: int) -> None:
     live.cost[i] = 0.0
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _gap(xy: np.ndarray, mesh: np.ndarray, h: int, x: float, y: float) -> float:
     """Squared distance in the plane from (x, y) to halfedge h."""
     a = mesh[h]
@@ -410,7 +411,7 @@ def _gap(xy: np.ndarray, mesh: np.ndarray, h: int, x: float, y: float) -> float:
     return dx * dx + dy * dy
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _key(mesh: np.ndarray, h: int) -> int:
     """Rank of segment h among equally near ones: that of its triangle in the written mesh, then its side."""
     t = h & TRIANGLE
@@ -424,7 +425,7 @@ def _key(mesh: np.ndarray, h: int) -> int:
     return (a << 33) | (b << 2) | (((h & 3) - least + 3) % 3)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _bare_cost(
     xy: np.ndarray, z: np.ndarray, mesh: np.ndarray, h: int, i: int, unit: float, nearest: bool
 ) -> float:
@@ -454,7 +455,7 @@ def _bare_cost(
     return np.sqrt((ex * ex + ey * ey) * unit * unit + dz * dz)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _settle_bare(g: Ground, live: Live) -> None:
     """Give the bare vertices their nearest segment again, where segments came, went or a vertex is new."""
     xy = g.xy
@@ -504,7 +505,7 @@ def _settle_bare(g: Ground, live: Live) -> None:
 # ------------------------------------------------------------------------------------------------ operations
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
     """Take triangles out of the books: their vertices into the pool, their errors, their segments."""
     count = live.tally
@@ -546,7 +547,7 @@ def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
     count[N_TOUCHED] = n_touched
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _settle_thin(g: Ground, live: Live, seed: int) -> None:
     """Decide for the chain of thin triangles around ``seed`` whether it is peeled: whether it reaches the outside."""
     mesh = live.mesh
@@ -589,7 +590,7 @@ def _settle_thin(g: Ground, live: Live, seed: int) -> None:
         kind[t >> 3] = (bits | EMITTED) if (bits & (INSIDE | PEELED)) == INSIDE else (bits & ~EMITTED)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _settle(g: Ground, live: Live, half: bool) -> None:
     """Enter the triangles of the region into the books and place the pooled vertices.
 
@@ -714,7 +715,7 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
     count[N_ADDED] = 0
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _new_record(live: Live) -> int:
     count = live.tally
     if count[N_FREE] > 0:
@@ -725,7 +726,7 @@ def _new_record(live: Live) -> int:
     return t
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _insert(g: Ground, live: Live, p: int, half: bool) -> None:
     """Insert vertex p; ``half`` as in :func:`_settle`."""
     mesh = live.mesh
@@ -767,7 +768,7 @@ def _insert(g: Ground, live: Live, p: int, half: bool) -> None:
     _settle(g, live, half)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
     """Remove site p; ``half`` as in :func:`_settle`."""
     mesh = live.mesh
@@ -819,7 +820,7 @@ def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _total(live: Live) -> float:
     if live.tally[N_EMITTED] == 0:
         return np.inf
@@ -827,7 +828,7 @@ def _total(live: Live) -> float:
 
 
 @answers(moves.exchange, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
     """Remove site v and insert vertex w, either of them -1 for none; return False if v cannot go, with nothing changed.
 
@@ -841,7 +842,7 @@ def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
     before = _total(live)
     n = live.tally[N_EMITTED]
@@ -854,7 +855,7 @@ def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]
 
 
 @answers(moves.try_exchange, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def try_exchange(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, int]:
     """Return the change of cost and of the number of triangles if site v went and vertex w came; -1 means none.
 
@@ -866,7 +867,7 @@ def try_exchange(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[f
     return change, triangles
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _enter_form(
     xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, x0: float, y0: float, forms: np.ndarray, k: int
 ) -> None:
@@ -891,7 +892,7 @@ def _enter_form(
     forms[k, 11] = z[a] + forms[k, 8] * rise_b + forms[k, 2] * rise_c
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _inward(forms: np.ndarray, k: int, x: float, y: float) -> float:
     """How far inside triangle k (x, y) lies, twice the least area with a side; negative outside."""
     return min(
@@ -900,7 +901,7 @@ def _inward(forms: np.ndarray, k: int, x: float, y: float) -> float:
     )
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _may_go(mesh: np.ndarray, kind: np.ndarray, segment_of: np.ndarray, t: int, n_bare: int) -> int:
     """Say whether triangle t can be replaced without a look at the outline: 1 emitted, 0 a ghost, -1 no."""
     if n_bare > 0:
@@ -912,7 +913,7 @@ def _may_go(mesh: np.ndarray, kind: np.ndarray, segment_of: np.ndarray, t: int, 
     return 0 if n_bare == 0 and (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX else -1
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[int, int]:
     """List the triangles in conflict with w once the ears have replaced the star; as :func:`_cavity`.
 
@@ -958,7 +959,7 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
     return n_cavity, n_rim
 
 
-@njit(cache=True, nogil=True, forceinline=True)
+@inner
 def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, int]:
     """As :func:`try_exchange`, but nan where the outline is touched so that bare vertices may change."""
     unknown = (np.nan, 0)
@@ -1065,13 +1066,13 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
     return change, n - n_emitted
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _build(
-    g: Ground, live: Live, sites: np.ndarray, site_xy: np.ndarray, first: np.ndarray, inserted: np.ndarray
+    ground: Ground, books: Live, sites: np.ndarray, site_xy: np.ndarray, first: np.ndarray, inserted: np.ndarray
 ) -> bool:
     """Triangulate the sites from scratch and enter everything into the books."""
-    g = borrowed(g)
-    live = borrowed(live)
+    g = borrowed(ground)
+    live = borrowed(books)
     mesh = live.mesh
     count = live.tally
     end = triangulate(
@@ -1129,32 +1130,32 @@ def _build(
 
 
 @answers(moves.total_cost, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def total_cost(g: Ground, live: Live) -> float:
     """Sum of the costs; inf where there is no mesh."""
     return _total(live)
 
 
 @answers(moves.n_triangles, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _n_triangles(g: Ground, live: Live) -> int:
     return live.tally[N_EMITTED]
 
 
 @answers(moves.n_sites, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _n_sites(g: Ground, live: Live) -> int:
     return live.tally[N_SITES]
 
 
 @answers(moves.is_site, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _is_site(g: Ground, live: Live, v: int) -> bool:
     return live.site[v] != 0
 
 
 @answers(moves.is_taken, Ground)
-@njit(cache=True, nogil=True)
+@inner
 def _is_taken(g: Ground, live: Live, w: int) -> bool:
     """Whether some site has the position of vertex w; those at one position follow each other."""
     xy = g.xy
@@ -1171,13 +1172,13 @@ def _is_taken(g: Ground, live: Live, w: int) -> bool:
 
 
 @answers(moves.urgency, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _urgency(g: Ground, live: Live, v: int) -> float:
     return live.subtotal[live.place[v] >> 3] if live.bare_at[v] < 0 else live.cost[v]
 
 
 @answers(moves.sites_around, Ground)
-@njit(cache=True, nogil=True)
+@inner
 def _sites_around(g: Ground, live: Live, v: int, found: np.ndarray) -> int:
     m = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
     n = 0
@@ -1189,13 +1190,13 @@ def _sites_around(g: Ground, live: Live, v: int, found: np.ndarray) -> int:
 
 
 @answers(moves.n_cells, Ground)
-@njit(cache=True, nogil=True, forceinline=True)
+@inner(inline=True)
 def _n_cells(g: Ground, live: Live) -> int:
     return live.tally[END] // RECORD
 
 
 @answers(moves.cells_around, Ground)
-@njit(cache=True, nogil=True)
+@inner
 def _cells_around(g: Ground, live: Live, v: int, found: np.ndarray) -> int:
     m = triangles_around(live.mesh, live.place[v], v, live.cavity, live.rim, live.ring)
     for k in range(m):
@@ -1203,7 +1204,7 @@ def _cells_around(g: Ground, live: Live, v: int, found: np.ndarray) -> int:
     return m
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _at_a_corner(xy: np.ndarray, mesh: np.ndarray, t: int, i: int) -> bool:
     """Whether vertex i has the position of a corner of triangle t, where there is no room for it."""
     for k in range(3):
@@ -1214,7 +1215,7 @@ def _at_a_corner(xy: np.ndarray, mesh: np.ndarray, t: int, i: int) -> bool:
 
 
 @answers(moves.worst_in, Ground)
-@njit(cache=True, nogil=True)
+@inner
 def _worst_in(g: Ground, live: Live, cell: int) -> tuple[int, float, float]:
     mesh = live.mesh
     t = cell * RECORD
@@ -1241,6 +1242,21 @@ def _worst_in(g: Ground, live: Live, cell: int) -> tuple[int, float, float]:
             worst = i
         i = live.following[i]
     return worst, most, whole
+
+
+# the same for Python, vertex by vertex
+
+
+@entry
+def exchange_once(g: Ground, live: Live, v: int, w: int) -> bool:
+    """Do what :func:`exchange` does, called from Python."""
+    return exchange(borrowed(g), borrowed(live), v, w)
+
+
+@entry
+def try_exchange_once(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
+    """Do what :func:`try_exchange` does without a limit, called from Python."""
+    return try_exchange(borrowed(g), borrowed(live), v, w, np.inf)
 
 
 # ------------------------------------------------------------------------------------------------------------ the books

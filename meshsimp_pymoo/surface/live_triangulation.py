@@ -11,7 +11,15 @@ from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.triangulation import RECORD
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.live import EMITTED, END, N_EMITTED, build, exchange, make_live, total_cost, try_exchange
+from meshsimp_pymoo.surface.live import (
+    EMITTED,
+    END,
+    N_EMITTED,
+    build,
+    exchange_once,
+    make_live,
+    try_exchange_once,
+)
 from meshsimp_pymoo.surface.surface import error_of, movable_ground
 
 
@@ -69,7 +77,7 @@ class LiveTriangulation:
     @property
     def error(self) -> float:
         """The error in the chosen measure [model units]."""
-        return float(error_of(self.surface, total_cost(self.ground, self.live)))
+        return float(error_of(self.surface, self._total()))
 
     @property
     def triangles(self) -> int:
@@ -91,7 +99,7 @@ class LiveTriangulation:
         held = self._site_at(v)
         self._kept[v] = True
         if held is None:
-            exchange(self.ground, self.live, -1, v)
+            exchange_once(self.ground, self.live, -1, v)
         elif v < held:
             self._replace(held, v)
         return self.error - before
@@ -105,7 +113,7 @@ class LiveTriangulation:
             heir = self._site_at(v, kept=True)
             if heir is not None:
                 self._replace(v, heir)
-            elif not exchange(self.ground, self.live, v, -1):
+            elif not exchange_once(self.ground, self.live, v, -1):
                 self._kept[v] = True
                 raise ValueError(f"without vertex {v} the kept vertices of {self.model.name} span no triangle")
         self._kept[v] = False
@@ -122,26 +130,30 @@ class LiveTriangulation:
         v = self._index(vertex, kept=False)
         if self._site_at(v) is not None:
             return self._tried(lambda: self.insert(v), lambda: self.remove(v))
-        return self._measured(*try_exchange(self.ground, self.live, -1, v, np.inf))
+        return self._measured(*try_exchange_once(self.ground, self.live, -1, v))
 
     def try_remove(self, vertex: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if the vertex were dropped (inf: it cannot)."""
         v = self._index(vertex, kept=True)
         if self._has_twins:
             return self._tried(lambda: self.remove(v), lambda: self.insert(v))
-        return self._measured(*try_exchange(self.ground, self.live, v, -1, np.inf))
+        return self._measured(*try_exchange_once(self.ground, self.live, v, -1))
 
     def try_move(self, vertex: int, to: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if one vertex were dropped for another."""
         if self._has_twins:
             return self._tried(lambda: self.move(vertex, to), lambda: self.move(to, vertex))
         v, w = self._index(vertex, kept=True), self._index(to, kept=False)
-        return self._measured(*try_exchange(self.ground, self.live, v, w, np.inf))
+        return self._measured(*try_exchange_once(self.ground, self.live, v, w))
+
+    def _total(self) -> float:
+        """Return the sum of the costs."""
+        return float(self.live.amount.sum()) if self.triangles else np.inf
 
     def _measured(self, change: float, triangles: int) -> tuple[float, int]:
         """Turn a change of the sum of costs into one of the error."""
         if self.ground.squared:
-            change = error_of(self.surface, total_cost(self.ground, self.live) + change) - self.error
+            change = error_of(self.surface, self._total() + change) - self.error
         return float(change), int(triangles)
 
     def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
@@ -152,11 +164,11 @@ class LiveTriangulation:
         return result
 
     def _replace(self, old: int, new: int) -> None:
-        if not exchange(self.ground, self.live, old, -1):
+        if not exchange_once(self.ground, self.live, old, -1):
             # With three sites left the triangulation is built anew.
             build(self.ground, self.live, self.surface.sites(self._kept), self.model.name)
             return
-        exchange(self.ground, self.live, -1, new)
+        exchange_once(self.ground, self.live, -1, new)
 
     def _site_at(self, v: int, *, kept: bool = False) -> int | None:
         """Return the site (or with ``kept`` the first kept vertex) at the position of v, if there is one."""

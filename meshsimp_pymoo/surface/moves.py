@@ -34,42 +34,12 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
-from numba.core.caching import FunctionCache
 from numba.extending import overload
 
+from meshsimp_pymoo.compiling.functions import ANSWER_OPTIONS, entry
+from meshsimp_pymoo.plane.borrow import borrowed
+
 Function = TypeVar("Function", bound=Callable[..., Any])
-PACKAGE = __name__.partition(".")[0]
-
-
-class _OwnRecords(FunctionCache):
-    """Keeps on disk what was compiled for the records of this package alone.
-
-    Code for the records of others holds their answers, which may change or be gone while this package stays the same;
-    and the index of a compiled function cannot be read any more where one record of it cannot be imported.
-    """
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled function from disk, if it is there."""
-        return super().load_overload(sig, target_context) if _is_own(sig) else None
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the compiled function on disk, if it is for records of this package."""
-        if _is_own(sig):
-            super().save_overload(sig, data)
-
-
-def _is_own(sig: Any) -> bool:
-    records = (getattr(kind, "instance_class", None) for kind in getattr(sig, "args", sig))
-    return all(record.__module__.partition(".")[0] == PACKAGE for record in records if record is not None)
-
-
-def loop(function: Function) -> Function:
-    """Compile a function that asks these questions: once for each class of ground, without Python's lock."""
-    compiled: Any = njit(nogil=True)(function)
-    compiled._cache = _OwnRecords(function)
-    loops: Function = compiled
-    return loops
 
 
 def answers(question: Callable[..., Any], record: type) -> Callable[[Function], Function]:
@@ -96,7 +66,8 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
             return called if getattr(ground, "instance_class", None) is record else None
 
         # inlined, or every call would hand over some fifty arrays: annealing takes half as long again
-        overload(question, strict=False, jit_options={"forceinline": True, "nogil": True})(choose)
+        overload(question, strict=False, jit_options=ANSWER_OPTIONS)(choose)
+        question.__dict__.setdefault("parts", []).append(function)
         return function
 
     return register
@@ -169,10 +140,12 @@ def cells_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     return int(_unanswered())
 
 
-@loop
-def site_mask(ground: Any, books: Any, n: int) -> np.ndarray:
-    """Return which of n vertices are sites, as a bool array (n,)."""
-    mask = np.zeros(n, np.bool_)
+@entry
+def snapshot(ground: Any, books: Any, n: int) -> tuple[np.ndarray, float, int]:
+    """Return which of n vertices are sites, as a bool array (n,), the sum of the costs and the number of triangles."""
+    g = borrowed(ground)
+    live = borrowed(books)
+    mask = np.empty(n, np.bool_)
     for v in range(n):
-        mask[v] = is_site(ground, books, v)
-    return mask
+        mask[v] = is_site(g, live, v)
+    return mask, total_cost(g, live), n_triangles(g, live)

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry, inner
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -655,7 +656,7 @@ def _overlaps(triangles: FloatArray, members: IntArray) -> IntArray:
     return _overlapping_pairs(xy, members, cells_low, cells_high, shape, OVERLAP_TOLERANCE * extent)
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _overlapping_pairs(
     xy: np.ndarray,
     members: np.ndarray,
@@ -670,9 +671,12 @@ def _overlapping_pairs(
         for i in range(cells_low[m, 0], cells_high[m, 0] + 1):
             for j in range(cells_low[m, 1], cells_high[m, 1] + 1):
                 start[i * rows + j + 1] += 1
-    start = np.cumsum(start)
-    fill = start[:-1].copy()
-    content = np.empty(start[-1], np.int64)
+    # plain loops: NumPy's sums and slices take Numba two seconds to compile
+    fill = np.empty(columns * rows, np.int64)
+    for cell in range(columns * rows):
+        fill[cell] = start[cell]
+        start[cell + 1] += start[cell]
+    content = np.empty(start[columns * rows], np.int64)
     is_member = np.zeros(len(xy), np.bool_)
     for m in members:
         is_member[m] = True
@@ -698,7 +702,9 @@ def _overlapping_pairs(
                         continue
                     if n == len(found):
                         longer = np.empty((2 * n, 2), np.int64)
-                        longer[:n] = found
+                        for q in range(n):
+                            longer[q, 0] = found[q, 0]
+                            longer[q, 1] = found[q, 1]
                         found = longer
                     found[n, 0] = m
                     found[n, 1] = f
@@ -706,7 +712,7 @@ def _overlapping_pairs(
     return found[:n]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@inner(inline=True)
 def _separated(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
     """Tell whether an edge of the counter-clockwise triangle `a` has all of `b` on its outer side."""
     for i in range(3):
@@ -723,7 +729,7 @@ def _separated(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _lower_ones(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     """Return, of each pair, the triangle lower at the centre of the overlap (in a tie the later)."""
     lower = np.empty(len(pairs), np.int64)
@@ -771,7 +777,7 @@ def _lower_ones(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     return lower
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _height(t: np.ndarray, x: float, y: float) -> float:
     """Return the height of a triangle's plane over (x, y)."""
     bx, by, bz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
@@ -781,7 +787,7 @@ def _height(t: np.ndarray, x: float, y: float) -> float:
     return t[0, 2] + ((x * cy - y * cx) * bz + (bx * y - by * x) * cz) / area
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _seen_sides(triangles: np.ndarray, is_front: np.ndarray, rays: int) -> tuple[int, int]:
     """Count the vertical rays of a lattice that meet first, from above, a front and a back."""
     x_low, y_low = triangles[:, :, 0].min(), triangles[:, :, 1].min()

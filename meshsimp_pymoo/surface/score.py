@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.plane.hilbert import hilbert_keys
@@ -124,7 +125,7 @@ def _look_at_mesh(
 SOLID_AREA = 1e-14
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _mesh_deviation(
     samples: np.ndarray,
     z: np.ndarray,

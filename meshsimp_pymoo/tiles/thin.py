@@ -19,7 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.plane.order import vector_order
@@ -147,7 +148,7 @@ def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
     return _hull_levels(np.ascontiguousarray(saved, np.int64), np.ascontiguousarray(error, np.float64))
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
     m = len(saved)
     hull = np.empty(m, np.int64)
@@ -233,7 +234,7 @@ def _model(
     )
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _fix_foreign(
     xy: np.ndarray,
     mesh: np.ndarray,

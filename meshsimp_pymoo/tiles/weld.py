@@ -13,12 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.order import vector_order
-from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate_once
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -89,7 +90,7 @@ def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
     samples, xy, z = kept[order], np.ascontiguousarray(xy[order]), z[order]
     first = np.flatnonzero(np.isin(samples, grid.corners)).astype(np.int64)
     records = np.empty(16 * len(samples), np.uint32)
-    end = triangulate(
+    end = triangulate_once(
         xy.ravel(), len(samples), first, np.empty(0, np.int64), np.empty(len(samples), np.uint8), records,
         *grid.exact_ranges,
     )  # fmt: skip
@@ -158,7 +159,7 @@ def pieces(grid: HeightGrid, mesh: WeldedMesh, size: int) -> Iterator[tuple[int,
         yield int(tile_row[group[0]]), int(tile_column[group[0]]), mesh.samples[used], compact.reshape(-1, 3)
 
 
-@njit(cache=True, nogil=True)
+@entry
 def _measure_rows(
     x: np.ndarray,
     y: np.ndarray,

@@ -18,7 +18,7 @@ from meshsimp_pymoo.formats.source import SourceMesh, build_source, check_points
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.plane.triangulation import INFINITE, RECORD, triangulate
+from meshsimp_pymoo.plane.triangulation import INFINITE, RECORD, triangulate_once
 
 
 def cloud_source(
@@ -120,7 +120,7 @@ def _delaunay(xy: FloatArray) -> IntArray:
     area, lift = exact_ranges(xy)
     records = np.empty(16 * n, np.uint32)
     flat = np.ascontiguousarray(xy).ravel()
-    end = triangulate(flat, n, find_corners(xy), np.empty(0, np.int64), np.empty(n, np.uint8), records, area, lift)
+    end = triangulate_once(flat, n, find_corners(xy), np.empty(0, np.int64), np.empty(n, np.uint8), records, area, lift)
     table = records[:end].reshape(-1, RECORD)
     triangles = table[:, :3].astype(np.int64)
     beyond = (table[:, :3] == INFINITE).any(axis=1)

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from meshsimp_pymoo.compiling.functions import entry
 
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
@@ -118,7 +119,7 @@ def _scan_binary_element(
     return columns, int(end)
 
 
-@njit(cache=True)
+@entry
 def _scan_bytes(
     body: np.ndarray, at: int, n_rows: int, count_sizes: np.ndarray, item_sizes: np.ndarray, big: bool
 ) -> tuple[np.ndarray, np.ndarray, int]:
@@ -186,7 +187,7 @@ def _as_declared(values: FloatArray, item: PlyProperty, name: str) -> AnyArray:
         return values.astype(dtype)
 
 
-@njit(cache=True)
+@entry
 def _scan_numbers(numbers: np.ndarray, at: int, n_rows: int, is_list: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Return where each property of each row starts, its number of values, and the end (-1: too short)."""
     n = len(is_list)

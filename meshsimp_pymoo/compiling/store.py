@@ -1,0 +1,264 @@
+"""Machine code on disk: where it is kept, what it is made from, and who is told when it has to be made.
+
+Numba keeps the code of a function beside its file or in the user's cache folder, and cannot be imported with where
+neither can be written; and it knows what was compiled by the time stamp of that one file, although a function holds the
+code of those that it calls, in other files. Here the folder is the first that can be written of several, at worst none,
+and code is known by what it is made from.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from inspect import getclosurevars
+from pathlib import Path
+from types import CodeType
+from typing import Any, NamedTuple
+
+import llvmlite
+import platformdirs
+from numba.core import config
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache, _CacheLocator
+
+from meshsimp_pymoo.errors import CodeWarning, reason_of
+
+PACKAGE = __name__.partition(".")[0]
+HERE = Path(__file__).resolve().parent.parent
+
+
+# ------------------------------------------------------------------------------------------------------------ the place
+
+
+class Place(NamedTuple):
+    """Where machine code is kept."""
+
+    #: None where no folder can be written: the code is made again by each process.
+    folder: Path | None
+    #: Folders that cannot be used, each with the reason.
+    refused: tuple[str, ...] = ()
+
+
+def _candidates() -> Iterator[Path]:
+    """Yield the folders that may hold machine code, the best first; one that the user names is the only one."""
+    if config.CACHE_DIR:
+        yield Path(config.CACHE_DIR) / PACKAGE
+        return
+    yield HERE / "__pycache__"
+    # two installations have different code
+    home = hashlib.sha256(os.fsencode(HERE)).hexdigest()[:12]
+    yield Path(platformdirs.user_cache_dir(PACKAGE, appauthor=False)) / home
+    owner = os.getuid() if hasattr(os, "getuid") else "user"
+    yield Path(tempfile.gettempdir()) / f"{PACKAGE}-{owner}" / home
+
+
+def _prepare(folder: Path) -> None:
+    """Make a folder, if need be, and see that it can be written, by us alone: what is in it is run."""
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    for part in (folder, folder.parent):
+        found = part.lstat()
+        if hasattr(os, "getuid") and part.parent == Path(tempfile.gettempdir()) and found.st_uid != os.getuid():
+            raise PermissionError(None, "belongs to somebody else")
+    tempfile.TemporaryFile(dir=folder).close()
+
+
+@cache
+def place() -> Place:
+    """Return where machine code is kept: the first folder that can be written.
+
+    ``NUMBA_CACHE_DIR`` if it is set; else the package's own folder, the user's cache folder, the folder for temporary
+    files.
+    """
+    refused = []
+    for folder in _candidates():
+        try:
+            _prepare(folder)
+        except OSError as problem:
+            refused.append(f"{folder}: {reason_of(problem)}")
+        else:
+            return Place(folder, tuple(refused))
+    return Place(None, tuple(refused))
+
+
+# ----------------------------------------------------------------------------------------------- what code is made from
+
+
+def parts_of(function: Any) -> Iterator[Any]:
+    """Yield functions and values from which a function's code is made, of this package and its users, each once.
+
+    A function that stands for others (a question to a surface) has them in ``parts``.
+    """
+    seen: set[int] = set()
+    waiting = [function]
+    while waiting:
+        item = waiting.pop()
+        item = getattr(item, "py_func", getattr(item, "_defn", item))
+        if id(item) in seen:
+            continue
+        seen.add(id(item))
+        yield item
+        if not hasattr(item, "__code__"):
+            continue
+        waiting += getattr(item, "parts", [])
+        found = getclosurevars(item)
+        for value in (*found.globals.values(), *found.nonlocals.values()):
+            owner = getattr(value, "__module__", None)
+            if owner is None or owner.partition(".")[0] not in ("numpy", "numba", "builtins", "typing"):
+                waiting.append(value)
+
+
+def _code(code: CodeType) -> str:
+    """Return what a piece of byte code does, without where it stands."""
+    constants = [_code(item) if isinstance(item, CodeType) else repr(item) for item in code.co_consts]
+    return repr((code.co_code, code.co_names, code.co_varnames, constants))
+
+
+def made_from(function: Any) -> str:
+    """Return a hash of all that a function's machine code is made from."""
+    found = []
+    for item in parts_of(function):
+        if hasattr(item, "__code__"):
+            found.append(f"{item.__module__}.{item.__qualname__} {item.__annotations__} {_code(item.__code__)}")
+        elif isinstance(item, (bool, int, float, str, tuple)):
+            found.append(repr(item))
+    # the order in which they are found follows from the names in the code
+    return hashlib.sha256("\n".join([llvmlite.__version__, *found]).encode()).hexdigest()
+
+
+# ------------------------------------------------------------------------------------------------------------ the cache
+
+
+class _Locator(_CacheLocator):  # type: ignore[misc]
+    """Says to Numba where a function's code is, and what it is made from."""
+
+    def __init__(self, function: Any, folder: Path) -> None:
+        self._function = function
+        self._folder = folder
+        self._py_file = function.__code__.co_filename
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """Return a hash of what the code is made from."""
+        return made_from(self._function)
+
+    def get_disambiguator(self) -> str:
+        """Return what tells functions and levels of optimisation apart in one folder."""
+        module = self._function.__module__.partition(".")[2] or self._function.__module__
+        return f"{module}-O{int(config.OPT)}{'v' if config.LOOP_VECTORIZE else ''}"
+
+    @classmethod
+    def from_function(cls, function: Any, _: str) -> Any:
+        """Return the locator of a function."""
+        folder = place().folder
+        return None if folder is None else cls(function, folder)
+
+
+class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_Locator,)
+
+
+class _Files(FunctionCache):  # type: ignore[misc]
+    _impl_class = _Impl
+
+
+def _is_own(sig: Any) -> bool:
+    """Tell whether the records among the arguments are of this package."""
+    records = (getattr(kind, "instance_class", None) for kind in getattr(sig, "args", sig))
+    return all(record.__module__.partition(".")[0] == PACKAGE for record in records if record is not None)
+
+
+class Stored:
+    """The machine code of one function on disk, as Numba wants it; opened when it is first asked for.
+
+    What is compiled for the records of others stays in memory: it holds their answers, which may change or be gone
+    while this package stays the same, and Numba's index cannot be read where one record of it cannot be imported.
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._begun: dict[int, float] = {}
+
+    @property
+    def _files(self) -> Any:
+        if "files" not in self.__dict__:
+            self.files = NullCache() if place().folder is None else _Files(self._function)
+        return self.files
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder."""
+        path: str | None = self._files.cache_path
+        return path
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled function, if it is there and can be read; what cannot is made again."""
+        found = None
+        if _is_own(sig):
+            try:
+                found = self._files.load_overload(sig, target_context)
+            except Exception as problem:  # whatever unpickling half a file may raise
+                _warn_once(f"compiled code in {self.cache_path} cannot be read ({reason_of(problem)}); it is made again")
+        if found is None:
+            self._begun[threading.get_ident()] = time.perf_counter()
+            for told in _listeners:
+                told(self._function, None)
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a compiled function, if it is for records of this package and there is room."""
+        seconds = time.perf_counter() - self._begun.pop(threading.get_ident(), time.perf_counter())
+        for told in _listeners:
+            told(self._function, seconds)
+        if not _is_own(sig):
+            return
+        try:
+            self._files.save_overload(sig, data)
+        except OSError as problem:
+            _warn_once(f"compiled code cannot be kept in {self.cache_path} ({reason_of(problem)}); it is made each time")
+
+    def enable(self) -> None:
+        """See Numba."""
+        self._files.enable()
+
+    def disable(self) -> None:
+        """See Numba."""
+        self._files.disable()
+
+    def flush(self) -> None:
+        """Forget what is on disk."""
+        self._files.flush()
+
+
+_warned: set[str] = set()
+
+
+def _warn_once(message: str) -> None:
+    if message not in _warned:
+        _warned.add(message)
+        warnings.warn(message, CodeWarning, stacklevel=2)
+
+
+# ----------------------------------------------------------------------------------------------------- who is told of it
+
+# Called with a function whose code is being made, and the seconds it took, or None at the start.
+Listener = Callable[[Any, "float | None"], None]
+_listeners: list[Listener] = []
+
+
+@contextmanager
+def told_of_compiling(listener: Listener) -> Iterator[None]:
+    """Call a listener whenever the code of an entry has to be made, at its start and at its end."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
