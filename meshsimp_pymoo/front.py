@@ -96,8 +96,12 @@ class FrontSolution:
     @cached_property
     def refitted(self) -> Refitted:
         """The same triangles with vertices where their error is least, computed when first used."""
+        return self.refit()
+
+    def refit(self, *, until: float | None = None) -> Refitted:
+        """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
         surface = self.front.problem.surface
-        return surface.refit(self.kept | surface.pinned)
+        return surface.refit(self.kept | surface.pinned, until=until)
 
     @property
     def points(self) -> FloatArray:
@@ -473,7 +477,7 @@ class Front(Sequence[FrontSolution]):
         meshes: int | None = MESHES_BY_DEFAULT,
         mesh_format: str = "ply",
         chosen: int | FrontSolution | None = None,
-        refit: bool = False,
+        refit: bool | Mapping[int, Refitted] = False,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
     ) -> Path:
@@ -491,9 +495,9 @@ class Front(Sequence[FrontSolution]):
             A name out of :func:`~meshsimp_pymoo.formats.table.written_formats`, such as "ply" or "landxml".
         chosen : int or FrontSolution, optional
             The solution to write as ``chosen.<mesh_format>`` too.
-        refit : bool
+        refit : bool or mapping
             Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
-            :func:`~meshsimp_pymoo.surface.height.refit_heights`.
+            :func:`~meshsimp_pymoo.surface.height.refit_heights`. Or only those of these solutions, found already.
         page : bool
             Write ``report.html``, the page on which to look at the solutions and choose one.
         run : mapping, optional
@@ -512,6 +516,9 @@ class Front(Sequence[FrontSolution]):
             if solution not in drawn:
                 drawn[solution] = problem.simplify(self.kept[solution]).faces
             return drawn[solution]
+
+        def fitted(solution: int) -> Refitted | None:
+            return self[solution].refitted if refit is True else refit.get(solution) if refit else None
 
         def draw(unfinished: Path) -> None:
             from meshsimp_pymoo.report.figures import front_figure, panel_rows
@@ -548,7 +555,7 @@ class Front(Sequence[FrontSolution]):
             meshes=meshes,
             mesh_format=mesh_format.lower(),
             chosen=row,
-            refit=(lambda solution: self[solution].refitted) if refit else None,
+            refit=fitted if refit is not False else None,
             series=self.series,
             run=record,
             extra=draw,

@@ -180,7 +180,7 @@ def write_front(
     meshes: int | None = MESHES_BY_DEFAULT,
     mesh_format: str = "ply",
     chosen: int | None = None,
-    refit: Callable[[int], Refitted] | None = None,
+    refit: Callable[[int], Refitted | None] | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
     extra: Callable[[Path], None] | None = None,
@@ -213,7 +213,7 @@ def write_front(
     refit : callable, optional
         The best heights for the solution in this row of ``kept`` (see
         :func:`~meshsimp_pymoo.surface.height.refit_heights`). Each mesh that is written is then written with them
-        too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS.
+        too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS. None where there are none.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
         written to ``series.csv``.
@@ -275,8 +275,8 @@ def write_front(
                     write_mesh(partial / path, *arrays, **look)
                 if row == chosen:
                     write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
-                if refit is not None:
-                    better = refit(int(row))
+                better = None if refit is None else refit(int(row))
+                if better is not None:
                     raised = (better.vertices, *arrays[1:])
                     fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                     if solution in with_mesh:

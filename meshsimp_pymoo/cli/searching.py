@@ -16,14 +16,16 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
 
+from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
     INTERRUPTED,
     OK,
     TARGET_MISSED,
+    Stages,
     described,
-    progress,
+    front_in_words,
     say,
     stop_if_interrupted,
 )
@@ -43,17 +45,25 @@ from meshsimp_pymoo.search.checkpoint import (
 )
 from meshsimp_pymoo.search.memetic import sweep_generations
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
+from meshsimp_pymoo.search.time_limit import WholeGenerations, spread
 from meshsimp_pymoo.settings import plain
-from meshsimp_pymoo.storage import CHECKPOINT, claim_output, is_unfinished, package_versions
+from meshsimp_pymoo.storage import CHECKPOINT, claim_output, even_selection, is_unfinished, package_versions
 from meshsimp_pymoo.surface.measures import OBJECTIVES
+from meshsimp_pymoo.surface.surface import Refitted
+from meshsimp_pymoo.warming import SEARCH
+
+# Of the time that is given, the share kept for the best heights of the meshes.
+REFIT_SHARE = 0.3
+# What writing takes about, for any model and for each vertex [s].
+WRITING_SECONDS = (1.5, 3e-4)
 
 
-def simplify(request: Request) -> int:
+def simplify(request: Request, shown: Stages) -> int:
     """Search the front of a model and write it to a new folder; return the exit code."""
     search, output = request.search, request.output
     if wants_tiles(request):
         try:
-            return simplify_tiled(request)
+            return simplify_tiled(request, shown)
         except NoFullGrid as reason:
             if request.tiling.tile is not None:
                 raise
@@ -67,15 +77,19 @@ def simplify(request: Request) -> int:
             "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
             "use --algorithm nsga2_v1 with it, or --measure rms"
         )
-    problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
-    format_to_write(output.format).check(problem.model)
-    _refuse_impossible(problem, request.wish)
-    with Keeper(problem, search, output) as keeper:
-        found = _search(problem, keeper, quiet=output.quiet)
+    with compiling(SEARCH, shown) as compiled:
+        with shown.stage("reading", f"reading {Path(request.model).name}"):
+            problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
+            format_to_write(output.format).check(problem.model)
+        compiled.finish()
+        _refuse_impossible(problem, request.wish)
+    shown.expect("writing", WRITING_SECONDS[0] + WRITING_SECONDS[1] * problem.n_var)
+    with Keeper(problem, request, compiled.seconds) as keeper:
+        found = _search(problem, keeper, shown)
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
             return INTERRUPTED
-        return _write(found, request, keeper)
+        return _write(found, keeper, shown)
 
 
 def _claim(output: Output, search: Search) -> None:
@@ -131,34 +145,42 @@ def budget(search: Search) -> dict[str, float]:
     return {"generations": sweep_generations(search.population) if sweeps else DEFAULT_GENERATIONS}
 
 
-def _set_up(problem: MeshProblem, search: Search) -> Any:
+def _set_up(problem: MeshProblem, request: Request) -> Any:
     """Return the algorithm before its first generation."""
+    search, preset = request.search, PRESETS[request.search.algorithm]
     terminations = {
-        "time": TimeBasedTermination,
+        # sweeps end in time by themselves
+        "time": TimeBasedTermination if preset.sweeps else WholeGenerations,
         "evaluations": MaximumFunctionCallTermination,
         "generations": MaximumGenerationTermination,
     }
     ((kind, amount),) = budget(search).items()
-    algorithm = PRESETS[search.algorithm].function(pop_size=search.population)
+    if kind == "time" and request.output.refit:
+        amount *= 1.0 - REFIT_SHARE
+    algorithm = preset.function(pop_size=search.population)
     return algorithm.setup(problem, termination=terminations[kind](amount), seed=search.seed)
 
 
-def _search(problem: MeshProblem, keeper: Keeper, *, quiet: bool) -> _Found | None:
+def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | None:
     """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
-    algorithm, before = keeper.begin()
-    start = time.perf_counter()
-    found, generations, interrupted = algorithm.opt, (algorithm.n_iter or 1) - 1, False
-    with progress(quiet, problem.model) as show:
+    if (seconds := keeper.request.search.time) is not None:
+        shown.expect("searching", seconds)
+    with shown.stage("searching", "searching") as show:
+        algorithm, before = keeper.begin()
+        start = time.perf_counter()
+        found, generations, interrupted = algorithm.opt, (algorithm.n_iter or 1) - 1, False
         try:
             while algorithm.has_next():
                 stop_if_interrupted()
                 algorithm.next()
                 found, generations = algorithm.opt, algorithm.n_iter - 1
-                show(algorithm.termination.perc, algorithm.evaluator.n_eval, found.get("F"))
+                words = front_in_words(problem.model, algorithm.evaluator.n_eval, found.get("F"))
+                show(algorithm.termination.perc, words)
                 keeper.keep()
             keeper.keep(last=True)
         except KeyboardInterrupt:
             interrupted = True
+        seconds = before + time.perf_counter() - start
     if found is None:
         return None
     try:
@@ -170,7 +192,7 @@ def _search(problem: MeshProblem, keeper: Keeper, *, quiet: bool) -> _Found | No
             "inside its outline; search longer, or pass --footprint hull"
         ) from None
     front.series |= starting_front(problem, algorithm)
-    return _Found(front, generations, algorithm.evaluator.n_eval, before + time.perf_counter() - start, interrupted)
+    return _Found(front, generations, algorithm.evaluator.n_eval, seconds, interrupted)
 
 
 class Keeper:
@@ -180,17 +202,19 @@ class Keeper:
     ----------
     problem : MeshProblem
         What is searched.
-    search : Search
-        How.
-    output : Output
-        Where the results go, and whether old ones give way.
+    request : Request
+        How, where the results go, and whether old ones give way.
+    compile_seconds : float
+        What was compiled before took so long.
     """
 
-    def __init__(self, problem: MeshProblem, search: Search, output: Output) -> None:
+    def __init__(self, problem: MeshProblem, request: Request, compile_seconds: float = 0.0) -> None:
         self.problem = problem
-        self.search = search
-        self.output = output
-        self.path = output.folder / CHECKPOINT
+        self.request = request
+        self.search = request.search
+        self.output = request.output
+        self.compile_seconds = compile_seconds
+        self.path = self.output.folder / CHECKPOINT
         self.is_held = False
         self._checkpoints: Checkpoints | None = None
         self._until_done = ExitStack()
@@ -213,12 +237,13 @@ class Keeper:
             "population": search.population,
             "seed": search.seed,
             **budget(search),
+            **({"refit": True} if self.output.refit else {}),  # takes a share of the time
             **{name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")},
         }
 
     def begin(self) -> tuple[Any, float]:
         """Return the algorithm, where its checkpoint left it if there is one, and the seconds it took before."""
-        algorithm, before, interval = _set_up(self.problem, self.search), 0.0, self.search.checkpoint
+        algorithm, before, interval = _set_up(self.problem, self.request), 0.0, self.search.checkpoint
         if interval is None:
             return algorithm, before
         if self.path.exists():
@@ -230,7 +255,7 @@ class Keeper:
                     raise ResultError(
                         f"{problem}; name another folder, or allow overwriting (--overwrite) to begin anew"
                     ) from None
-                algorithm = _set_up(self.problem, self.search)
+                algorithm = _set_up(self.problem, self.request)
         try:
             self._checkpoints = Checkpoints(self.path, algorithm, self.what, interval=interval, before=before)
         except NotResumable as problem:
@@ -280,38 +305,44 @@ class Keeper:
 # ---------------------------------------------------------------------------------------------------------- the results
 
 
-def _write(found: _Found, request: Request, keeper: Keeper) -> int:
+def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
     """Write what was found, say so, and return the exit code."""
-    search, output = request.search, request.output
+    request, search, output = keeper.request, keeper.search, keeper.output
     folder, front = output.folder, found.front
     chosen, missed = request.wish.of(front)
-    run = {
-        "settings": request.recorded | budget(search),
-        "seed": search.seed,
-        "generations": found.generations,
-        "evaluations": found.evaluations,
-        "seconds": round(found.seconds, 3),
-        "interrupted": found.interrupted,
-    }
     try:
-        front.save(
-            folder,
-            # the folder of our own checkpoint gives way to the results
-            overwrite=output.overwrite or keeper.is_held or (is_unfinished(folder) and not keeper.path.exists()),
-            meshes=output.meshes,
-            mesh_format=output.format,
-            chosen=chosen,
-            refit=output.refit,
-            page=output.page,
-            run=run,
-        )
+        fitted = _refit(found, chosen, request, shown) if output.refit else None
+        run = {
+            "settings": request.recorded | budget(search),
+            "seed": search.seed,
+            "generations": found.generations,
+            "evaluations": found.evaluations,
+            "seconds": round(found.seconds, 3),
+            "read_seconds": round(shown.seconds["reading"], 3),
+            "compile_seconds": round(keeper.compile_seconds, 3),
+            **({} if fitted is None else {"refit_seconds": round(shown.seconds["refitting"], 3)}),
+            "interrupted": found.interrupted,
+        }
+        with shown.stage("writing", "writing"):
+            front.save(
+                folder,
+                # the folder of our own checkpoint gives way to the results
+                overwrite=output.overwrite or keeper.is_held or (is_unfinished(folder) and not keeper.path.exists()),
+                meshes=output.meshes,
+                mesh_format=output.format,
+                chosen=chosen,
+                refit=fitted or output.refit,
+                page=output.page,
+                run=run,
+            )
     except (ResultError, KeyboardInterrupt) as stop:
         if not (keeper.is_held and keeper.path.exists()):
             raise
         reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
         say(f"{reason}; the same command goes on from the checkpoint in {folder}")
         return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
-    _summarise(found, search, output, chosen)
+    shown.close()
+    _summarise(found, keeper, chosen, fitted)
     if found.interrupted:
         say(f"interrupted after {found.generations} generations; {folder} holds the front so far")
         return INTERRUPTED
@@ -321,7 +352,34 @@ def _write(found: _Found, request: Request, keeper: Keeper) -> int:
     return OK
 
 
-def _summarise(found: _Found, search: Search, output: Output, chosen: FrontSolution | None) -> None:
+def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown: Stages) -> dict[int, Refitted]:
+    """Return the best heights of the meshes to be written, as many as the time allows, the chosen one first."""
+    front, limit = found.front, request.search.time
+    rows = even_selection(len(front), request.output.meshes)
+    order = [rows[k] for k in spread(len(rows))]
+    if chosen is not None:
+        order = [chosen.solution, *(row for row in order if row != chosen.solution)]
+    until = None if limit is None or found.interrupted else time.perf_counter() + limit - found.seconds
+    fitted: dict[int, Refitted] = {}
+    longest = 0.0
+    with shown.stage("refitting", "refitting") as show:
+        for row in order:
+            begun = time.perf_counter()
+            if until is not None and fitted and begun + longest > until:
+                break
+            fitted[row] = front[row].refit(until=until)
+            longest = max(longest, time.perf_counter() - begun)
+            show(len(fitted) / len(order), f"refitted {len(fitted)} of {len(order)} meshes")
+    if len(fitted) < len(order):
+        say(
+            f"{len(fitted)} of {len(order)} meshes are refitted in the time given; for more search longer (--time) or "
+            "write fewer (--meshes)"
+        )
+    return fitted
+
+
+def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitted: dict[int, Refitted] | None) -> None:
+    search, output = keeper.search, keeper.output
     front, folder = found.front, output.folder
     model, quality = front.model, front.quality
     kind = format_to_write(output.format)
@@ -344,6 +402,7 @@ def _summarise(found: _Found, search: Search, output: Output, chosen: FrontSolut
             else {"mesh": chosen_path, "solution": chosen.solution, **asdict(chosen.quality)},
             "evaluations": found.evaluations,
             "seconds": round(found.seconds, 3),
+            "compile_seconds": round(keeper.compile_seconds, 3),
             "seed": search.seed,
         }
         if any(origin):
@@ -362,9 +421,11 @@ def _summarise(found: _Found, search: Search, output: Output, chosen: FrontSolut
     if chosen is not None:
         print(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
     written = len(list(folder.glob("meshes/*")))
-    fitted = f", {written} in refitted" if output.refit and written else ""
+    raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
     page = ", report.html" if output.page else ""
-    print(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + fitted)
+    print(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + raised)
+    if keeper.compile_seconds >= 1.0:
+        print(f"compiled once for this machine: {keeper.compile_seconds:.0f} s, not counted as search")
     if any(origin):
         place = ", ".join(f"{value:.15g}" for value in origin)
         print(f"origin of the glb meshes: ({place}); each file puts itself back there")

@@ -6,10 +6,10 @@ import math
 import signal
 import sys
 import threading
+import time
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -26,10 +26,11 @@ __all__ = [
     "INTERRUPTED",
     "OK",
     "TARGET_MISSED",
+    "Stages",
     "bar",
     "described",
+    "front_in_words",
     "interruptible",
-    "progress",
     "say",
     "stop_if_interrupted",
     "warnings_as_lines",
@@ -72,28 +73,97 @@ def stop_if_interrupted() -> None:
         raise KeyboardInterrupt
 
 
-@contextmanager
-def progress(quiet: bool, model: OpenModel) -> Iterator[Callable[[float, int, FloatArray], None]]:
-    """Yield what shows (share done, evaluations, objectives so far): a bar on a terminal, elsewhere nothing."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda share, evaluations, F: None
-        return
+def front_in_words(model: OpenModel, evaluations: int, F: FloatArray) -> str:
+    """Return what a search has found so far, for the line of its progress."""
     from meshsimp_pymoo.search.display import errors_at, usual_sizes
 
     sizes = usual_sizes(len(model.faces))
-    with bar(quiet, Path(model.name).name) as draw:
+    errors = zip(errors_at(F, sizes), sizes, strict=True)
+    so_far = [f"{error:.3g}@{size}" for error, size in errors if not math.isnan(error)]
+    return " ".join(["error", *so_far, f"after {evaluations:,} evaluations"])
 
-        def show(share: float, evaluations: int, F: FloatArray) -> None:
-            errors = zip(errors_at(F, sizes), sizes, strict=True)
-            so_far = [f"{error:.3g}@{size}" for error, size in errors if not math.isnan(error)]
-            draw(share, " ".join(["error", *so_far, f"after {evaluations:,} evaluations"]))
 
-        yield show
+class Stages:
+    """The progress of a command as a whole: one bar and one estimate of the time left, over stages that follow.
+
+    Parameters
+    ----------
+    quiet : bool
+        Whether nothing is shown.
+    name : str
+        What it is about.
+    plan : mapping
+        The stages in their order, and about how many seconds each takes.
+    """
+
+    def __init__(self, quiet: bool, name: str, plan: Mapping[str, float]) -> None:
+        self.quiet = quiet
+        #: What each stage has taken [s].
+        self.seconds: dict[str, float] = {}
+        self._plan = dict(plan)
+        self._shown = ExitStack()
+        self._draw = self._shown.enter_context(bar(quiet, name, timed=False))
+        self._begun = time.perf_counter()
+
+    def expect(self, stage: str, seconds: float) -> None:
+        """Say about how many seconds a stage will take."""
+        self._plan[stage] = seconds
+
+    @contextmanager
+    def stage(self, stage: str, state: str) -> Iterator[Callable[[float, str], None]]:
+        """Enter a stage; yields what shows the share of it that is done and a word. Until then the clock tells."""
+        begun = time.perf_counter()
+        told: tuple[float, str] = (0.0, state)
+        later = sum(seconds for name, seconds in self._plan.items() if name not in self.seconds and name != stage)
+        done = threading.Event()
+
+        def draw() -> None:
+            now = time.perf_counter()
+            share, words = told
+            left = (now - begun) * (1 - share) / share if share > 0 else max(self._plan[stage] - (now - begun), 0.0)
+            spent = now - self._begun
+            self._draw(spent / max(spent + left + later, 1e-9), f"{_in_words(left + later)} left; {words}")
+
+        def show(share: float, words: str) -> None:
+            nonlocal told
+            told = min(share, 1.0), words
+
+        def tick() -> None:
+            draw()
+            while not done.wait(0.2):
+                draw()
+
+        ticking = threading.Thread(target=tick, name="meshsimp-progress", daemon=True)
+        ticking.start()
+        try:
+            yield show
+        finally:
+            done.set()
+            ticking.join()
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
+
+    def close(self) -> None:
+        """Clear the line."""
+        self._shown.close()
+
+    def __enter__(self) -> Stages:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _in_words(seconds: float) -> str:
+    whole = round(seconds)
+    return f"{whole} s" if whole < 100 else f"{whole // 60}:{whole % 60:02} min"
 
 
 @contextmanager
-def bar(quiet: bool, name: str) -> Iterator[Callable[[float, str], None]]:
-    """Yield what shows (share done, what is being done): on a terminal a line of its width; elsewhere nothing."""
+def bar(quiet: bool, name: str, *, timed: bool = True) -> Iterator[Callable[[float, str], None]]:
+    """Yield what shows (share done, what is being done): on a terminal a line of its width; elsewhere nothing.
+
+    With ``timed`` the time that is left is reckoned from the shares.
+    """
     if quiet or not sys.stderr.isatty():
         yield lambda share, state: None
         return
@@ -106,8 +176,8 @@ def bar(quiet: bool, name: str) -> Iterator[Callable[[float, str], None]]:
         TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True)),
         BarColumn(bar_width=8),
         TextColumn("{task.percentage:>2.0f} %", table_column=Column(no_wrap=True)),
-        TimeRemainingColumn(compact=True, table_column=Column(no_wrap=True)),
-        TextColumn("left; {task.fields[state]}", markup=False, table_column=one_line),
+        *([TimeRemainingColumn(compact=True, table_column=Column(no_wrap=True))] if timed else []),
+        TextColumn(("left; " if timed else "") + "{task.fields[state]}", markup=False, table_column=one_line),
     )
     short = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
     # steps of an experiment can be a minute apart: the speed is that of the last ten minutes

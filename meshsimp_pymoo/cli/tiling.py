@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from meshsimp_pymoo.cli.arguments import numbered
+from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import Output, Request, Search, Tiling, Wish
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
+from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.options import Options
@@ -34,6 +35,7 @@ from meshsimp_pymoo.tiles.output import (
     write_tiled_front,
     write_welded,
 )
+from meshsimp_pymoo.warming import SEARCH
 from meshsimp_pymoo.workers import EngineError, open_engine
 
 # From this many samples on, a grid is thinned tile by tile without being asked.
@@ -55,15 +57,18 @@ def wants_tiles(request: Request) -> bool:
     return bool(request.tiling.tile)
 
 
-def simplify_tiled(request: Request) -> int:
+def simplify_tiled(request: Request, shown: Stages) -> int:
     """Thin a height grid tile by tile and write its front to a new folder; return the exit code."""
     _refuse_unknown(request)
     wish, output, tiling = request.wish, request.output, request.tiling
     out = output.folder
     restore(out)
     _claim(output)
+    with compiling((*SEARCH, "tiles"), shown) as compiled:
+        with shown.stage("reading", f"reading {Path(request.model).name}"):
+            grid = open_grid(request.model, request.options)
+        compiled.finish()
     start = time.perf_counter()
-    grid = open_grid(request.model, request.options)
     if grid.model is not None:
         format_to_write(output.format).check(grid.model)
     tile = tiling.tile or TILE
@@ -79,7 +84,7 @@ def simplify_tiled(request: Request) -> int:
     made_now = not out.exists()
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with locked(out), open_engine(jobs, tiling.dask) as engine, bar(output.quiet, Path(grid.name).name) as show:
+        with locked(out), open_engine(jobs, tiling.dask) as engine, shown.stage("searching", "thinning") as show:
             clear_up(out)
             if output.overwrite:
                 _forget_other(out / WORK, what)
@@ -93,6 +98,8 @@ def simplify_tiled(request: Request) -> int:
                 "options": plain(request.options),
                 "settings": request.recorded | {"tile": tile, "most": what["most"]},
                 "seconds": round(time.perf_counter() - start, 3),
+                "read_seconds": round(shown.seconds["reading"], 3),
+                "compile_seconds": round(compiled.seconds, 3),
             }
             _claim(output)  # somebody may have put something else there meanwhile, which would be replaced
             write_tiled_front(
@@ -123,6 +130,7 @@ def simplify_tiled(request: Request) -> int:
     finally:
         if made_now and _is_unfinished(out) and not _has_pieces(out):
             shutil.rmtree(out, ignore_errors=True)
+    shown.close()
     _summarise(output, tiling, front, chosen, time.perf_counter() - start)
     if missed:
         say(f"{out} holds a front, but no chosen mesh: {missed}")

@@ -45,8 +45,8 @@ def inner(function: Any = None, *, inline: bool = False) -> Any:
 
     Notes
     -----
-    Parameters annotated as ``int``, ``float`` and ``bool`` are 64 bits, double precision and a byte, whatever the caller
-    hands over, so there is one function for each combination of the others. With a Numba that is not known to
+    Parameters annotated as ``int``, ``float`` and ``bool`` are 64 bits, double precision and a byte, whatever is handed
+    over, so there is one function for each combination of the others. With a Numba that is not known to
     :mod:`~meshsimp_pymoo.compiling.linking` it is a plain ``njit`` function.
     """
     if function is None:

@@ -33,7 +33,7 @@ class _NoMachineCode:
         """Do nothing."""
 
 
-class _Linked(JITCodeLibrary):  # type: ignore[misc]
+class _Linked(JITCodeLibrary):
     """A function's code before optimisation, to be linked into others; it cannot be run by itself."""
 
     @property
@@ -54,7 +54,7 @@ class _Linked(JITCodeLibrary):  # type: ignore[misc]
         return 0
 
 
-class LinkedCompiler(Compiler):  # type: ignore[misc]
+class LinkedCompiler(Compiler):
     """The usual steps of compiling, into a library that is only linked."""
 
     def define_pipelines(self) -> Any:
@@ -66,7 +66,7 @@ class LinkedCompiler(Compiler):  # type: ignore[misc]
 
 def _as_annotated(name: Any, kind: Any) -> Any:
     """Return the type of an argument for a parameter's annotation: all integers are one, and literals are none."""
-    kind = types.unliteral(kind)
+    kind = types.misc.unliteral(kind)
     if name == "int" and isinstance(kind, (types.Integer, types.Boolean)):
         return types.int64
     if name == "float" and isinstance(kind, (types.Integer, types.Float)):
@@ -76,7 +76,7 @@ def _as_annotated(name: Any, kind: Any) -> Any:
     return kind
 
 
-class LinkedFunction(CPUDispatcher):  # type: ignore[misc]
+class LinkedFunction(CPUDispatcher):
     """A function for compiled code alone: one specialisation for the types of its annotations, and no wrapper."""
 
     def __init__(self, py_func: Any, locals: Any = None, targetoptions: Any = None, pipeline_class: Any = None) -> None:
@@ -85,6 +85,7 @@ class LinkedFunction(CPUDispatcher):  # type: ignore[misc]
         self._annotated = [parameter.annotation for parameter in inspect.signature(py_func).parameters.values()]
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Refuse: there is nothing that Python could call."""
         raise TypeError(
             f"{self.py_func.__module__}.{self.py_func.__qualname__} is called by compiled code only; call it in a "
             "function compiled with numba.njit, or call its py_func"

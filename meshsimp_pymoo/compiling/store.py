@@ -134,7 +134,7 @@ def made_from(function: Any) -> str:
 # ------------------------------------------------------------------------------------------------------------ the cache
 
 
-class _Locator(_CacheLocator):  # type: ignore[misc]
+class _Locator(_CacheLocator):
     """Says to Numba where a function's code is, and what it is made from."""
 
     def __init__(self, function: Any, folder: Path) -> None:
@@ -162,11 +162,11 @@ class _Locator(_CacheLocator):  # type: ignore[misc]
         return None if folder is None else cls(function, folder)
 
 
-class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
+class _Impl(CompileResultCacheImpl):
     _locator_classes = (_Locator,)
 
 
-class _Files(FunctionCache):  # type: ignore[misc]
+class _Files(FunctionCache):
     _impl_class = _Impl
 
 
@@ -206,7 +206,9 @@ class Stored:
             try:
                 found = self._files.load_overload(sig, target_context)
             except Exception as problem:  # whatever unpickling half a file may raise
-                _warn_once(f"compiled code in {self.cache_path} cannot be read ({reason_of(problem)}); it is made again")
+                _warn_once(
+                    f"compiled code in {self.cache_path} cannot be read ({reason_of(problem)}); it is made again"
+                )
         if found is None:
             self._begun[threading.get_ident()] = time.perf_counter()
             for told in _listeners:
@@ -223,7 +225,20 @@ class Stored:
         try:
             self._files.save_overload(sig, data)
         except OSError as problem:
-            _warn_once(f"compiled code cannot be kept in {self.cache_path} ({reason_of(problem)}); it is made each time")
+            _warn_once(
+                f"compiled code cannot be kept in {self.cache_path} ({reason_of(problem)}); it is made each time"
+            )
+
+    def is_stored(self, target_context: Any) -> bool:
+        """Tell whether there is code on disk for this machine, whatever the types."""
+        if isinstance(self._files, NullCache):
+            return False
+        try:
+            index = self._files._cache_file._load_index()
+        except Exception:  # see load_overload
+            return False
+        machine = target_context.codegen().magic_tuple()
+        return any(key[1] == machine for key in index)
 
     def enable(self) -> None:
         """See Numba."""
@@ -238,6 +253,13 @@ class Stored:
         self._files.flush()
 
 
+def has_code(function: Any) -> bool:
+    """Tell whether there is machine code of an entry, in this process or on disk for this machine."""
+    if config.DISABLE_JIT or function.overloads:
+        return True
+    return bool(function._cache.is_stored(function.targetctx))
+
+
 _warned: set[str] = set()
 
 
@@ -247,7 +269,7 @@ def _warn_once(message: str) -> None:
         warnings.warn(message, CodeWarning, stacklevel=2)
 
 
-# ----------------------------------------------------------------------------------------------------- who is told of it
+# ---------------------------------------------------------------------------------------------------- who is told of it
 
 # Called with a function whose code is being made, and the seconds it took, or None at the start.
 Listener = Callable[[Any, "float | None"], None]

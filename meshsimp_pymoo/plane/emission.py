@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
-
 from meshsimp_pymoo.plane.footprint import inside
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE
 

@@ -28,7 +28,6 @@ from __future__ import annotations
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import entry, inner
-
 from meshsimp_pymoo.plane.predicates import circle_sign, orient_sign
 
 # In the unit square the two products of an orientation sum to at most 2 in magnitude: past this its sign is certain.

@@ -50,6 +50,7 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, read_npz
+from meshsimp_pymoo.search.time_limit import WholeGenerations
 
 __all__ = ["CheckpointError", "Checkpoints", "NotResumable", "Stored", "difference", "read_checkpoint", "restore"]
 
@@ -69,6 +70,7 @@ TERMINATIONS = (
     MaximumGenerationTermination,
     MaximumFunctionCallTermination,
     TimeBasedTermination,
+    WholeGenerations,
 )
 FIXED = (types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.ModuleType, type, Problem)
 # A class derived from one of these holds more than its attributes.

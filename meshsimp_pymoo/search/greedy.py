@@ -22,9 +22,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from meshsimp_pymoo.compiling.functions import entry, inner
-
 from meshsimp_pymoo.arrays import BoolArray
+from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.moves import (
     cells_around,
@@ -32,8 +31,8 @@ from meshsimp_pymoo.surface.moves import (
     is_site,
     n_cells,
     n_triangles,
-    snapshot,
     sites_around,
+    snapshot,
     total_cost,
     try_exchange,
     worst_in,

@@ -10,13 +10,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from meshsimp_pymoo.compiling.functions import entry, inner
 from numpy.typing import NDArray
 
 from meshsimp_pymoo.arrays import BoolArray
+from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.search.time_limit import stopping
 from meshsimp_pymoo.surface.moves import (
     exchange,
     is_site,
@@ -346,6 +346,7 @@ def relocate_all(
     *,
     sizes: NDArray[np.integer] | None = None,
     triangles: NDArray[np.integer] | None = None,
+    seconds: float | None = None,
     **how: Any,
 ) -> BoolArray:
     """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number.
@@ -360,6 +361,8 @@ def relocate_all(
         Those arguments of :func:`relocate` for each row.
     random_state : numpy.random.Generator
         Source of randomness.
+    seconds : float, optional
+        The moves end after this time, wherever they are; the result then depends on the machine.
     **how
         Its other arguments, the same for all rows.
     """
@@ -380,7 +383,8 @@ def relocate_all(
         )
 
     try:
-        rows = list(thread_pool().map(one, range(len(X))))
+        with stopping(stop, seconds):
+            rows = list(thread_pool().map(one, range(len(X))))
     except BaseException:  # Ctrl-C: the other threads are not to keep the process alive
         stop[0] = True
         raise

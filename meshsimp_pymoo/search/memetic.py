@@ -29,6 +29,7 @@ from meshsimp_pymoo.search.greedy import NestedFront, thinned, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
+from meshsimp_pymoo.search.time_limit import compiling_left_out, spread
 from meshsimp_pymoo.surface.surface import Surface, movable_ground
 from meshsimp_pymoo.workers import thread_pool
 
@@ -46,9 +47,11 @@ MOVES_PER_VERTEX = (20.0, 1000.0)
 FIRST_SHARE = 0.12
 SLOWEST = 4000.0
 SECONDS_A_MOVE = 2e-6
-# Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs.
+# Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs; but
+# never more than the second share.
 LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
+MOST_SHARE = 0.3
 # The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
 IDLE = 12
 # In the final front neighbours differ by this share of the error, or by the smaller one where a rung is better than the
@@ -164,6 +167,7 @@ class DownTheLadder(Mating):
         work = self._work(problem, pop, rows)
         left = sum(work[chain[self.step :]].sum() for chain in chains)
         moves = np.ceil(self._pace(problem, algorithm, work.sum(), left) * work[turn]).astype(int)
+        limit = time_limit(algorithm)
         begun = time.perf_counter()
         children = relocate_all(
             problem.surface,
@@ -171,6 +175,7 @@ class DownTheLadder(Mating):
             moves,
             random_state,
             triangles=rungs[turn].astype(int),
+            seconds=None if limit is None else limit[1],
             temperature=temperature,
             cooling=cooling,
             shares=self.shares,
@@ -198,20 +203,20 @@ class DownTheLadder(Mating):
             first = min(max(TOTAL_MOVES / whole, lowest), highest) if given is None else given
             return min(first * 2.0**self.sweep, max(first, highest))
         a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
-        span, remaining = deadline
+        span, remaining, _ = deadline
         if self.sweep == 0:
             remaining -= (1.0 - FIRST_SHARE) * span
         return min(max(remaining / (a_move * left), 1.0), SLOWEST)
 
 
-def time_limit(algorithm: Any) -> tuple[float, float] | None:
-    """Return the seconds a run has for its search and those left; None where it does not end by time."""
+def time_limit(algorithm: Any) -> tuple[float, float, float] | None:
+    """Return the seconds a run has, those left for its sweeps, and those kept for its end; None: it has no limit."""
     termination = getattr(algorithm, "termination", None)
     for part in getattr(termination, "terminations", [termination]):
         if isinstance(part, TimeBasedTermination):
             whole = float(part.max_time)
-            last = max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6)
-            return whole, whole - last - (time.time() - algorithm.start_time)
+            last = min(max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6), MOST_SHARE * whole)
+            return whole, whole - last - (time.time() - algorithm.start_time), last
     return None
 
 
@@ -266,11 +271,18 @@ class MemeticSearch(GeneticAlgorithm):
             random_state=self.random_state,
         )
 
+    def next(self) -> None:
+        """Do a generation; the time in which functions are compiled is not its own."""
+        with compiling_left_out(self):
+            super().next()
+
     def _finalize(self) -> None:
         """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
         pop = self.pop
         surface = self.problem.surface
-        X = between_the_rungs(surface, pop.get("X"), pop.get("F"), most=self.survival.rungs[-1])
+        limit = time_limit(self)
+        seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
+        X = between_the_rungs(surface, pop.get("X"), pop.get("F"), most=self.survival.rungs[-1], seconds=seconds)
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
             self.evaluator.eval(self.problem, extra, algorithm=self)
@@ -278,9 +290,11 @@ class MemeticSearch(GeneticAlgorithm):
 
 
 def between_the_rungs(
-    surface: Surface, X: NDArray[np.bool_], F: NDArray[np.float64], *, most: float
+    surface: Surface, X: NDArray[np.bool_], F: NDArray[np.float64], *, most: float, seconds: float | None = None
 ) -> NDArray[np.bool_]:
     """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
+
+    With ``seconds`` no gap is begun that would end after that time; those that are left are spread over the ladder.
 
     Beyond the most accurate of them, where keeping all vertices is not the best (a scan whose outline is not covered),
     those of the thinned model that are better, of at most ``most`` triangles.
@@ -288,8 +302,18 @@ def between_the_rungs(
     order = np.argsort(F[:, 1], kind="stable")
     whole = thinned(surface)
     most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
+    end = np.inf if seconds is None else time.perf_counter() + seconds
+    longest = [0.0]
 
     def one(k: int) -> list[NDArray[np.bool_]]:
+        begun = time.perf_counter()
+        if begun + longest[0] > end:
+            return []
+        rows = fill(k)
+        longest[0] = max(longest[0], time.perf_counter() - begun)
+        return rows
+
+    def fill(k: int) -> list[NDArray[np.bool_]]:
         low, high = F[order[k - 1], 1], F[order[k], 1]
         ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
         by_thinning = _best_of(whole, high)[0]
@@ -310,7 +334,10 @@ def between_the_rungs(
                 rows.append(best[1].kept(best[2]))
         return rows
 
-    found = [kept for rows in thread_pool().map(one, range(1, len(order))) for kept in rows]
+    gaps = np.arange(1, len(order))
+    if seconds is not None:
+        gaps = gaps[spread(len(gaps))]
+    found = [kept for rows in thread_pool().map(one, gaps.tolist()) for kept in rows]
     better = np.flatnonzero((whole.error < F[:, 0].min()) & (whole.triangles <= most))
     if len(better):
         best = better[np.argmin(whole.error[better])]

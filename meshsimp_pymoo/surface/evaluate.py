@@ -21,9 +21,8 @@ import threading
 
 import numpy as np
 
-from meshsimp_pymoo.compiling.functions import entry, inner
-
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.emission import emit, outline
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment

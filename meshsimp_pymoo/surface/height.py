@@ -174,7 +174,7 @@ class HeightSurface:
         quality = mesh_quality(deviation, covered, np.asarray(faces), self.model.weights, self.total_weight)
         return Scored(quality, deviation, covered)
 
-    def refit(self, kept: BoolArray, *, tolerance: float = TOLERANCE) -> Refitted:
+    def refit(self, kept: BoolArray, *, tolerance: float = TOLERANCE, until: float | None = None) -> Refitted:
         """Move the kept vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
         if not tolerance > 0:
             raise ValueError(
@@ -200,7 +200,7 @@ class HeightSurface:
         A.sum_duplicates()
         original = model.points[rows, 2]
         heights, bound = least_error(
-            A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance
+            A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance, until=until
         )
         raised = own + (heights - original)[:, None] * model.rotation[2]
         error = self.score(raised, compact).quality.error

@@ -26,9 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.compiling.functions import entry, inner
-
 from meshsimp_pymoo.arrays import IntArray
+from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.emission import is_sliver, sum_of_three
 from meshsimp_pymoo.plane.footprint import inside
@@ -426,9 +425,7 @@ def _key(mesh: np.ndarray, h: int) -> int:
 
 
 @inner
-def _bare_cost(
-    xy: np.ndarray, z: np.ndarray, mesh: np.ndarray, h: int, i: int, unit: float, nearest: bool
-) -> float:
+def _bare_cost(xy: np.ndarray, z: np.ndarray, mesh: np.ndarray, h: int, i: int, unit: float, nearest: bool) -> float:
     """d_p of a bare vertex i whose nearest segment is halfedge h."""
     t = h & TRIANGLE
     a = mesh[h]
@@ -1075,9 +1072,7 @@ def _build(
     live = borrowed(books)
     mesh = live.mesh
     count = live.tally
-    end = triangulate(
-        site_xy, len(sites), first, np.empty(0, np.int64), inserted, mesh, g.exact_area, g.exact_lift
-    )
+    end = triangulate(site_xy, len(sites), first, np.empty(0, np.int64), inserted, mesh, g.exact_area, g.exact_lift)
     if end == 0:
         return False
     count[:] = 0

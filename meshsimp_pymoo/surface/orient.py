@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-from meshsimp_pymoo.compiling.functions import entry, inner
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
 

@@ -25,6 +25,8 @@ References
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
@@ -48,6 +50,7 @@ def least_error(
     start: np.ndarray,
     *,
     tolerance: float = TOLERANCE,
+    until: float | None = None,
 ) -> tuple[np.ndarray, float]:
     """Minimise the sum of w sqrt(gap^2 + (A h - z)^2) over h; see the module's docstring.
 
@@ -61,6 +64,8 @@ def least_error(
         Where to begin.
     tolerance : float
         The search ends where the sum is at most this share above the proved bound.
+    until : float, optional
+        Or where ``time.perf_counter()`` is beyond this, with what is found by then.
 
     Returns
     -------
@@ -114,7 +119,7 @@ def least_error(
             least, best = value, h
         proved = float(g @ np.sqrt(np.maximum(w * w - y * y, 0.0)) - y @ z)
         bound = max(bound, proved)
-        if least - bound <= tolerance * least:
+        if least - bound <= tolerance * least or (until is not None and time.perf_counter() > until):
             break
         epsilon = min(epsilon, max(SMOOTHING * (value - proved) / float(w.sum()), 1e-12))
     return best * unit + level, bound * unit

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshsimp_pymoo.compiling.functions import entry
-
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.hilbert import hilbert_keys
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
@@ -115,8 +114,18 @@ def _look_at_mesh(
     deviation = np.empty(len(z))
     covered = np.empty(len(z), np.bool_)
     recorded = np.zeros((n_recorded, 3), np.int64), np.zeros((n_recorded, 3)), np.zeros(n_recorded)
-    if not _mesh_deviation(samples, z, xy, height, faces, unit, extent, ground.nearest, deviation, covered, *recorded):
+    ends, key = np.empty((3 * len(faces), 2), np.int64), np.empty(3 * len(faces), np.int64)
+    m = _cover(samples, z, xy, height, faces, extent, deviation, covered, *recorded[:2], ends, key)
+    if m == 0:
         raise ValueError(f"none of the {len(faces)} faces has an area in the plane")
+    bare = np.flatnonzero(~covered)
+    if len(bare) and ground.nearest:
+        # along the curve, so that the tree's boxes are small whatever the order of the faces
+        place = xy.reshape(-1, 2)
+        order = np.argsort(hilbert_keys((place[ends[:m, 0]] + place[ends[:m, 1]]) / 2.0), kind="stable")
+        _measure_outside(bare, samples, z, xy, height, ends[order], key[order], unit, deviation, *recorded)
+    else:
+        deviation[bare] = 0.0
     return deviation, covered, recorded
 
 
@@ -126,22 +135,24 @@ SOLID_AREA = 1e-14
 
 
 @entry
-def _mesh_deviation(
+def _cover(
     samples: np.ndarray,
     z: np.ndarray,
     xy: np.ndarray,
     height: np.ndarray,
     faces: np.ndarray,
-    unit: float,
     extent: float,
-    nearest: bool,
     deviation: np.ndarray,
     covered: np.ndarray,
     sites: np.ndarray,
     shares: np.ndarray,
-    gap: np.ndarray,
-) -> bool:
-    """Fill d_p, its coverage and, if they have rows, what decides it for any mesh; False if no face is solid."""
+    ends: np.ndarray,
+    key: np.ndarray,
+) -> int:
+    """Fill d_p of what the mesh covers, what decides it, if ``sites`` has rows, and the edges of all solid faces.
+
+    Returns the number of edges, with their rank in ``key``; 0 if no face is solid.
+    """
     n = len(z)
     # Samples by cell of the unit square, about two in each.
     side = max(int(np.sqrt(n / 2)), 1)
@@ -161,8 +172,6 @@ def _mesh_deviation(
     for i in range(n):
         deviation[i] = np.inf
         covered[i] = False
-    ends = np.empty((3 * len(faces), 2), np.int64)
-    key = np.empty(3 * len(faces), np.int64)
     m = 0
     for f in range(len(faces)):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -196,31 +205,35 @@ def _mesh_deviation(
                         d = abs(wa * height[a] + wb * height[b] + wc * height[c] - z[i])
                         if d < deviation[i]:
                             deviation[i] = d
-                            if len(gap) > 0:
+                            if len(sites) > 0:
                                 sites[i, 0], sites[i, 1], sites[i, 2] = a, b, c
                                 shares[i, 0], shares[i, 1], shares[i, 2] = wa, wb, wc
                         covered[i] = True
-    if m == 0:
-        return False
-    boxes = np.empty((0, 4))
+    return m
+
+
+@entry
+def _measure_outside(
+    bare: np.ndarray,
+    samples: np.ndarray,
+    z: np.ndarray,
+    xy: np.ndarray,
+    height: np.ndarray,
+    ends: np.ndarray,
+    key: np.ndarray,
+    unit: float,
+    deviation: np.ndarray,
+    sites: np.ndarray,
+    shares: np.ndarray,
+    gap: np.ndarray,
+) -> None:
+    """Fill d_p of vertices that no face covers, by the nearest edge, and what decides it, if ``gap`` has rows."""
+    m = len(ends)
+    boxes = build_tree(xy, ends, m)
     stack = np.empty(64, np.int64)
     guess = 0
-    for i in range(n):
-        if covered[i]:
-            continue
-        if not nearest:
-            deviation[i] = 0.0
-            continue
-        if len(boxes) == 0:
-            # Along the curve, so that the tree's boxes are small whatever the order of the faces.
-            middle = np.empty((m, 2))
-            for k in range(m):
-                for axis in range(2):
-                    middle[k, axis] = (xy[2 * ends[k, 0] + axis] + xy[2 * ends[k, 1] + axis]) / 2.0
-            order = np.argsort(hilbert_keys(middle))
-            ends[:m] = ends[order]
-            key[:m] = key[order]
-            boxes = build_tree(xy, ends, m)
+    for q in range(len(bare)):
+        i = bare[q]
         guess, t, d = nearest_segment(xy, ends, key, m, boxes, stack, samples[2 * i], samples[2 * i + 1], guess)
         dz = (1.0 - t) * height[ends[guess, 0]] + t * height[ends[guess, 1]] - z[i]
         deviation[i] = np.sqrt(d * unit * unit + dz * dz)
@@ -228,4 +241,3 @@ def _mesh_deviation(
             sites[i, 0], sites[i, 1], sites[i, 2] = ends[guess, 0], ends[guess, 1], ends[guess, 1]
             shares[i, 0], shares[i, 1] = 1.0 - t, t
             gap[i] = np.sqrt(d) * unit
-    return True

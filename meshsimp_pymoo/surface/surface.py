@@ -229,8 +229,8 @@ class Surface(Protocol):
         """Measure any mesh in the frame of the model's file by the same error."""
         ...
 
-    def refit(self, kept: BoolArray) -> Refitted:
-        """Return the mesh of one subset with its vertices moved to where its error is least."""
+    def refit(self, kept: BoolArray, *, until: float | None = None) -> Refitted:
+        """Return the mesh of one subset with its vertices moved to where its error is least, or ended at ``until``."""
         ...
 
     def stored_arrays(self) -> dict[str, AnyArray]:

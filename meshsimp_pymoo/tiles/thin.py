@@ -20,9 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from meshsimp_pymoo.compiling.functions import entry
-
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.greedy import thin
@@ -273,10 +272,7 @@ def _fix_foreign(
             reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
             reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
             known = (
-                sx - reach_x >= box[0]
-                and sx + reach_x <= box[1]
-                and sy - reach_y >= box[2]
-                and sy + reach_y <= box[3]
+                sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
             )
         if not known:
             fixed[a] = True

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.compiling.functions import entry
-
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate_once

@@ -27,6 +27,9 @@ examples:
       a height grid that is too big for one piece
 """
 
+# About how long each stage takes [s], until more is known.
+STAGES = {"starting": 0.7, "reading": 0.5, "compiling": 0.0, "searching": 20.0, "refitting": 0.0, "writing": 2.0}
+
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
@@ -137,7 +140,13 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search the front of ``args.model`` and write it to a new folder."""
-    from meshsimp_pymoo.cli.requests import request_of
-    from meshsimp_pymoo.cli.searching import simplify
+    from pathlib import Path
 
-    return simplify(request_of(args))
+    from meshsimp_pymoo.cli.requests import request_of
+    from meshsimp_pymoo.cli.terminal import Stages
+
+    request = request_of(args)
+    with Stages(request.output.quiet, Path(request.model).name, STAGES) as shown:
+        with shown.stage("starting", "starting"):  # what is imported takes longer than a person waits without a sign
+            from meshsimp_pymoo.cli.searching import simplify
+        return simplify(request, shown)

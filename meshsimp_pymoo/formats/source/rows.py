@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.compiling.functions import entry
-
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.numbers import parse_numbers, whole
 

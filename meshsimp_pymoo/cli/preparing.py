@@ -1,0 +1,67 @@
+"""What has to be compiled before a command can do its work, with a word about it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+
+from meshsimp_pymoo.cli.terminal import Stages, say
+from meshsimp_pymoo.compiling.store import place, told_of_compiling
+from meshsimp_pymoo.warming import Warming
+
+ONCE = "compiling once for this machine"
+
+
+class Compiling:
+    """The compiling of a command: :meth:`finish` ends it; ``seconds`` says how long it has taken so far."""
+
+    def __init__(self, warming: Warming, shown: Stages) -> None:
+        self._warming = warming
+        self._shown = shown
+        self.seconds = 0.0
+
+    def finish(self) -> None:
+        """Compile what is missing still."""
+        if not self._warming.parts:
+            return
+        before = self.seconds
+        with self._shown.stage("compiling", ONCE):
+            self._warming.finish()
+        self.seconds = before + self._shown.seconds["compiling"]
+
+
+@contextmanager
+def compiling(names: Iterable[str], shown: Stages) -> Iterator[Compiling]:
+    """Begin to compile what is missing of these parts, and say so; whatever is compiled in here is counted."""
+    warming = Warming(names)
+    shown.expect("compiling", warming.expected)
+    if warming.parts and not shown.quiet:
+        if not sys.stderr.isatty():
+            say(f"{ONCE}, about {warming.expected:.0f} s")
+        _say_where()
+    found = Compiling(warming, shown)
+
+    def told(_: object, seconds: float | None) -> None:
+        found.seconds += seconds or 0.0
+
+    with warming, told_of_compiling(told):
+        yield found
+
+
+def compile_first(names: Iterable[str], *, quiet: bool) -> None:
+    """Compile what is missing of these parts, and say so."""
+    with Stages(quiet, "meshsimp", {"compiling": 0.0}) as shown, compiling(names, shown) as under_way:
+        under_way.finish()
+
+
+def _say_where() -> None:
+    """Say where machine code is kept, if not in the usual place."""
+    found = place()
+    if found.folder is None:
+        say(
+            f"warning: compiled code can be kept nowhere ({'; '.join(found.refused)}), so every command compiles anew; "
+            "set NUMBA_CACHE_DIR to a folder that can be written"
+        )
+    elif found.refused:
+        say(f"compiled code is kept in {found.folder} ({'; '.join(found.refused)})")

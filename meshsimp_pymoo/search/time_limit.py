@@ -1,0 +1,91 @@
+"""Searches that end in time: the clock counts what is searched, not what is compiled meanwhile."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from pymoo.termination.max_time import TimeBasedTermination
+
+from meshsimp_pymoo.arrays import BoolArray
+from meshsimp_pymoo.compiling.store import told_of_compiling
+
+
+def spread(n: int) -> list[int]:
+    """Return the numbers below n in an order in which the first so many are spread over all, as far as they go.
+
+    >>> spread(6)
+    [0, 4, 2, 1, 5, 3]
+    """
+    bits = max(n - 1, 1).bit_length()
+    # van der Corput's sequence in base 2
+    return [place for k in range(1 << bits) if (place := int(f"{k:0{bits}b}"[::-1], 2)) < n]
+
+
+class WholeGenerations(TimeBasedTermination):
+    """Ends where another generation, as long as the longest so far, would end too late.
+
+    Parameters
+    ----------
+    max_time : float
+        Seconds from the start of the search.
+    """
+
+    def __init__(self, max_time: float) -> None:
+        super().__init__(max_time)
+        self._last: float | None = None
+        self._longest = 0.0
+
+    def _update(self, algorithm: Any) -> float:
+        elapsed = time.time() - algorithm.start_time
+        # the first generation makes the first population, which the others need not do
+        if self._last is not None:
+            self._longest = max(self._longest, elapsed - self._last)
+        self._last = elapsed
+        return 1.0 if elapsed + self._longest > self.max_time else elapsed / self.max_time
+
+
+@contextmanager
+def compiling_left_out(algorithm: Any) -> Iterator[None]:
+    """Set the clock of a pymoo algorithm back by the time in which functions are compiled in here."""
+
+    def told(_: Any, seconds: float | None) -> None:
+        if seconds is not None and algorithm.start_time is not None:
+            algorithm.start_time += seconds
+
+    with told_of_compiling(told):
+        yield
+
+
+@contextmanager
+def stopping(stop: BoolArray, seconds: float | None) -> Iterator[None]:
+    """Set ``stop[0]`` after so many seconds in here, those of compiling left out; None: never."""
+    if seconds is None:
+        yield
+        return
+    limit = time.perf_counter() + seconds
+    under_way = 0
+    done = threading.Event()
+
+    def told(_: Any, took: float | None) -> None:
+        nonlocal limit, under_way
+        under_way += 1 if took is None else -1
+        limit += took or 0.0
+
+    def watch() -> None:
+        while not done.wait(max(limit - time.perf_counter(), 0.01)):
+            if under_way == 0 and time.perf_counter() >= limit:
+                stop[0] = True
+                return
+
+    with told_of_compiling(told):
+        watcher = threading.Thread(target=watch, name="meshsimp-time", daemon=True)
+        watcher.start()
+        try:
+            yield
+        finally:
+            done.set()
+            watcher.join()

@@ -1,0 +1,289 @@
+"""What has to be compiled once on a machine, and the doing of it: in two processes where two cores are free.
+
+Functions are compiled when they are called for the first time, so each part of this table calls those of one subject on
+a mesh of a few vertices, in the way in which the package calls them. What Python calls is in one part each.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from meshsimp_pymoo.compiling.store import has_code, place
+
+PACKAGE = __name__.partition(".")[0]
+
+
+class Part(NamedTuple):
+    """Functions that are compiled together."""
+
+    name: str
+    #: What Python calls, as file:function.
+    entries: tuple[str, ...]
+    #: Calls them all.
+    work: Callable[[], Any]
+    #: What that takes, about, on one core at 2.6 GHz [s].
+    seconds: float
+    #: Whether the second process does it, where there is one: what stands on the moves of the live triangulation.
+    beside: bool
+
+
+# ------------------------------------------------------------------------------------------------------------ the calls
+
+
+def _reading() -> None:
+    from meshsimp_pymoo.opening import open_model
+
+    # a scan with bays: its order, the look for folds, the cells of its footprint
+    _ = open_model("horseshoe:60").footprint
+
+
+def _square() -> Any:
+    """Return the surface of a grid of 3 x 3 samples, put together without anything that is compiled."""
+    import numpy as np
+
+    from meshsimp_pymoo.surface.height import HeightSurface
+    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.rules import Rules
+
+    x, y = np.meshgrid([0.0, 0.5, 1.0], [0.0, 0.5, 1.0])
+    points = np.column_stack([x.ravel(), y.ravel(), [0.0, 0.1, 0.3, 0.2, 0.9, 0.1, 0.4, 0.2, 0.0]])
+    a = np.array([0, 1, 3, 4])
+    faces = np.concatenate([np.column_stack([a, a + 1, a + 4]), np.column_stack([a, a + 4, a + 3])]).astype(np.int32)
+    model = OpenModel(
+        name="square",
+        points=points,
+        faces=faces,
+        corners=np.array([0, 2, 6, 8]),
+        source_index=np.arange(9),
+        file_points=points,
+        attributes={},
+        up=np.array([0.0, 0.0, 1.0]),
+        rotation=np.eye(3),
+        pivot=np.zeros(3),
+        offset=np.zeros(3),
+        xy=np.ascontiguousarray(points[:, :2]),
+        unit=1.0,
+        weights=None,
+    )
+    return HeightSurface(model, Rules(footprint="hull", outside="nearest"))
+
+
+def _evaluation() -> None:
+    surface = _square()
+    surface.evaluate(surface.pinned[None])
+
+
+def _compile_for(function: Any, *arguments: Any) -> None:
+    """Compile a function for arguments like these, without calling it."""
+    from numba import typeof
+
+    function.compile(tuple(map(typeof, arguments)))
+
+
+def _records(surface: Any) -> tuple[Any, Any]:
+    from meshsimp_pymoo.surface.live import make_live
+
+    return surface.ground(), make_live(surface.n_vertices)
+
+
+def _building() -> None:
+    from meshsimp_pymoo.surface.moves import snapshot
+
+    surface = _square()
+    with surface.books(surface.pinned) as books:
+        snapshot(surface.ground(), books, surface.n_vertices)
+
+
+def _thinning() -> None:
+    import numpy as np
+
+    from meshsimp_pymoo.search.greedy import thin
+
+    surface = _square()
+    n, rows, numbers = surface.n_vertices, np.zeros(9, np.int64), np.zeros(9)
+    _compile_for(thin, *_records(surface), n, surface.pinned, 0, np.inf, rows, numbers, rows)
+
+
+def _moves() -> None:
+    import numpy as np
+
+    from meshsimp_pymoo.search.local_search import USUAL_MOVES, _anneal, _fit
+
+    surface = _square()
+    records, n, rows, state = _records(surface), surface.n_vertices, np.zeros(9, np.int64), np.zeros(1, np.uint64)
+    graph, shares, stop = (surface.border, *surface.neighbours), tuple(map(float, USUAL_MOVES)), np.zeros(1, np.bool_)
+    _compile_for(_anneal, *records, n, rows, n, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows)
+    _compile_for(_fit, *records, n, surface.pinned, True, 8, state)
+
+
+def _insertion() -> None:
+    from meshsimp_pymoo.search.greedy import greedy_insertion
+
+    greedy_insertion(_square())
+
+
+def _single_moves() -> None:
+    from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+
+    surface = _square()
+    live = LiveTriangulation(surface, surface.pinned)
+    live.try_insert(4)
+    live.insert(4)
+
+
+def _tiles() -> None:
+    import numpy as np
+
+    from meshsimp_pymoo.tiles.front import LEAST_TILE, tiled_front
+    from meshsimp_pymoo.tiles.grid import open_grid
+
+    side = np.arange(2.0 * LEAST_TILE)
+    tiled_front(open_grid(np.add.outer(side, side**2 % 7)), tile=LEAST_TILE)
+
+
+def _scores() -> None:
+    surface = _square()
+    surface.score(surface.points, surface.faces[:2])
+
+
+def _folds() -> None:
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source import build_source
+    from meshsimp_pymoo.surface.orient import _hidden_faces, front_patch
+
+    # a sheet that turns back over itself: it has a front and a back, and hides a part
+    x, z = np.array([0.0, 2.0, 3.0, 2.0, 0.5]), np.array([0.0, 0.0, 0.5, 1.0, 1.0])
+    points = np.array([[px, py, pz] for px, pz in zip(x, z, strict=True) for py in (0.0, 1.0)])
+    faces = np.array([[2 * k + i for i in corner] for k in range(4) for corner in ((0, 2, 1), (1, 2, 3))], np.int32)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # says what is left out
+        front_patch(build_source(points, faces, name="sheet"), up="z")
+    _hidden_faces(points, np.concatenate([faces[:4], faces[4:, ::-1]]))
+
+
+def _files() -> None:
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source import rows
+
+    corners = rows.PlyProperty("corners", np.dtype("i4"), np.dtype("u1"))
+    element = rows.PlyElement("face", 2, [corners])
+    rows.text_columns(b"1 0 2 0 0", 0, [element], "two faces")
+    rows.binary_columns(b"\x01" + bytes(4) + b"\x02" + bytes(8), 0, [element], "two faces")
+
+
+# ------------------------------------------------------------------------------------------------------------ the table
+
+PARTS = (
+    Part(
+        "reading",
+        (
+            "plane.hilbert:hilbert_keys", "plane.footprint:_mark_outline", "plane.footprint:_face_cells",
+            "surface.orient:_overlapping_pairs",
+        ),
+        _reading, 2.0, False,
+    ),
+    Part("evaluation", ("surface.evaluate:_evaluate",), _evaluation, 5.0, False),
+    Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 4.0, False),
+    Part("thinning", ("search.greedy:thin",), _thinning, 8.0, True),
+    Part("moves", ("search.local_search:_anneal", "search.local_search:_fit"), _moves, 3.0, True),
+    Part("insertion", ("search.greedy:_grow",), _insertion, 1.5, True),
+    Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 2.0, True),
+    Part(
+        "tiles",
+        (
+            "plane.triangulation:triangulate_once", "tiles.thin:_hull_levels", "tiles.thin:_fix_foreign",
+            "tiles.weld:_measure_rows",
+        ),
+        _tiles, 2.5, False,
+    ),
+    Part("scores", ("surface.score:_cover", "surface.score:_measure_outside"), _scores, 1.5, False),
+    Part("folded scans", ("surface.orient:_lower_ones", "surface.orient:_seen_sides"), _folds, 2.0, False),
+    Part("files", ("formats.source.rows:_scan_bytes", "formats.source.rows:_scan_numbers"), _files, 1.0, False),
+)  # fmt: skip
+
+#: What a search with the default algorithm needs.
+SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
+
+
+def missing(names: Iterable[str] | None = None) -> list[Part]:
+    """Return those parts, of all, that have functions without machine code on this machine."""
+    wanted = {part.name for part in PARTS} if names is None else set(names)
+    return [part for part in PARTS if part.name in wanted and not all(map(_has_code, part.entries))]
+
+
+def _has_code(entry: str) -> bool:
+    file, _, name = entry.partition(":")
+    return has_code(getattr(import_module(f"{PACKAGE}.{file}"), name))
+
+
+class Warming:
+    """Compiles what is missing, in two processes if there are cores and a place for two.
+
+    The second process begins when this is entered, so that a model can be read meanwhile; :meth:`finish` does the rest.
+    What the second process has compiled is read from disk where it is needed.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Of parts.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.parts = missing(names)
+        self._beside: subprocess.Popen[bytes] | None = None
+
+    @property
+    def expected(self) -> float:
+        """About how long it takes [s]."""
+        return max(sum(part.seconds for part in share) for share in self._shares()) if self.parts else 0.0
+
+    def _shares(self) -> list[list[Part]]:
+        """Divide the parts among one or two processes: this one's first."""
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        shares = [[part for part in self.parts if part.beside == beside] for beside in (False, True)]
+        return [list(self.parts)] if cores < 2 or place().folder is None or not all(shares) else shares
+
+    def __enter__(self) -> Warming:
+        _, *others = self._shares()
+        if others:
+            code = f"from {__name__} import compile_here; compile_here({[part.name for part in others[0]]!r})"
+            paths = [str(Path(__file__).parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+            with suppress(OSError):  # it is all done in this process then
+                self._beside = subprocess.Popen(
+                    [sys.executable, "-c", code],
+                    env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+        return self
+
+    def finish(self) -> None:
+        """Compile the rest, and what the other process could not do: here it fails with a reason, if it must."""
+        compile_here(part.name for part in self._shares()[0])
+        if self._beside is not None:
+            self._beside.wait()
+            compile_here(part.name for part in missing(part.name for part in self.parts))
+
+    def __exit__(self, *_: object) -> None:
+        if self._beside is not None:
+            self._beside.kill()
+            self._beside.wait()
+
+
+def compile_here(names: Iterable[str]) -> None:
+    """Call all functions of these parts in this process."""
+    wanted = set(names)
+    for part in PARTS:
+        if part.name in wanted:
+            part.work()
