@@ -273,7 +273,7 @@ class Warming:
         compile_here(part.name for part in self._shares()[0])
         if self._beside is not None:
             self._beside.wait()
-            compile_here(part.name for part in missing(part.name for part in self.parts))
+        compile_here(part.name for part in missing(part.name for part in self.parts))
 
     def __exit__(self, *_: object) -> None:
         if self._beside is not None:

@@ -26,6 +26,7 @@ from meshsimp_pymoo import Front, MeshProblem, memetic
 from meshsimp_pymoo.cli import main, searching
 from meshsimp_pymoo.cli.commands.completion import SHELLS
 from meshsimp_pymoo.cli.parser import make_parser
+from meshsimp_pymoo.cli.terminal import front_in_words
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh, written_formats
@@ -33,12 +34,13 @@ from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.warming import SEARCH, compile_here
 
 QUICK = ("--generations", "3", "--population", "12")
 # The presets that the shell offers.
 ALGORITHMS = [name for name, preset in PRESETS.items() if preset.whole_front]
 PAPERS = ("--algorithm", "nsga2_v1")
-COMMANDS = ("simplify", "pick", "score", "info", "run", "report", "completion")
+COMMANDS = ("simplify", "pick", "score", "info", "run", "report", "warm", "completion")
 
 
 @pytest.fixture
@@ -155,7 +157,7 @@ def test_the_budget_in_seconds_is_kept(tmp_path):
     start = time.perf_counter()
     assert run("simplify", "roof:9", "-o", tmp_path / "out", "--time", "0.5s", "--population", "12", *PAPERS) == 0
     seconds = json.loads((tmp_path / "out" / "run.json").read_text())["seconds"]
-    assert 0.5 <= seconds < 2
+    assert 0.3 <= seconds <= 0.55
     assert time.perf_counter() - start < 8
 
 
@@ -387,11 +389,15 @@ def test_a_terminal_sees_progress_in_short_lines(tmp_path, monkeypatch):
     write_mesh(deep / "roof.ply", roof.points, roof.faces)
     assert run("simplify", deep / "roof.ply", "-o", tmp_path / "out", *QUICK, *PAPERS) == 0
     shown = re.sub(r"\x1b\[[0-9;]*m", "", sys.stderr.getvalue())
-    (last,) = {line.strip() for line in re.split(r"\x1b|[\r\n]", shown) if "36 evaluations" in line}
-    stored = read_front(tmp_path / "out")
-    least = stored.F[stored.F[:, 1] <= 26, 0].min()
-    assert re.fullmatch(rf"\[2Kroof\.ply \S+ +100 % +00:00 left; error .*{least:.3g}@26 after 36 evaluations", last)
+    lines = [line.strip() for line in re.split(r"\x1b|[\r\n]", shown) if "left" in line]
+    assert re.fullmatch(r"\[2Kroof\.ply \S+ +\d+ % \d+ s left; writing", lines[-1])
     assert "a_folder_with_a_long_name" not in shown
+
+
+def test_the_front_so_far_is_said_at_a_few_sizes():
+    problem = MeshProblem("roof:9")
+    F = np.array([[4.0, 2], [3.0, 10], [1.25, 26], [0.0, 100]])
+    assert front_in_words(problem.model, 36, F) == "error 4@2 4@6 3@13 1.25@26 after 36 evaluations"
 
 
 @pytest.mark.parametrize("width", [40, 80])
@@ -457,6 +463,7 @@ def test_an_interruption_while_writing_leaves_nothing_half_written(tmp_path, mon
 def test_ctrl_c_in_a_real_shell_keeps_the_front(tmp_path):
     command = [sys.executable, "-m", "meshsimp_pymoo", "simplify", "face:2000", "--time", "10min"]
     command += ["-o", str(tmp_path / "out")]
+    compile_here(SEARCH)  # and keep it on disk, or it is still compiling when it is interrupted
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         time.sleep(6)
         process.send_signal(signal.SIGINT)

@@ -380,7 +380,6 @@ def test_pymoo_s_runners_give_the_same_result():
     np.testing.assert_array_equal(result.F, base.F)
 
 
-@pytest.mark.slow
 def test_joblib_s_processes_give_the_same_result():
     pytest.importorskip("joblib", reason="pymoo's JoblibParallelization needs joblib, which is not installed")
     base = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
@@ -389,7 +388,6 @@ def test_joblib_s_processes_give_the_same_result():
     np.testing.assert_array_equal(result.F, base.F)
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of distributed's own making, while its cluster comes and goes
 def test_dask_s_workers_give_the_same_result():
     distributed = pytest.importorskip(

@@ -55,6 +55,22 @@ def compile_first(names: Iterable[str], *, quiet: bool) -> None:
         under_way.finish()
 
 
+@contextmanager
+def said_when_compiling(quiet: bool) -> Iterator[None]:
+    """Say once, if something has to be compiled in here, that it is; for what takes a few seconds at most."""
+    said = quiet
+
+    def told(_: object, seconds: float | None) -> None:
+        nonlocal said
+        if not said:
+            said = True
+            say(f"{ONCE}, a few seconds")
+            _say_where()
+
+    with told_of_compiling(told):
+        yield
+
+
 def _say_where() -> None:
     """Say where machine code is kept, if not in the usual place."""
     found = place()

@@ -77,7 +77,7 @@ def simplify(request: Request, shown: Stages) -> int:
             "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
             "use --algorithm nsga2_v1 with it, or --measure rms"
         )
-    with compiling(SEARCH, shown) as compiled:
+    with compiling((*SEARCH, "scores") if output.refit else SEARCH, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
             format_to_write(output.format).check(problem.model)

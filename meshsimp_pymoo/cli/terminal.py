@@ -140,6 +140,7 @@ class Stages:
         finally:
             done.set()
             ticking.join()
+            draw()
             self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from inspect import getclosurevars
 from pathlib import Path
@@ -206,6 +206,8 @@ class Stored:
             try:
                 found = self._files.load_overload(sig, target_context)
             except Exception as problem:  # whatever unpickling half a file may raise
+                with suppress(OSError):
+                    self._files.flush()
                 _warn_once(
                     f"compiled code in {self.cache_path} cannot be read ({reason_of(problem)}); it is made again"
                 )

@@ -2,10 +2,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
+from meshsimp_pymoo.plane import nearest
+
+build_tree, nearest_segment = map(from_python, (nearest.build_tree, nearest.nearest_segment))
 
 
 def search(points, ends, key, x, y, guess):

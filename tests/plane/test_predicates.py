@@ -3,10 +3,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from delaunay import in_circle, orient, rational
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshsimp_pymoo.plane.predicates import circle_sign, circle_sign_exact, exact_ranges, orient_sign, orient_sign_exact
+from meshsimp_pymoo.plane import predicates
+from meshsimp_pymoo.plane.predicates import exact_ranges
+
+circle_sign, circle_sign_exact, orient_sign, orient_sign_exact = (
+    from_python(getattr(predicates, name))
+    for name in ("circle_sign", "circle_sign_exact", "orient_sign", "orient_sign_exact")
+)
 
 SCALE = 2**52
 anywhere = st.integers(0, SCALE)

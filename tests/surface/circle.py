@@ -145,7 +145,7 @@ class Circle:
         row = [d.sum(), len(faces), len(np.unique(faces)), (d * d).sum(), d.max(), (~covered).sum()]
         return Scored(as_quality(np.array(row, float), self.total_weight), d, covered)
 
-    def refit(self, kept: BoolArray) -> Refitted:
+    def refit(self, kept: BoolArray, *, until: float | None = None) -> Refitted:
         """Return the fan as it is: nothing moves here."""
         mesh = self.simplify(kept)
         rows = np.flatnonzero(kept)

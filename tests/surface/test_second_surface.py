@@ -46,7 +46,7 @@ from meshsimp_pymoo.search.local_search import relocate, relocate_all
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES
-from meshsimp_pymoo.surface.moves import exchange, site_mask, total_cost, try_exchange
+from meshsimp_pymoo.surface.moves import exchange, snapshot, total_cost, try_exchange
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Surface
 
@@ -196,8 +196,8 @@ def test_nothing_is_kept_on_disk_of_what_was_compiled_for_it():
     """Else a process that cannot import its classes could thin nothing any more, and old answers would be given."""
     for surface in (circle(9), MeshProblem("roof:3").surface):
         thinning(surface)
-    for loop in (thin, site_mask):
-        kept = loop._cache._cache_file._load_index()
+    for loop in (thin, snapshot):
+        kept = loop._cache._files._cache_file._load_index()
         records = {getattr(kind, "instance_class", None) for signature, *_ in kept for kind in signature}
         assert Ground in records
         assert Round not in records

@@ -38,11 +38,13 @@ def run(args: argparse.Namespace) -> int:
 
     from meshsimp_pymoo import datasets
     from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.terminal import OK
     from meshsimp_pymoo.formats.options import Options
 
     if args.model is not None:
-        return _describe(args.model, settings_from(args, Options), as_json=args.json)
+        with said_when_compiling(quiet=False):
+            return _describe(args.model, settings_from(args, Options), as_json=args.json)
 
     lines = datasets.describe()
     print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))

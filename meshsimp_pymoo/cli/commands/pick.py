@@ -50,6 +50,7 @@ def add(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Say which solution of the front in ``args.front`` is meant, and write its mesh if a file is named."""
     from meshsimp_pymoo.cli.arguments import wishes_of
+    from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.requests import Wish
     from meshsimp_pymoo.cli.tiling import pick_tiled
     from meshsimp_pymoo.files import claim_file
@@ -58,9 +59,10 @@ def run(args: argparse.Namespace) -> int:
 
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
-    if is_tiled(args.front):
-        return pick_tiled(args.front, args.model, wish, args.solution, path, **shown)
-    return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
+    with said_when_compiling(args.quiet):
+        if is_tiled(args.front):
+            return pick_tiled(args.front, args.model, wish, args.solution, path, **shown)
+        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
 
 
 def _pick(

@@ -30,12 +30,14 @@ def run(args: argparse.Namespace) -> int:
     """Make the report of the experiment, or the page of the front, in ``args.output`` anew."""
     from pathlib import Path
 
+    from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.reporting import report_on_experiment, report_on_front
     from meshsimp_pymoo.errors import UsageError
 
     out, shown = Path(args.output), {"quiet": args.quiet, "as_json": args.json}
     if (out / "front.csv").is_file():
-        return report_on_front(out, args.model, **shown)
+        with said_when_compiling(args.quiet):
+            return report_on_front(out, args.model, **shown)
     if args.model is not None:
         raise UsageError(f"--model is for the page of a front; {out} holds none")
     return report_on_experiment(out, {}, **shown)

@@ -43,14 +43,17 @@ def run(args: argparse.Namespace) -> int:
     from contextlib import ExitStack
     from pathlib import Path
 
+    from meshsimp_pymoo.cli.preparing import compile_first
     from meshsimp_pymoo.cli.reporting import report_on_experiment
     from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say
     from meshsimp_pymoo.comparison.config import read_experiment_file
     from meshsimp_pymoo.comparison.runner import run_experiment
+    from meshsimp_pymoo.warming import SEARCH
 
     experiment = read_experiment_file(args.config, folder=args.models)
     out = Path(args.output or f"{Path(args.config).stem}_results")
     jobs = args.jobs or os.cpu_count() or 1
+    compile_first((*SEARCH, "insertion"), quiet=args.quiet)
     start = time.perf_counter()
     try:
         with bar(args.quiet, "runs") as show, ExitStack() as open_until_done:

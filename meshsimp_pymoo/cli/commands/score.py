@@ -52,6 +52,7 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from meshsimp_pymoo.cli.arguments import settings_from
+    from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.terminal import OK
     from meshsimp_pymoo.files import claim_file
     from meshsimp_pymoo.formats.options import Options
@@ -59,7 +60,8 @@ def run(args: argparse.Namespace) -> int:
 
     path = None if args.output is None else claim_file(args.output, PICTURES, overwrite=args.overwrite)
     options, rules = settings_from(args, Options), settings_from(args, Rules)
-    summary, lines = _scored(args.model, options, rules, args.outside, args.other, args.front, path)
+    with said_when_compiling(quiet=False):
+        summary, lines = _scored(args.model, options, rules, args.outside, args.other, args.front, path)
     print(json.dumps(summary, indent=2) if args.json else "\n".join(lines))
     return OK
 

@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import json
+import os
+import pkgutil
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+import meshsimp_pymoo
+from meshsimp_pymoo import warming
+from meshsimp_pymoo.compiling.store import Stored
+from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
+
+# The specialisations that the first search compiles; how many is what it costs. If it has to be more, say why here.
+MOST_SPECIALISATIONS = 145
+
+
+def test_what_python_calls_is_in_one_part_each():
+    found = set()
+    for module in pkgutil.walk_packages(meshsimp_pymoo.__path__, "meshsimp_pymoo."):
+        if module.name == "meshsimp_pymoo.__main__":
+            continue
+        for name, item in vars(import_module(module.name)).items():
+            if isinstance(getattr(item, "_cache", None), Stored) and item.__module__ == module.name:
+                found.add(f"{module.name.partition('.')[2]}:{name}")
+    named = [name for part in PARTS for name in part.entries]
+    assert sorted(named) == sorted(found)
+    assert set(SEARCH) <= {part.name for part in PARTS}
+
+
+FIRST_CALL = """
+import json, os, sys
+if hasattr(os, "sched_setaffinity"):
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # one core: all is compiled in this process
+from meshsimp_pymoo.__main__ import COMPILER
+os.environ.update(COMPILER)
+from meshsimp_pymoo import cli
+
+facts = {"compiled": 0, "entries": [], "late": []}
+
+def watch():
+    from numba.core import event
+    from meshsimp_pymoo import warming
+    from meshsimp_pymoo.cli import searching
+    from meshsimp_pymoo.compiling import store
+
+    class Counter(event.Listener):
+        def on_start(self, event):
+            facts["compiled"] += 1
+
+        def on_end(self, event):
+            pass
+
+    event.register("numba:compile", Counter())
+    store._listeners.append(lambda function, seconds: facts[where].append(function.__name__))
+    search = searching._search
+
+    def begun(*arguments):
+        global where
+        where = "late"
+        return search(*arguments)
+
+    searching._search = begun
+
+where = "entries"
+watch()
+facts["code"] = cli.main(sys.argv[1:])
+print(json.dumps(facts))
+"""
+
+
+@pytest.fixture(scope="module")
+def first_call(tmp_path_factory):
+    """Return what was compiled and said when a search was called on a machine that had compiled nothing."""
+    folder = tmp_path_factory.mktemp("first")
+    out = folder / "out"
+    command = ["simplify", "horseshoe:80", "-o", str(out), "--generations", "2", "--population", "8", "--refit"]
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_CALL, *command],
+        env=os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    *said, facts = done.stdout.splitlines()
+    run = json.loads((out / "run.json").read_text())
+    return done.stderr, said, json.loads(facts), run
+
+
+def test_the_first_call_says_that_it_compiles_and_keeps_it_apart(first_call):
+    err, said, facts, run = first_call
+    assert facts["code"] == 0
+    assert err.startswith("meshsimp: compiling once for this machine, about ")
+    assert run["compile_seconds"] > 1
+    assert run["seconds"] < 5
+    assert any(line.startswith("compiled once for this machine: ") for line in said)
+
+
+def test_a_search_finds_everything_compiled(first_call):
+    _, _, facts, _ = first_call
+    assert facts["late"] == []
+    parts = (*SEARCH, "scores")
+    names = {name.partition(":")[2] for part in PARTS if part.name in parts for name in part.entries}
+    assert set(facts["entries"]) == names
+
+
+def test_the_specialisations_do_not_grow(first_call):
+    _, _, facts, _ = first_call
+    assert facts["compiled"] <= MOST_SPECIALISATIONS
+
+
+def test_two_processes_compile_where_there_are_two_cores(tmp_path, monkeypatch):
+    code = "from meshsimp_pymoo import warming\nparts = ['files', 'folded scans']\n"
+    code += "warming.PARTS = [part._replace(beside=part.name == parts[1]) for part in warming.PARTS]\n"
+    code += "with warming.Warming(parts) as found:\n    print(found._beside is not None)\n    found.finish()\n"
+    code += "print([part.name for part in warming.missing(parts)])"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    if not hasattr(os, "sched_getaffinity") or len(os.sched_getaffinity(0)) < 2:
+        pytest.skip("this process may use one core only")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.split("\n")[:2] == ["True", "[]"]
+
+
+def test_where_no_second_process_can_be_started_all_is_compiled_in_this_one(monkeypatch):
+    done = []
+    parts = [part._replace(work=lambda name=part.name: done.append(name)) for part in PARTS]
+    monkeypatch.setattr(warming, "PARTS", parts)
+    monkeypatch.setattr(warming, "_has_code", lambda entry: any(entry in p.entries for p in parts if p.name in done))
+
+    def fail(*_, **__):
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(warming.subprocess, "Popen", fail)
+    with Warming(SEARCH) as found:
+        found.finish()
+    assert sorted(done) == sorted(SEARCH)
