@@ -47,6 +47,8 @@ MOVES_PER_VERTEX = (20.0, 1000.0)
 FIRST_SHARE = 0.12
 SLOWEST = 4000.0
 SECONDS_A_MOVE = 2e-6
+# What measuring a subset takes for each vertex of the model, about [s].
+SECONDS_A_VERTEX = 4e-8
 # Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs; but
 # never more than the second share.
 LAST_SHARE = 0.03
@@ -282,7 +284,14 @@ class MemeticSearch(GeneticAlgorithm):
         surface = self.problem.surface
         limit = time_limit(self)
         seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
-        X = between_the_rungs(surface, pop.get("X"), pop.get("F"), most=self.survival.rungs[-1], seconds=seconds)
+        X = between_the_rungs(
+            surface,
+            pop.get("X"),
+            pop.get("F"),
+            most=self.survival.rungs[-1],
+            seconds=seconds,
+            threads=getattr(self.problem.elementwise_runner, "n_threads", 1),
+        )
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
             self.evaluator.eval(self.problem, extra, algorithm=self)
@@ -290,11 +299,17 @@ class MemeticSearch(GeneticAlgorithm):
 
 
 def between_the_rungs(
-    surface: Surface, X: NDArray[np.bool_], F: NDArray[np.float64], *, most: float, seconds: float | None = None
+    surface: Surface,
+    X: NDArray[np.bool_],
+    F: NDArray[np.float64],
+    *,
+    most: float,
+    seconds: float | None = None,
+    threads: int = 1,
 ) -> NDArray[np.bool_]:
     """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
 
-    With ``seconds`` no gap is begun that would end after that time; those that are left are spread over the ladder.
+    With ``seconds`` there are no more than can be found and measured on so many threads by then, spread over the ladder.
 
     Beyond the most accurate of them, where keeping all vertices is not the best (a scan whose outline is not covered),
     those of the thinned model that are better, of at most ``most`` triangles.
@@ -302,7 +317,12 @@ def between_the_rungs(
     order = np.argsort(F[:, 1], kind="stable")
     whole = thinned(surface)
     most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
-    end = np.inf if seconds is None else time.perf_counter() + seconds
+    end = np.inf
+    if seconds is not None:
+        # half of the time is for finding them, half for measuring what is found
+        end = time.perf_counter() + seconds / 2.0
+        measured = threads * seconds / 2.0 / (SECONDS_A_VERTEX * X.shape[1])
+        most_rows = min(most_rows, max(int(measured / len(X)), 1))
     longest = [0.0]
 
     def one(k: int) -> list[NDArray[np.bool_]]:
