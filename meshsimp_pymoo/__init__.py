@@ -4,6 +4,7 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
 
     errors, arrays                 words that all share: one-line errors, types of arrays
     settings, workers, indicators  what a user may set; threads, processes, Dask; dominance, knee, hypervolume
+    compiling/     functions that Python calls and functions inside them, their machine code on disk
     files          files and folders whole or not at all, locks, arrays without pickles
     plane/         predicates, triangulation, footprint, faces: arrays in, arrays out
     formats/       one file a format, in one table; ends in a SourceMesh
@@ -17,6 +18,7 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
     front          Front: a sequence of solutions to choose from
     tiles/         height grids too big for one piece
     comparison/    the study: YAML files, the runs they ask for, tables, findings
+    warming        what has to be compiled once on a machine
     cli/           the shell command ``meshsimp``
 
 Public names are imported when they are first used, so that ``import meshsimp_pymoo`` is quick.

@@ -3,7 +3,8 @@
 Thinning, insertion and annealing are compiled loops over a surface's *ground* (a NamedTuple: what does not change) and
 its *books* (a NamedTuple: the triangulation of a subset that is being changed). They call the functions below, which
 have no body: a surface says with `answers` which compiled function is meant where the ground is of its class, and the
-compiler chooses by that class when it compiles the loop. It costs nothing when the loop runs.
+compiler chooses by that class when it compiles the loop. It costs nothing when the loop runs. Both records are handed
+on as pointers (:mod:`~meshsimp_pymoo.plane.borrow`): their members are read by name.
 
 A vertex that is in the triangulation is a *site*. Costs are sums over the vertices, in the measure of the rules; moves
 are of one site v to one vertex w, where -1 for either means none: so removals and insertions are moves too. *Cells*,
@@ -65,7 +66,7 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
         def choose(ground: Any, *_: Any) -> Any:
             return called if getattr(ground, "instance_class", None) is record else None
 
-        # inlined, or every call would hand over some fifty arrays: annealing takes half as long again
+        # inlined: a call of a call
         overload(question, strict=False, jit_options=ANSWER_OPTIONS)(choose)
         question.__dict__.setdefault("parts", []).append(function)
         return function
