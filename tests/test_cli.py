@@ -30,6 +30,7 @@ from meshsimp_pymoo.cli.terminal import front_in_words
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh, written_formats
+from meshsimp_pymoo.front import FrontSolution
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
@@ -159,6 +160,29 @@ def test_the_budget_in_seconds_is_kept(tmp_path):
     seconds = json.loads((tmp_path / "out" / "run.json").read_text())["seconds"]
     assert 0.3 <= seconds <= 0.55
     assert time.perf_counter() - start < 8
+
+
+def test_refitting_is_within_the_time_that_is_given_and_what_is_left_out_is_said(tmp_path, monkeypatch, capsys):
+    def slowly(self, **how):
+        time.sleep(0.05)
+        return refit(self, **how)
+
+    refit = FrontSolution.refit
+    monkeypatch.setattr(FrontSolution, "refit", slowly)
+    command = ("simplify", "jacksboro:20", "-o", tmp_path / "out", "--time", "1s", "--refit", "--triangles", 40)
+    assert run(*command, "--population", 12) == 0
+    facts = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert facts["seconds"] <= 0.8
+    assert facts["seconds"] + facts["refit_seconds"] <= 1.1
+    rows = list(csv.DictReader((tmp_path / "out" / "front.csv").read_text().splitlines()))
+    fitted = [row for row in rows if row["refitted_error"]]
+    said = capsys.readouterr()
+    written = len(list((tmp_path / "out" / "meshes").iterdir()))
+    assert f"{len(fitted)} of {written} meshes are refitted in the time given" in said.err
+    assert 1 <= len(fitted) < written
+    assert len(list((tmp_path / "out" / "refitted").iterdir())) == len(fitted)
+    assert rows[facts["chosen"]]["refitted_error"]  # first
+    assert Front.load(tmp_path / "out")[facts["chosen"]].triangles <= 40
 
 
 # ----------------------------------------------------------------------------------------------------- the mesh wanted

@@ -18,7 +18,7 @@ from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
 # Versions (major, minor) of Numba with which the tests of this room have passed.
-KNOWN = ((0, 68),)
+KNOWN = tuple((0, minor) for minor in range(61, 69))
 
 
 def is_known() -> bool:
@@ -81,7 +81,7 @@ class LinkedFunction(CPUDispatcher):
 
     def __init__(self, py_func: Any, locals: Any = None, targetoptions: Any = None, pipeline_class: Any = None) -> None:
         options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True} | (targetoptions or {})
-        super().__init__(py_func, locals, options, pipeline_class or LinkedCompiler)
+        super().__init__(py_func, locals or {}, options, pipeline_class or LinkedCompiler)
         self._annotated = [parameter.annotation for parameter in inspect.signature(py_func).parameters.values()]
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:

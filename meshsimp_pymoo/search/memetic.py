@@ -309,7 +309,7 @@ def between_the_rungs(
 ) -> NDArray[np.bool_]:
     """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
 
-    With ``seconds`` there are no more than can be found and measured on so many threads by then, spread over the ladder.
+    With ``seconds`` no more than can be found and measured on so many threads by then, spread over the ladder.
 
     Beyond the most accurate of them, where keeping all vertices is not the best (a scan whose outline is not covered),
     those of the thinned model that are better, of at most ``most`` triangles.
