@@ -8,10 +8,6 @@ from pathlib import Path
 import pytest
 from browser import launched, playwright_engine
 
-from meshsimp_pymoo.__main__ import COMPILER
-
-# as the shell command compiles: what its processes in these tests have compiled is found here, and the other way round
-os.environ.update(COMPILER)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 

@@ -35,8 +35,6 @@ FIRST_CALL = """
 import json, os, sys
 if hasattr(os, "sched_setaffinity"):
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # one core: all is compiled in this process
-from meshsimp_pymoo.__main__ import COMPILER
-os.environ.update(COMPILER)
 from meshsimp_pymoo import cli
 
 facts = {"compiled": 0, "entries": [], "late": []}

@@ -26,7 +26,7 @@ class Compiling:
         if not self._warming.parts:
             return
         before = self.seconds
-        with self._shown.stage("compiling", ONCE):
+        with self._shown.stage("compiling", f"{ONCE}, about {self._warming.expected:.0f} s"):
             self._warming.finish()
         self.seconds = before + self._shown.seconds["compiling"]
 

@@ -24,7 +24,8 @@ if linking.is_known():
 
 def entry(function: Function) -> Function:
     """Compile a function that Python calls, when it is called, and keep its machine code on disk."""
-    compiled: Any = numba.njit(**OPTIONS, no_cfunc_wrapper=True)(function)
+    how = {"pipeline_class": linking.EntryCompiler} if linking.is_known() else {}
+    compiled: Any = numba.njit(**OPTIONS, **how, no_cfunc_wrapper=True)(function)
     if not config.DISABLE_JIT:
         compiled._cache = Stored(function)
     found: Function = compiled

@@ -9,10 +9,12 @@ versions they are known to work with; see :func:`~meshsimp_pymoo.compiling.funct
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numba
-from numba.core import types
+from numba.core import config, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
@@ -26,6 +28,44 @@ def is_known() -> bool:
     return tuple(numba.version_info[:2]) in KNOWN
 
 
+@contextmanager
+def _one_level() -> Iterator[None]:
+    """Have LLVM optimise at its first level: a third quicker to compile than the third, and no slower to run here.
+
+    Numba's level is one for the process and belongs to whoever runs it. This is entered under Numba's lock, so nothing
+    else is optimised meanwhile.
+    """
+    before = config.OPT, config.LOOP_VECTORIZE
+    config.OPT, config.LOOP_VECTORIZE = type(config.OPT)(1), 0
+    try:
+        yield
+    finally:
+        config.OPT, config.LOOP_VECTORIZE = before
+
+
+class _Optimised(JITCodeLibrary):
+    """A function's code, optimised at one level whatever the process is set to."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        with _one_level():
+            super()._optimize_functions(ll_module)
+
+    def _optimize_final_module(self) -> None:
+        with _one_level():
+            super()._optimize_final_module()
+
+
+class EntryCompiler(Compiler):
+    """The usual steps of compiling, into a library that is optimised at one level."""
+
+    def define_pipelines(self) -> Any:
+        """Return the usual steps."""
+        state = self.state
+        state.library = _Optimised(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().define_pipelines()
+
+
 class _NoMachineCode:
     """In place of what assembles: there is nothing to tell where a function's environment is."""
 
@@ -33,7 +73,7 @@ class _NoMachineCode:
         """Do nothing."""
 
 
-class _Linked(JITCodeLibrary):
+class _Linked(_Optimised):
     """A function's code before optimisation, to be linked into others; it cannot be run by itself."""
 
     @property

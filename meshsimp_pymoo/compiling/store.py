@@ -27,6 +27,7 @@ import platformdirs
 from numba.core import config
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache, _CacheLocator
 
+from meshsimp_pymoo.compiling.linking import is_known
 from meshsimp_pymoo.errors import CodeWarning, reason_of
 
 PACKAGE = __name__.partition(".")[0]
@@ -151,9 +152,9 @@ class _Locator(_CacheLocator):
         return made_from(self._function)
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions and levels of optimisation apart in one folder."""
+        """Return what tells functions apart in one folder, and levels of optimisation where we do not choose them."""
         module = self._function.__module__.partition(".")[2] or self._function.__module__
-        return f"{module}-O{int(config.OPT)}{'v' if config.LOOP_VECTORIZE else ''}"
+        return module if is_known() else f"{module}-O{int(config.OPT)}{'v' if config.LOOP_VECTORIZE else ''}"
 
     @classmethod
     def from_function(cls, function: Any, _: str) -> Any:

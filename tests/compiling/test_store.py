@@ -88,8 +88,8 @@ def test_a_temporary_folder_of_somebody_else_is_refused(fresh_place, tmp_path):
 BEGIN = """\
 import tempfile
 tempfile.tempdir = {temporary!r}
-from meshsimp_pymoo.__main__ import run
-raise SystemExit(run())
+from meshsimp_pymoo.cli import main
+raise SystemExit(main())
 """
 PLACES = {"user's cache": 1, "temporary folder": 2, "nowhere": 3}
 
@@ -214,7 +214,10 @@ def test_a_full_disk_costs_a_word_and_nothing_else(kept, monkeypatch):
     assert not loaded(kept())  # and no second word
 
 
-def test_levels_of_optimisation_are_kept_apart(kept, monkeypatch):
-    loaded(kept())
-    monkeypatch.setattr(store.config, "OPT", 2)
-    assert not store.has_code(kept())
+def test_the_level_of_optimisation_is_ours_and_levels_are_kept_apart_where_it_is_not(kept, monkeypatch):
+    for is_ours in (True, False):
+        monkeypatch.setattr(store, "is_known", lambda is_ours=is_ours: is_ours)
+        monkeypatch.setattr(store.config, "OPT", 3)
+        loaded(kept())
+        monkeypatch.setattr(store.config, "OPT", 2)
+        assert store.has_code(kept()) == is_ours
