@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import warnings
 
 # Of a foreign exception's text, in a line of ours.
@@ -44,6 +45,12 @@ def reason_of(error: BaseException) -> str:
     """
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split())[:LONGEST_REASON]
+
+
+def raise_if_memory(error: BaseException) -> None:
+    """Raise MemoryError if that is what an exception says in its way: there is nothing wrong with a file then."""
+    if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+        raise MemoryError from error
 
 
 def warn_of(message: str) -> None:

@@ -19,7 +19,7 @@ from typing import IO
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray
-from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
+from meshsimp_pymoo.errors import ModelError, ResultError, raise_if_memory, reason_of
 
 # Deflate cannot shrink data by more than 1032:1, so a .npz member that claims more is a forgery.
 DEFLATE_LIMIT = 1100
@@ -313,6 +313,7 @@ def read_npz(stream: IO[bytes], name: str) -> dict[str, AnyArray]:
     except (ModelError, MemoryError):
         raise
     except Exception as error:  # its directory and its packed data may be damaged in any way
+        raise_if_memory(error)
         raise ModelError(f"{name}: is not a complete .npz file ({reason_of(error)}); copy or save it again") from error
     return arrays
 

@@ -8,10 +8,19 @@ from pathlib import Path
 import pytest
 from browser import launched, playwright_engine
 
+from meshsimp_pymoo.warming import SEARCH, Warming
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled() -> None:
+    """Compile what searches need, in two processes, where it is missing: else the first test that searches does."""
+    with Warming(SEARCH) as warming:
+        warming.finish()
 
 
 @pytest.fixture(scope="session")

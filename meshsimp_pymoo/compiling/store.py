@@ -106,7 +106,8 @@ def parts_of(function: Any) -> Iterator[Any]:
         yield item
         if not hasattr(item, "__code__"):
             continue
-        waiting += getattr(item, "parts", [])
+        # answers of others change nothing on disk: code for their records is not kept
+        waiting += [part for part in getattr(item, "parts", []) if part.__module__.startswith(f"{PACKAGE}.")]
         found = getclosurevars(item)
         for value in (*found.globals.values(), *found.nonlocals.values()):
             owner = getattr(value, "__module__", None)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, reason_of, warn_of
+from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, raise_if_memory, reason_of, warn_of
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
@@ -233,6 +233,7 @@ def _guarded(name: str) -> Iterator[None]:
     except (ModelError, ModelWarning, MemoryError):
         raise
     except Exception as error:  # GDAL's own errors, and what its answers break in a damaged file
+        raise_if_memory(error)
         raise ModelError(f"{name}: cannot be read as a GeoTIFF ({reason_of(error)}); export it again") from error
 
 

@@ -6,7 +6,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from meshsimp_pymoo.errors import ModelError, reason_of
+from meshsimp_pymoo.errors import ModelError, raise_if_memory, reason_of
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
@@ -44,6 +44,7 @@ def _mapped(path: Path, name: str) -> AnyArray:
             warnings.simplefilter("ignore")  # about the header's spelling
             heights = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as problem:  # its header is Python text: anything may break
+        raise_if_memory(problem)
         raise ModelError(
             f"{name}: is not a whole NumPy array file ({reason_of(problem)}); save or copy it again"
         ) from None

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from meshsimp_pymoo import formats
 from meshsimp_pymoo.discovery import modules_in
-from meshsimp_pymoo.errors import ModelError, ModelWarning, reason_of
+from meshsimp_pymoo.errors import ModelError, ModelWarning, raise_if_memory, reason_of
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.settings import defaults_of, settings_of
@@ -330,9 +330,10 @@ def guarded(kind: Format, name: str) -> Iterator[None]:
             f"{name}: {kind.title} needs {library}; install it by pip install 'meshsimp-pymoo[{kind.extra}]'"
         ) from None
     except OSError as error:
+        raise_if_memory(error)
         raise ModelError(f"{name}: cannot be read ({reason_of(error)}); check the path and its permissions") from error
     except MemoryError as error:
-        raise ModelError(f"{name}: does not fit into memory; cut it into tiles first") from error
+        raise ModelError(f"{name}: does not fit into memory; take a part of it, or tiles (--tile)") from error
 
 
 # ------------------------------------------------------------------------------------------------------------ writing

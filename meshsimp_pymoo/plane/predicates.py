@@ -137,11 +137,6 @@ def orient_sign(adx: float, ady: float, bdx: float, bdy: float, exact_area: floa
         The differences a - p and b - p of coordinates that are multiples of 2**-52 in [0, 1].
     exact_area : float
         Magnitude up to which double precision is exact for this model (see the module's text); 0 is always valid.
-
-    Examples
-    --------
-    >>> orient_sign(-0.5, -0.25, 0.5, -0.25, 0.0), orient_sign(-0.5, -0.5, 0.5, 0.5, 0.0)
-    (1, 0)
     """
     left = adx * bdy
     right = ady * bdx
@@ -207,13 +202,6 @@ def circle_sign(adx: float, ady: float, bdx: float, bdy: float, cdx: float, cdy:
         The differences a - p, b - p and c - p of coordinates that are multiples of 2**-52 in [0, 1].
     exact_lift : float
         Sum of squared distances up to which double precision is exact for this model; 0 is always valid.
-
-    Examples
-    --------
-    >>> circle_sign(0.0, -1.0, 1.0, -1.0, 1.0, 0.0, 0.0)
-    0
-    >>> circle_sign(-0.25, -0.5, 0.75, -0.5, 0.75, 0.5, 0.0)
-    1
     """
     alift = adx * adx + ady * ady
     blift = bdx * bdx + bdy * bdy

@@ -50,6 +50,13 @@ def test_predicates_equal_rational_arithmetic(xy):
     assert circle_sign_exact(*differences) == circle
 
 
+def test_signs_by_hand():
+    assert orient_sign(-0.5, -0.25, 0.5, -0.25, 0.0) == 1
+    assert orient_sign(-0.5, -0.5, 0.5, 0.5, 0.0) == 0
+    assert circle_sign(0.0, -1.0, 1.0, -1.0, 1.0, 0.0, 0.0) == 0
+    assert circle_sign(-0.25, -0.5, 0.75, -0.5, 0.75, 0.5, 0.0) == 1
+
+
 def test_upright_rectangles_of_inexact_sides_are_ties():
     rng = np.random.default_rng(3)
     for _ in range(200):
