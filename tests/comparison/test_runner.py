@@ -22,7 +22,7 @@ from meshsimp_pymoo.comparison import analysis, meshlab, runner
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.comparison.figures import meshes_figure
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
-from meshsimp_pymoo.comparison.report import write_tables
+from meshsimp_pymoo.comparison.report import write_report, write_tables
 from meshsimp_pymoo.comparison.runner import plan, run_experiment
 from meshsimp_pymoo.comparison.store import ExperimentWarning, RunStore, read_run
 from meshsimp_pymoo.comparison.study import Study
@@ -596,3 +596,20 @@ def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findin
     said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
     assert "On face the *error* is the RMS error (root mean square), not the sum of the deviations." in said
     assert "attribute *importance*" in said
+
+
+def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp_path):
+    numbers = [round(0.1 * row, 1) for row in range(25)]
+    (tmp_path / "study.yaml").write_text(
+        f"problems: [{{model: 'roof:5', weights: {numbers}}}, {{name: square, model: 'roof:5', weights: "
+        f"{[numbers[row : row + 5] for row in range(0, 25, 5)]}}}, 'roof:3']\n"
+        "algorithms: [{preset: nsga2_v1, parameters: {pop_size: 12}}]\nseeds: [1]\nbudgets: [{generations: 2}]\n",
+        encoding="utf-8",
+    )
+    assert run_experiment(tmp_path / "study.yaml", tmp_path / "out", jobs=1).finished == 3
+    study = write_report(tmp_path / "out")
+    assert [problem.rules.weights for problem in study.problems[::2]] == [numbers, None]
+    assert study.surface(study.problems[0]).total_weight == pytest.approx(sum(numbers))
+    said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
+    assert "On roof:5, square each vertex counts by a number of its own, from the configuration." in said
+    assert said.count("each vertex counts") == 1
