@@ -67,8 +67,6 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
     ModelError
         If there is neither a file nor a built-in model of this name, or it cannot be used.
     """
-    if options.patch not in (None, "front"):
-        raise ModelError(f'patch={options.patch!r} is unknown; use patch="front" or leave it out')
     source = _source_of(model, options)
     return front_patch(source, options.up) if options.patch == "front" else source
 

@@ -43,6 +43,7 @@ from meshsimp_pymoo.front import starting_front
 from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
+from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
 from meshsimp_pymoo.surface.measures import MEASURES
 
@@ -501,7 +502,7 @@ def test_errors_at_sizes_are_those_of_the_best_small_enough():
 
 
 @pytest.mark.parametrize(
-    "pin", [[12, 7], 12, (1, 2), np.array([3, 4]), np.array([[0.0, 0.5]]), "hull", ["hull", 12]], ids=str
+    "pin", [[12, 7], 12, (1, 2), np.array([3, 4]), np.array([[0.0, 0.5]]), "hull", ["hull", 12], {7}], ids=str
 )
 def test_what_is_pinned_is_pinned_again_when_the_front_is_read(pin, tmp_path):
     problem = MeshProblem("roof:5", pin=pin)
@@ -520,3 +521,15 @@ def test_weights_by_number_count_again_when_the_front_is_read(weights, tmp_path)
     again = Front.load(tmp_path / "out")
     assert again.quality == front.quality
     assert again.problem.evaluate(problem.pinned).tolist() == problem.evaluate(problem.pinned).tolist()
+
+
+def test_a_grid_with_gaps_and_weights_without_numbers_there_is_read_again(tmp_path):
+    heights = np.random.default_rng(1).random((6, 7))
+    heights[2:4, 3] = -LARGEST  # what GDAL writes where there is no sample
+    np.save(tmp_path / "dem.npy", heights)
+    weights = np.where(heights < 0, np.nan, 1.0 + heights)
+    problem = MeshProblem(tmp_path / "dem.npy", nodata=-LARGEST, weights=weights)
+    Front.from_subsets(problem, problem.pinned, ends=True).save(tmp_path / "out", page=False)
+    again = Front.load(tmp_path / "out").problem
+    assert again.options == problem.options == Options(nodata=-LARGEST)
+    assert again.model.hash == problem.model.hash

@@ -130,8 +130,8 @@ def test_constraints_bound_triangles_and_error():
         ({"max_triangles": 0}, "leaves no mesh"),
         ({"max_error": -1.0}, "is no error"),
         ({"max_error": float("nan")}, "is no error"),
-        ({"footprint": "box"}, "'box' is unknown"),
-        ({"outside": "zero"}, "'zero' is unknown"),
+        ({"footprint": "box"}, "footprint is 'box': expected one of model, hull"),
+        ({"outside": "zero"}, "outside is 'zero': expected one of nearest, ignore"),
         ({"n_threads": 0}, "no number of threads"),
     ],
 )

@@ -188,7 +188,8 @@ class HeightGrid:
         if self.nodata is not None:
             # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
             own = self.heights.dtype
-            missing |= values == (float(own.type(self.nodata)) if own.kind == "f" else self.nodata)
+            with np.errstate(over="ignore"):
+                missing |= values == (float(own.type(self.nodata)) if own.kind == "f" else self.nodata)
         if missing.any():
             i, j = np.argwhere(missing)[0]
             row = int(rows[i]) if np.ndim(rows) else rows + int(i)
