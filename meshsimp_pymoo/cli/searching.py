@@ -27,7 +27,7 @@ from meshsimp_pymoo.cli.terminal import (
     say,
     stop_if_interrupted,
 )
-from meshsimp_pymoo.cli.tiling import simplify_tiled, wants_tiles
+from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, shared_frame
@@ -61,6 +61,8 @@ def simplify(request: Request) -> int:
             if not output.quiet:
                 why = re.split("; only|, and tiles", str(reason))[0]
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
+    else:
+        refuse_alone(request.tiling)
     _claim(output, search)
     if PRESETS[search.algorithm].sums_only and not OBJECTIVES[request.rules.measure].is_sum:
         raise UsageError(

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import time
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +38,12 @@ from meshsimp_pymoo.workers import EngineError, open_engine
 
 # From this many samples on, a grid is thinned tile by tile without being asked.
 TILED_FROM = 2_000_000
-# What tiles do not know; refused where it is not what asks for nothing.
-UNKNOWN: dict[type[Any], tuple[str, ...]] = {
-    Search: ("time", "evaluations", "generations", "algorithm"),
-    Rules: ("pin", "weights", "measure"),
-    Options: ("max_edge", "patch"),
-    Output: ("refit",),
+# What tiles know, or what makes no difference to them; all else is refused where it is not what asks for nothing.
+KNOWN: dict[type[Any], tuple[str, ...]] = {
+    Search: ("seed", "threads", "checkpoint"),  # nothing is left to chance, and finished tiles are always saved
+    Rules: ("footprint", "outside"),  # a grid without gaps fills its hull
+    Options: ("up", "spacing", "nodata", "window"),
+    Output: ("folder", "overwrite", "format", "meshes", "page", "quiet", "json"),
 }
 
 
@@ -53,6 +53,16 @@ def wants_tiles(request: Request) -> bool:
         count = count_samples(request.model, window=request.options.window)
         return count is not None and count >= TILED_FROM
     return bool(request.tiling.tile)
+
+
+def refuse_alone(tiling: Tiling) -> None:
+    """Refuse what is said of tiles where a model is searched in one piece."""
+    for item in fields(tiling):
+        if item.name != "tile" and getattr(tiling, item.name) != item.default:
+            raise UsageError(
+                f"--{item.name} is for tiles, and this model is searched in one piece; leave it out, or ask for tiles "
+                f"(--tile {TILE})"
+            )
 
 
 def simplify_tiled(request: Request) -> int:
@@ -91,7 +101,7 @@ def simplify_tiled(request: Request) -> int:
             front, chosen, missed = _choose(wish, front, threads)
             run = {
                 "options": plain(request.options),
-                "settings": request.recorded | {"tile": tile, "most": what["most"]},
+                "settings": request.wanted | {"tile": tile, "most": what["most"]},
                 "seconds": round(time.perf_counter() - start, 3),
             }
             _claim(output)  # somebody may have put something else there meanwhile, which would be replaced
@@ -150,11 +160,11 @@ def _has_pieces(out: Path) -> bool:
 
 def _refuse_unknown(request: Request) -> None:
     for part in (request.search, request.rules, request.options, request.output):
-        for name in UNKNOWN[type(part)]:
-            if getattr(part, name) != getattr(type(part), name):
+        for item in fields(part):
+            if item.name not in KNOWN[type(part)] and getattr(part, item.name) != item.default:
                 raise UsageError(
-                    f"--{name.replace('_', '-')} does not go with tiles, which are thinned and not searched; leave it "
-                    "out, or do without tiles (--tile none)"
+                    f"--{item.name.replace('_', '-')} does not go with tiles, which are thinned and not searched; "
+                    "leave it out, or do without tiles (--tile none)"
                 )
     if request.wish.triangles == 1:
         raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
