@@ -42,8 +42,8 @@ from meshsimp_pymoo.comparison.analysis import (
     rank_sum,
     unary_scores,
 )
-from meshsimp_pymoo.comparison.store import RunStore, StoredRun, read_experiment, read_model
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
+from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -245,6 +245,20 @@ class Study:
     def __init__(self, out: str | os.PathLike[str]) -> None:
         self.out = Path(out)
         self.content = read_experiment(self.out)
+        store = RunStore(self.out)
+        try:
+            self._take(store)
+        except (AttributeError, KeyError, TypeError, ValueError) as problem:
+            what = f"{problem} is missing" if isinstance(problem, KeyError) else reason_of(problem)
+            raise ResultError(
+                f"{self.out / EXPERIMENT_FILE}: is damaged ({what}); `meshsimp run` writes it anew"
+            ) from None
+        self.damaged = store.damaged
+        if not self._runs:
+            raise ResultError(f"{self.out}: none of its runs is finished; `meshsimp run` does them")
+
+    def _take(self, store: RunStore) -> None:
+        """Take over what the record says, and the runs that it names."""
         self.title: str = self.content["title"]
         self.skipped: list[str] = list(self.content["skipped"])
         self.missing: list[str] = []
@@ -263,14 +277,10 @@ class Study:
         ]
         self.budgets: list[str] = [item["name"] for item in self.content["budgets"]]
         self.methods: list[str] = [item["name"] for item in self.content["algorithms"]]
-        store = RunStore(self.out)
         self._runs: dict[tuple[str, str, str, int], list[StoredRun]] = {}
         self._expected = {item["name"]: len(item["merged_values"]) for item in self.content["algorithms"]}
         self._fill(store)
         self._classic = self._read_classic(store)
-        self.damaged = store.damaged
-        if not self._runs:
-            raise ResultError(f"{self.out}: none of its runs is finished; `meshsimp run` does them")
 
     def _fill(self, store: RunStore) -> None:
         for item in self.content["runs"]:

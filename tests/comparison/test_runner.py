@@ -24,7 +24,7 @@ from meshsimp_pymoo.comparison.figures import meshes_figure
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
 from meshsimp_pymoo.comparison.report import write_report, write_tables
 from meshsimp_pymoo.comparison.runner import plan, run_experiment
-from meshsimp_pymoo.comparison.store import ExperimentWarning, RunStore, read_run
+from meshsimp_pymoo.comparison.store import FORMAT, ExperimentWarning, RunStore, read_run
 from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
@@ -613,3 +613,27 @@ def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp
     said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
     assert "On roof:5, square each vertex counts by a number of its own, from the configuration." in said
     assert said.count("each vertex counts") == 1
+
+
+def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one_line(stored, capsys):
+    record = stored / "experiment.json"
+    content = json.loads(record.read_text(encoding="utf-8"))
+    assert content["format"] == FORMAT == 2
+
+    def told(**changed):
+        record.write_text(json.dumps(content | changed), encoding="utf-8")
+        assert main(["report", str(stored)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    without_rules = [{key: item[key] for key in item if key != "rules"} for item in content["problems"]]
+    assert "experiment.json: is not of the format 2 that this version reads; run it again" in told(
+        format=1, problems=without_rules
+    )
+    assert "experiment.json: is damaged ('rules' is missing); `meshsimp run` writes it anew" in told(
+        problems=without_rules
+    )
+    assert "experiment.json: is damaged (footprint is 3: expected one of model, hull)" in told(
+        problems=[problem | {"rules": {"footprint": 3}} for problem in content["problems"]]
+    )
+    assert "experiment.json: is damaged (" in told(runs=[None])
