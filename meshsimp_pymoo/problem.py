@@ -26,7 +26,6 @@ from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
     MEASURES,
-    OBJECTIVES,
     REGIONS,
     SQUARES,
     TRIANGLES,
@@ -34,6 +33,7 @@ from meshsimp_pymoo.surface.measures import (
     VERTICES,
     Quality,
     as_quality,
+    checked_objectives,
 )
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
@@ -169,7 +169,7 @@ class MeshProblem(ElementwiseProblem):
                 )
             self.surface: Surface = cast("Surface", model)
             names = objectives if objectives is not None else (self.surface.rules.measure, "triangles")
-            self.objectives = _checked_objectives(names)
+            self.objectives = checked_objectives(names)
             if self.objectives[0] != self.surface.rules.measure:
                 raise ValueError(
                     f"the first objective is {self.objectives[0]!r}, and the surface's rules measure "
@@ -177,7 +177,7 @@ class MeshProblem(ElementwiseProblem):
                 )
         else:
             measure = (rules or Rules()).measure
-            self.objectives = _checked_objectives(objectives if objectives is not None else (measure, "triangles"))
+            self.objectives = checked_objectives(objectives if objectives is not None else (measure, "triangles"))
             rules = taken(Rules, rules, named | {"measure": self.objectives[0]})
             self.surface = HeightSurface(open_model(model, self.options), rules)
         self.max_triangles = max_triangles
@@ -353,18 +353,6 @@ def _refuse_unknown(kwargs: dict[str, Any]) -> None:
         raise TypeError(
             f"MeshProblem has no argument {unknown[0]!r}" + (f"; did you mean {near[0]!r}?" if near else "")
         )
-
-
-def _checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
-    """Return the objectives as a tuple, or raise a ValueError that says what they must be."""
-    names = (objectives,) if isinstance(objectives, str) else tuple(objectives)
-    measures = names[:-1]
-    if names[-1:] != ("triangles",) or not measures or set(measures) - set(OBJECTIVES) or len(set(names)) < len(names):
-        raise ValueError(
-            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, OBJECTIVES))}, each "
-            "once, and 'triangles' last, as in ('error', 'triangles')"
-        )
-    return names
 
 
 def _require_bool(X: Any) -> None:

@@ -48,7 +48,7 @@ from meshsimp_pymoo.files import (
 )
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
 from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
 
 FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
@@ -369,16 +369,34 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
 
 
 def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
-    """Refuse a record whose parts are not of the kind that others rely on."""
-    model, chosen = run.get("model") or {}, run.get("chosen")
-    parts = ("model", "options", "rules", "settings", "versions")
-    wrong = [name for name in parts if not isinstance(run.get(name) or {}, dict)]
-    if not wrong:
-        wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
+    """Refuse a record whose parts are not of the kind that others rely on, or that an earlier version wrote."""
+    model, chosen, objectives = run.get("model"), run.get("chosen"), run.get("objectives")
+    wrong = [name for name in ("options", "rules", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    if not isinstance(model, dict):
+        wrong.append("model")
+    else:
+        wrong += [f"model.{key}" for key in ("name", "hash") if not isinstance(model.get(key), str)]
+        wrong += ["model.file"] * (not isinstance(model.get("file") or "", str))
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
         wrong.append("chosen")
+    wrong += ["objectives"] * (objectives is not None and not _are_objectives(objectives))
     if wrong:
         raise ResultError(f"{path}: {', '.join(wrong)} is not what a front's record holds; write the front again")
+    if "footprint" in (run.get("settings") or {}) and not {"options", "rules"} & set(run):
+        raise ResultError(
+            f"{path}: is of an earlier version, which stored how a model is read and what counts otherwise; simplify "
+            "the model again"
+        )
+
+
+def _are_objectives(names: Any) -> bool:
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return False
+    try:
+        checked_objectives(names)
+    except ValueError:
+        return False
+    return True
 
 
 def mesh_arrays(

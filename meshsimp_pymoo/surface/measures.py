@@ -10,7 +10,7 @@ Nothing heavy is imported here: the shell command's ``--help`` is made of the ta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -160,6 +160,18 @@ def measured(table: Any, measure: str, total_weight: float) -> Any:
     """
     require_measure(measure)
     return MEASURES[measure].of(table, total_weight)
+
+
+def checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
+    """Return the objectives as a tuple, or raise a ValueError that says what they must be."""
+    names = (objectives,) if isinstance(objectives, str) else tuple(objectives)
+    measures = names[:-1]
+    if names[-1:] != ("triangles",) or not measures or set(measures) - set(OBJECTIVES) or len(set(names)) < len(names):
+        raise ValueError(
+            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, OBJECTIVES))}, each "
+            "once, and 'triangles' last, as in ('error', 'triangles')"
+        )
+    return names
 
 
 def require_measure(measure: str, *, summed_for: str = "") -> None:
