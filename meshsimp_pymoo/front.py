@@ -31,6 +31,7 @@ from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
+from meshsimp_pymoo.opening import applicable
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
@@ -635,7 +636,8 @@ class Front(Sequence[FrontSolution]):
                     raise ResultError(f"{where}: has other rules than this {type(source).__name__}: {rules}; {way_out}")
                 problem = MeshProblem(source, objectives=objectives)
             else:
-                problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
+                how = applicable(source, options)
+                problem = MeshProblem(source, options=how, rules=rules, objectives=objectives)
         except ModelError as trouble:
             if model is not None:
                 raise
@@ -648,6 +650,7 @@ class Front(Sequence[FrontSolution]):
                 * (facts.get("vertices") != problem.model.n_vertices)
                 + f"; {way_out}"
             )
+        problem.options = options  # a model that was given in memory is the same one, and was read so
         return problem
 
     def _model_file(self) -> Path | str:

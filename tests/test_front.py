@@ -379,6 +379,10 @@ def test_how_the_model_was_read_is_remembered(tmp_path):
     assert np.ptp(front[-1].mesh.vertices[:, :2], axis=0).tolist() == [50, 80]
     assert front.problem.surface.rules == Rules(footprint="hull", outside="ignore")
     assert front.problem.options == problem.options == Options(spacing=(10, 20), nodata=-9999)
+    again = Front.load(tmp_path / "out", model=problem.model)  # a model in memory was read in that way, too
+    assert Front.load(again.save(tmp_path / "again", meshes=0, page=False)).problem.options == problem.options
+    surface = Front.load(tmp_path / "out", model=problem.surface)
+    assert surface.problem.options == problem.options
 
 
 def test_a_front_can_be_pickled(front):

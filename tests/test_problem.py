@@ -175,7 +175,8 @@ def test_a_surface_brings_its_rules_and_takes_no_other_ones():
     assert problem.surface is surface
     assert problem.model is surface.model
     assert problem.objectives == ("rms_error", "triangles")
-    for arguments in ({"footprint": "model"}, {"rules": Rules()}, {"spacing": 2.0}, {"options": Options(up="z")}):
+    others = ({"footprint": "model"}, {"rules": Rules()}, {"spacing": 2.0}, {"options": Options(up="z")})
+    for arguments in (*others, {"up": np.array([0, 0, 1])}):
         with pytest.raises(TypeError, match="a HeightSurface is a model that was read, with its rules; make an"):
             MeshProblem(surface, **arguments)
     with pytest.raises(ValueError, match=r"the surface's rules measure 'rms_error'; .* Rules\(measure='error'\)"):
