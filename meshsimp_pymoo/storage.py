@@ -49,7 +49,7 @@ from meshsimp_pymoo.files import (
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
-from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
+from meshsimp_pymoo.surface.surface import Original, Refitted, Surface, require_rules
 
 FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
@@ -236,6 +236,7 @@ def write_front(
     ValueError
         If the front is empty, holds a number that is not finite, or does not fit the model.
     """
+    require_rules(surface, "write_front")
     model = surface.model
     kept = np.asarray(kept, dtype=bool)
     if len(quality) == 0:

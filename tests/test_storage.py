@@ -237,6 +237,12 @@ def test_an_empty_or_unfinished_front_is_refused(tmp_path, model, solutions):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_model_in_place_of_a_surface_is_told_apart(tmp_path, model, solutions):
+    kept, simplified = solutions
+    with pytest.raises(TypeError, match=r"write_front: a OpenModel has no rules; give a surface"):
+        write_front(tmp_path / "out", model, [s.quality for s in simplified], kept, meshes=0)
+
+
 def spoil_csv(line, column, value):
     def spoil(folder):
         rows = [row.split(",") for row in (folder / "front.csv").read_text().splitlines()]

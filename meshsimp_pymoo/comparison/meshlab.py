@@ -32,10 +32,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.surface.surface import Surface, require_rules
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.measures import Quality
-    from meshsimp_pymoo.surface.surface import Surface
 
 __all__ = [
     "MESHLAB_METHODS",
@@ -329,6 +329,7 @@ def meshlab_front(
     ValueError
         If a method is unknown or a number of triangles impossible; nothing is computed then.
     """
+    require_rules(surface, "meshlab_front")
     model = surface.model
     numbers = [int(number) for number in triangles]
     for name in methods:

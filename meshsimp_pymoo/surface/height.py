@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.pins import pinned_vertices
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, require_rules
 
 # A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
 # metres.
@@ -252,6 +252,8 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
 
     Raises
     ------
+    TypeError
+        If this is no surface but a model, which has no rules.
     ValueError
         If the subset spans no triangle, or the tolerance is not positive.
 
@@ -266,4 +268,5 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
     >>> refit_heights(roof, roof.pinned).error
     3.0
     """
+    require_rules(surface, "refit_heights")
     return surface.refit(kept, tolerance=tolerance)
