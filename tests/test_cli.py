@@ -213,7 +213,7 @@ def test_a_target_that_was_not_reached_says_so_and_leaves_the_front(tmp_path, ca
     faces = np.vstack([roof.faces, [0, 1, 25]])
     write_mesh(tmp_path / "twin.ply", points, faces)
     assert run("simplify", tmp_path / "twin.ply", "-o", tmp_path / "out", "--max-error", "0.5", *QUICK) == 1
-    said = r"no chosen mesh: no solution of .*twin\.ply has a max error of at most 0\.5; the least is \d+.*; search"
+    said = r"no chosen mesh: the least max error of a solution of .*twin\.ply is \d+.*, and 0\.5 was asked for; search"
     assert re.search(said, capsys.readouterr().err)
     assert (tmp_path / "out" / "front.csv").is_file()
     assert not (tmp_path / "out" / "chosen.ply").exists()
@@ -710,7 +710,7 @@ def test_pick_without_a_file_says_what_it_would_be(picked, capsys):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        (("--triangles", "1"), 1, r"no solution of face:200 has at most 1 triangles; the smallest has 2; nothing is w"),
+        (("--triangles", "1"), 1, r"no solution of face:200 has at most 1 triangles; the least is 2; nothing is w"),
         (("--solution", "9999"), 2, r"has the solutions 0 to \d+; --solution 9999 is none of them"),
         ((), 2, r"one of the arguments --triangles .* is required \(see meshsimp pick --help\)"),
         (("--knee", "-o", "a.doc"), 2, r"a\.doc: the suffix '\.doc' says no format that can be written; use one"),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import builtins
 import dataclasses
+import inspect
 import itertools
 import json
 import pickle
+import pydoc
 import re
 import shutil
 import sys
@@ -22,6 +24,7 @@ from pymoo.problems import get_problem
 from meshsimp_pymoo import (
     Front,
     FrontOutput,
+    FrontSolution,
     HalfPlaneCrossover,
     MeshProblem,
     NeighbourShift,
@@ -178,11 +181,30 @@ def test_a_solution_has_its_numbers_and_its_mesh(front):
     assert (solution.mean_error, solution.rms_error, solution.max_error) == (q.mean_error, q.rms_error, q.max_error)
     assert solution.uncovered == q.uncovered
     assert {name: getattr(solution, name) for name in MEASURES} == dataclasses.asdict(q)
-    with pytest.raises(AttributeError, match="a solution of a front has no 'eror'; its numbers are error, triangles"):
-        _ = solution.eror
     assert isinstance(solution.mesh, trimesh.Trimesh)
     assert len(solution.mesh.faces) == solution.triangles == len(solution.faces)
     assert solution.simplified.deviation.sum() == pytest.approx(solution.error)
+
+
+def test_help_and_editors_know_the_numbers_of_a_solution_and_the_limits_of_a_choice(front):
+    said = pydoc.render_doc(FrontSolution, renderer=pydoc.plaintext)
+    for name, measure in MEASURES.items():
+        assert name in dir(front[0])
+        assert isinstance(getattr(FrontSolution, name), property)
+        assert measure.label in getattr(FrontSolution, name).__doc__.lower().replace("rms", "RMS")
+        assert f"  {name}\n" in said
+    assert list(inspect.signature(front.best).parameters) == list(MEASURES)
+    assert "error, vertices, mean_error, rms_error, max_error, uncovered : float" in Front.best.__doc__
+
+
+def test_what_goes_wrong_in_a_property_is_reported_as_it_is(front):
+    class Broken(FrontSolution):
+        @property
+        def area(self):
+            return self.faces.are
+
+    with pytest.raises(AttributeError, match=r"'numpy\.ndarray' object has no attribute 'are'"):
+        _ = Broken(front, 0).area
 
 
 # ------------------------------------------------------------------------------------------------------------- choosing
@@ -203,10 +225,14 @@ def test_best_within_a_measure_is_the_smallest(front, name):
 
 
 def test_a_limit_that_nothing_meets_says_how_near_the_front_comes(front):
-    with pytest.raises(LookupError, match="no solution of face:200 has at most 1 triangles; the smallest has 2"):
+    with pytest.raises(LookupError, match="no solution of face:200 has at most 1 triangles; the least is 2"):
         front.best(triangles=1)
-    with pytest.raises(LookupError, match=r"face:200 has a max error of at most 1e-09; the least is \d"):
+    with pytest.raises(LookupError, match=r"no solution of face:200 has at most -1 uncovered; the least is 0"):
+        front.best(uncovered=-1)
+    with pytest.raises(LookupError, match=r"the least max error of a solution of face:200 is .*, and 1e-09 was asked"):
         front[:-1].best(max_error=1e-9)
+    with pytest.raises(LookupError, match=r"the least RMS error of a solution of face:200 is .*, and 0 was asked for"):
+        front[:-1].best(rms_error=0)
     with pytest.raises(TypeError, match=r"best\(\) takes one limit, such as triangles=500 .*; 2 are given"):
         front.best(triangles=5, error=3)
     with pytest.raises(TypeError, match="0 are given"):
