@@ -136,13 +136,15 @@ def put_back(folder: str | os.PathLike[str], *, tidy: bool = False) -> None:
     folder : path
         The folder. If it is gone, and what it held before stands aside, that becomes the folder again.
     tidy : bool
-        Remove unfinished folders beside it too; only for who holds the folder.
+        Remove unfinished folders beside it too, and older ones that it has replaced; only for who holds the folder.
     """
     target = Path(folder).resolve()
     if not target.exists() and (old := left_beside(target, "old")):
         old[0].rename(target)
-    for unfinished in left_beside(target, "partial") if tidy else ():
-        shutil.rmtree(unfinished, ignore_errors=True)
+    if not tidy:
+        return
+    for left in (*left_beside(target, "partial"), *(left_beside(target, "old") if target.exists() else ())):
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def left_beside(target: Path, kind: str) -> list[Path]:
