@@ -291,8 +291,8 @@ def write_front(
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        own = {"source_index": model.source_index.astype(np.int64)} | surface.stored_arrays()
-        write_npz(partial / "front.npz", F=F[order], kept=packed, **own)
+        rows_of_file = model.source_index.astype(np.int64)
+        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=rows_of_file)
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, triangulate_subset
 from meshsimp_pymoo.surface.ground import Ground, make_ground
 from meshsimp_pymoo.surface.live import Live, build, lent_live
@@ -207,10 +207,6 @@ class HeightSurface:
         if error >= before:
             raised, error = own, before
         return Refitted(mesh.faces, rows, raised, error, before, min(bound, error))
-
-    def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return nothing: the row of each vertex in the file says it all."""
-        return {}
 
     def _checked(self, kept: Any) -> BoolArray:
         row = np.array(kept, order="C")

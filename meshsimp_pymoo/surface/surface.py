@@ -233,10 +233,6 @@ class Surface(Protocol):
         """Return the mesh of one subset with its vertices moved to where its error is least."""
         ...
 
-    def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return what ``front.npz`` must hold of the surface beside the row of each vertex in the file."""
-        ...
-
     def ground(self) -> Any | None:
         """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
         ...
