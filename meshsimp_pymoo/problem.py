@@ -271,7 +271,7 @@ class MeshProblem(ElementwiseProblem):
 
     def _worst_row(self) -> FloatArray:
         """Return the numbers of a mesh that every other one dominates."""
-        surface, row = self.surface, np.empty(REGIONS)
+        surface, row = self.surface, np.full(REGIONS, np.nan)
         row[ERROR] = surface.total_weight * surface.diagonal
         row[SQUARES] = surface.total_weight * surface.diagonal**2
         row[MAXIMUM] = surface.diagonal

@@ -205,6 +205,14 @@ def test_the_objectives_are_the_named_numbers_of_the_same_evaluation(problem, ob
     assert (other.evaluate(subsets(problem, 5)) < other.worst).all()
 
 
+def test_a_number_that_the_worst_mesh_is_not_given_is_none(problem, monkeypatch):
+    assert np.isfinite(problem._worst_row()).all()
+    monkeypatch.setattr("meshsimp_pymoo.problem.REGIONS", 5000)  # so many that memory held something there before
+    row = problem._worst_row()
+    assert np.isfinite(row[:6]).all()
+    assert np.isnan(row[6:]).all()
+
+
 def test_a_bound_on_the_error_is_one_on_the_first_objective():
     problem = MeshProblem("face:300", objectives=("rms_error", "triangles"), max_error=2.0, max_triangles=90)
     F, G = problem.evaluate(subsets(problem))

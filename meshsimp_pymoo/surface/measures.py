@@ -3,7 +3,8 @@
 A measure is a field of `Quality`; its row (`Measure`) says how it comes from the numbers that evaluation adds up, what
 it is called, and what it can be used for. The columns of ``front.csv``, the attributes of a front's solutions, the
 wishes of the shell command, the objectives of a problem and the rows of the page follow from the table. A new measure
-is a new field here and, if evaluation does not add up what it needs, a new column there.
+is a new field here and, if it needs a number that the columns below do not hold, a new one of these, which all
+who make such rows fill (``CONTRIBUTING.md`` lists them).
 
 Nothing heavy is imported here: the shell command's ``--help`` is made of the table.
 """
