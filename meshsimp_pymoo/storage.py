@@ -9,14 +9,15 @@
                        the columns REFIT_COLUMNS too
     OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
     OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
-    OUT/run.json       settings, seed, package versions, evaluations, seconds, hash of the model
+    OUT/run.json       the model with its hash, how it was read (options), what counted (rules), what was minimised
+                       (objectives), how it was searched and written (settings, seed), package versions, evaluations,
+                       seconds
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
 
 All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
-the same front. Floats are written
-with the fewest digits that read back to the same number. Everything is written to a hidden folder beside OUT,
-flushed to the disk and then renamed, so that OUT is either complete or absent.
+the same front. Floats are written with the fewest digits that read back to the same number. Everything is written to a
+hidden folder beside OUT, flushed to the disk and then renamed, so that OUT is either complete or absent.
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@
     OUT/meshes/         007_412.ply is solution 7, of 412 triangles
     OUT/chosen.ply      the solution that was asked for, if one was; with pieces, a folder of that name
     OUT/front.png       the front
-    OUT/run.json        settings, package versions, seconds, hash of the grid, where on Earth it is
+    OUT/run.json        the grid with its hash and where on Earth it is, how it was read (options), tiles and what was
+                        wanted (settings), package versions, seconds
     OUT/tiles/          while the work is going on: finished tiles, which the same call finds again
 
 The finished folder is put in place as a whole; see `meshsimp_pymoo.storage`. A process that is killed at any moment
