@@ -615,8 +615,10 @@ class Front(Sequence[FrontSolution]):
         at = knee(self.F)
         rows = sorted({*even_selection(len(self), SHOWN_ROWS), at})
         picture = base64.b64encode(self._repr_png_()).decode()
-        names = ("triangles", "vertices", "error", "mean_error", "max_error")
-        header = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in ("solution", *names))
+        # what a mesh consists of, its error, and what it can be chosen by
+        shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name == "error"]
+        names = sorted(shown, key=lambda name: bool(MEASURES[name].unit))
+        header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]

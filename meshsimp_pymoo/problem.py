@@ -26,6 +26,7 @@ from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
     MEASURES,
+    OBJECTIVES,
     REGIONS,
     SQUARES,
     TRIANGLES,
@@ -88,7 +89,7 @@ class MeshProblem(ElementwiseProblem):
     rules : Rules, optional
         What counts, in one object; the settings given by name replace its own.
     objectives : tuple of str, optional
-        What is minimised: one or more of "error" (the sum of w_p d_p), "rms_error" and "max_error" (see
+        What is minimised: one or more of OBJECTIVES (see
         :class:`~meshsimp_pymoo.surface.measures.Quality`), then "triangles". All come from the same evaluation. By
         default the measure of the rules, "error" unless they say otherwise, and "triangles".
     max_triangles : int, optional
@@ -124,10 +125,11 @@ class MeshProblem(ElementwiseProblem):
 
     Notes
     -----
-    ``out`` also holds ``error``, ``vertices``, ``mean_error``, ``rms_error``, ``max_error`` and ``uncovered``, whatever
-    the objectives, so that ``result.opt.get("max_error")`` works; with ``regions`` also their errors,
-    ``region_error``. A subset that emits no triangle is no mesh; it gets the worst objectives, N times the diagonal and
-    2 N triangles, which any mesh dominates.
+    Whatever the objectives, ``out`` also holds
+    REPORTED,
+    so that ``result.opt.get("max_error")`` works; with ``regions`` also their errors, ``region_error``. A subset that
+    emits no triangle is no mesh; it gets the worst objectives, N times the diagonal and 2 N triangles, which any mesh
+    dominates.
 
     Examples
     --------
@@ -327,7 +329,14 @@ class MeshProblem(ElementwiseProblem):
         return self
 
 
-MeshProblem.__doc__ = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+def _doc() -> str:
+    """Return the documentation of MeshProblem with what the tables know."""
+    doc = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+    doc = doc.replace("OBJECTIVES", ", ".join(f'"{name}"' for name in OBJECTIVES))
+    return doc.replace("REPORTED", ", ".join(f"``{name}``" for name in REPORTED))
+
+
+MeshProblem.__doc__ = _doc()
 
 
 def _signature() -> inspect.Signature:

@@ -14,6 +14,7 @@ import sys
 import time
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,12 +27,14 @@ from meshsimp_pymoo import Front, MeshProblem, memetic
 from meshsimp_pymoo.cli import main, searching
 from meshsimp_pymoo.cli.commands.completion import SHELLS
 from meshsimp_pymoo.cli.parser import make_parser
+from meshsimp_pymoo.cli.terminal import described
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh, written_formats
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
+from meshsimp_pymoo.surface.measures import MEASURES, Measure, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
 QUICK = ("--generations", "3", "--population", "12")
@@ -883,6 +886,15 @@ def test_info_describes_even_what_would_be_refused(tmp_path, capsys):
     assert re.search(r"triangles +12\n", out)
     assert re.search(r"verdict +refused", out)
     assert err.startswith(f"meshsimp: {tmp_path / 'box.ply'}: ")
+
+
+def test_a_mesh_is_described_by_every_measure_that_means_something(monkeypatch):
+    quality = Quality(1234.56789, 12345, 6200, 0.123456, 0.234567, 3.456789, 1500)
+    said = "12,345 triangles, error 1234.57, mean 0.1235, RMS 0.2346, max 3.457, uncovered 1500"
+    assert described(quality) == said
+    new = Measure(lambda table, weight: 0.0, label="median error", meaning="half deviate by less", unit="model units")
+    monkeypatch.setitem(MEASURES, "median_error", new)
+    assert described(SimpleNamespace(**vars(quality), median_error=0.5)) == f"{said}, median 0.5"
 
 
 def test_info_without_a_model_lists_the_built_in_ones(capsys):

@@ -432,6 +432,13 @@ def test_a_notebook_shows_the_picture_and_a_table_with_the_knee(front):
     page = front._repr_html_()
     assert "data:image/png;base64," in page
     assert f"<td>{front.knee().solution} (knee)</td>" in page
+    header = "".join(
+        f"<th>{word}</th>" for word in ("solution", "triangles", "vertices", "error", "mean error", "max error")
+    )
+    assert f"<tr>{header}</tr>" in page
+    first = front.quality[0]
+    numbers = (first.triangles, first.vertices, first.error, first.mean_error, first.max_error)
+    assert "".join(f"<td>{number:.6g}</td>" for number in numbers) in page
     rows = page.count("<tr>") - 1
     assert 3 <= rows <= 13
     assert (f"{len(front) - rows} more solutions are not listed" in page) == (rows < len(front))

@@ -38,7 +38,7 @@ from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import ThreadRunner
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES
+from meshsimp_pymoo.surface.measures import ERROR, MEASURES, OBJECTIVES, TRIANGLES
 
 
 @pytest.fixture(scope="module")
@@ -211,6 +211,12 @@ def test_a_number_that_the_worst_mesh_is_not_given_is_none(problem, monkeypatch)
     row = problem._worst_row()
     assert np.isfinite(row[:6]).all()
     assert np.isnan(row[6:]).all()
+
+
+def test_the_documentation_names_every_objective_and_every_number_beside_them():
+    assert all(f'"{name}"' in MeshProblem.__doc__ for name in OBJECTIVES)
+    assert ", ".join(f"``{name}``" for name in MEASURES if name != "triangles") in MeshProblem.__doc__
+    assert not {"SETTINGS", "OBJECTIVES", "REPORTED"} & set(MeshProblem.__doc__.split())
 
 
 def test_a_bound_on_the_error_is_one_on_the_first_objective():
