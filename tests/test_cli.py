@@ -30,11 +30,11 @@ from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.cli.terminal import described
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import write_mesh, written_formats
+from meshsimp_pymoo.formats.table import all_formats, write_mesh, written_formats
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
-from meshsimp_pymoo.surface.measures import MEASURES, Measure, Quality
+from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES, Measure, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
 QUICK = ("--generations", "3", "--population", "12")
@@ -929,6 +929,16 @@ def test_the_version_is_that_of_the_installed_package(capsys):
     assert meshsimp_pymoo.__version__ == installed
 
 
+def test_help_says_which_grids_are_cut_into_tiles_and_what_each_measure_is(capsys):
+    with pytest.raises(SystemExit):
+        run("simplify", "--help")
+    said = " ".join(capsys.readouterr().out.split())
+    counted = [suffix for kind in all_formats() if kind.count_samples for suffix in kind.suffixes]
+    assert set(counted) >= {".npy", ".asc", ".tif", ".tiff"}
+    assert f"for {', '.join(counted[:-1])} and {counted[-1]} from 2 million samples on)" in said
+    assert all(f"{measure.minimised} ({measure.meaning})" in said for measure in OBJECTIVES.values())
+
+
 def test_the_choices_offered_are_those_of_the_library():
     for name in written_formats():
         assert make_parser().parse_args(["simplify", "roof", "--format", name]).format == name
@@ -1027,7 +1037,11 @@ def test_refitted_meshes_stand_beside_the_others_and_the_referee_agrees(tmp_path
     ("options", "message"),
     [
         (["--measure", "l2"], "--measure: invalid choice: 'l2' (choose from l1, rms, max); did you mean l1?"),
-        (["--measure", "max", "--algorithm", "memetic"], "--measure max is not for the memetic search"),
+        (
+            ["--measure", "max", "--algorithm", "memetic"],
+            "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
+            "use --algorithm nsga2_v1 or nsga2_v2 or moead with it, or --measure l1 or rms",
+        ),
         (["--weights", "sharpness"], "no per-vertex attribute 'sharpness' to weigh by; it has: none"),
     ],
 )

@@ -16,6 +16,9 @@ from meshsimp_pymoo.surface.rules import Rules
 
 Part = TypeVar("Part")
 
+# From this many samples on, a grid is thinned tile by tile without being asked.
+TILED_FROM = 2_000_000
+
 
 @dataclass(frozen=True)
 class Search:

@@ -64,10 +64,14 @@ def simplify(request: Request) -> int:
     else:
         refuse_alone(request.tiling)
     _claim(output, search)
-    if PRESETS[search.algorithm].sums_only and not OBJECTIVES[request.rules.measure].is_sum:
+    measure = OBJECTIVES[request.rules.measure]
+    if PRESETS[search.algorithm].sums_only and not measure.is_sum:
+        others = [name for name, preset in PRESETS.items() if preset.whole_front and not preset.sums_only]
+        sums = [known.minimised for known in OBJECTIVES.values() if known.is_sum]
         raise UsageError(
-            "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
-            "use --algorithm nsga2_v1 with it, or --measure rms"
+            f"--measure {measure.minimised} is not for the {search.algorithm} search, which thins and moves vertices "
+            f"by sums over the vertices; use --algorithm {' or '.join(others)} with it, or --measure "
+            f"{' or '.join(sums)}"
         )
     problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
     format_to_write(output.format).check(problem.model)

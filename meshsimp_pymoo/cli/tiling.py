@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from meshsimp_pymoo.cli.arguments import numbered
-from meshsimp_pymoo.cli.requests import Output, Request, Search, Tiling, Wish
+from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling, Wish
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, bar, described, say
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.files import locked
@@ -36,8 +36,6 @@ from meshsimp_pymoo.tiles.output import (
 )
 from meshsimp_pymoo.workers import EngineError, open_engine
 
-# From this many samples on, a grid is thinned tile by tile without being asked.
-TILED_FROM = 2_000_000
 # What tiles know, or what makes no difference to them; all else is refused where it is not what asks for nothing.
 KNOWN: dict[type[Any], tuple[str, ...]] = {
     Search: ("seed", "threads", "checkpoint"),  # nothing is left to chance, and finished tiles are always saved
