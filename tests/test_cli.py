@@ -929,7 +929,7 @@ def test_the_version_is_that_of_the_installed_package(capsys):
     assert meshsimp_pymoo.__version__ == installed
 
 
-def test_help_says_which_grids_are_cut_into_tiles_and_what_each_measure_is(capsys):
+def test_help_says_which_grids_are_cut_into_tiles_and_what_each_measure_and_algorithm_is(capsys):
     with pytest.raises(SystemExit):
         run("simplify", "--help")
     said = " ".join(capsys.readouterr().out.split())
@@ -937,6 +937,7 @@ def test_help_says_which_grids_are_cut_into_tiles_and_what_each_measure_is(capsy
     assert set(counted) >= {".npy", ".asc", ".tif", ".tiff"}
     assert f"for {', '.join(counted[:-1])} and {counted[-1]} from 2 million samples on)" in said
     assert all(f"{measure.minimised} ({measure.meaning})" in said for measure in OBJECTIVES.values())
+    assert all(f"{name}: {PRESETS[name].about}" in said for name in ALGORITHMS)
 
 
 def test_the_choices_offered_are_those_of_the_library():

@@ -55,19 +55,21 @@ def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, floa
     ResultError
         If there is no experiment, or none of its runs is finished.
     """
-    study, found = _write_tables(out)
+    study = Study(out)
+    found = write_tables(study)
     _write_figures(study, progress)
     put_text(study.out / "report.html", experiment_page(study, found))
     return study
 
 
-def write_tables(out: str | os.PathLike[str]) -> Study:
-    """Write the tables and findings of an experiment, without figures and without its page."""
-    return _write_tables(out)[0]
+def write_tables(study: Study) -> list[verdicts.Finding]:
+    """Write the tables, findings and times of an experiment, without its figures and its page; return the findings.
 
-
-def _write_tables(out: str | os.PathLike[str]) -> tuple[Study, list[verdicts.Finding]]:
-    study = Study(out)
+    Warns
+    -----
+    ExperimentWarning
+        If runs are missing, damaged or without a mesh.
+    """
     for what, items in (("missing", study.missing), ("damaged", study.damaged), ("without a mesh", study.empty)):
         if items:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
@@ -91,7 +93,7 @@ def _write_tables(out: str | os.PathLike[str]) -> tuple[Study, list[verdicts.Fin
     put_text(study.out / "findings.md", verdicts.page(study, found))
     put_text(study.out / "times.csv", tables.times(study).csv())
     put_text(study.out / "times.md", verdicts.times_page(study))
-    return study, found
+    return found
 
 
 def _write_figures(study: Study, progress: Callable[[float, float, str], None] | None) -> None:

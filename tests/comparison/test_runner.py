@@ -65,7 +65,7 @@ def reference(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reference")
     (folder / "tiny.yaml").write_text(CONFIG, encoding="utf-8")
     run_experiment(folder / "tiny.yaml", folder / "out")
-    write_tables(folder / "out")
+    write_tables(Study(folder / "out"))
     return folder / "out"
 
 
@@ -184,7 +184,7 @@ def test_a_changed_configuration_does_what_is_new_and_names_what_is_stale(config
     assert done.finished == RUNS // 3  # the new seed; a new name is no new run
     assert done.reused == 2 * RUNS // 3
     assert first.path.exists()
-    study = write_tables(stored)
+    write_tables(study := Study(stored))
     assert study.methods == ["Other", "N2", "G1"]
     for case in study.cases.values():
         assert set(case.runs["Other"]) == {2, 3, 4}
@@ -263,7 +263,7 @@ def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored
     record = record_of(stored, problem="Face", algorithm="N2", seed=2, budget="6 generations")
     damaged = spoil(record)
     with pytest.warns(ExperimentWarning, match="left out of the report") as caught:
-        study = write_tables(stored)
+        write_tables(study := Study(stored))
     assert any(damaged.name in line for line in study.damaged)
     assert any("Face / N2 / seed 2" in str(w.message) for w in caught)
     assert 2 not in study.cases["Face", "6 generations", "searched"].runs["N2"]
@@ -271,7 +271,7 @@ def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored
     with pytest.warns(ExperimentWarning, match=f"{damaged.name}.*computed again"):
         done = run_experiment(config, stored)
     assert done.finished == 1
-    write_tables(stored)
+    write_tables(Study(stored))
     assert results(stored) == results(reference)
 
 
@@ -279,7 +279,7 @@ def test_a_merged_front_that_lacks_a_run_is_left_out(stored):
     path = record_of(stored, problem="Face", algorithm="G1", seed=1, budget="6 generations")
     path.unlink()
     with pytest.warns(ExperimentWarning, match="missing: Face / G1"):
-        study = write_tables(stored)
+        write_tables(study := Study(stored))
     assert set(study.cases["Face", "6 generations", "searched"].runs["G1"]) == {2, 3}
     assert set(study.cases["Face", "6 generations", "searched"].runs["N1"]) == {1, 2, 3}
 
@@ -304,7 +304,7 @@ def test_ctrl_c_leaves_the_finished_runs(config, tmp_path, reference):
     finished = len(list((out / "runs").glob("*.json")))
     assert RUNS // 2 <= finished < RUNS
     assert run_experiment(config, out).reused == finished
-    write_tables(out)
+    write_tables(Study(out))
     assert results(out) == results(reference)
 
 
@@ -320,7 +320,7 @@ def in_a_child(config: str, out: str, begun: str) -> None:
     experiment = read_experiment_file(config)
     Path(begun).touch()
     run_experiment(experiment, out)
-    write_tables(out)
+    write_tables(Study(out))
 
 
 @pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a fork server")
@@ -380,7 +380,7 @@ def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(con
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExperimentWarning)  # runs of the seeds that are not asked for any more
         assert run_experiment(config, out).reused > 0
-    write_tables(out)
+    write_tables(Study(out))
     assert results(out) == results(reference)
 
 
@@ -391,7 +391,7 @@ def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
         DaskEngine(cluster.scheduler_address) as engine,
     ):
         run_experiment(config, tmp_path / "out", engine=engine)
-    write_tables(tmp_path / "out")
+    write_tables(Study(tmp_path / "out"))
     assert results(tmp_path / "out") == results(reference)
 
 
@@ -421,7 +421,7 @@ def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_ski
         done = run_experiment(config, out)
     assert done.finished == RUNS
     assert "libopengl0" in done.skipped[0]
-    write_tables(out)
+    write_tables(Study(out))
     assert "libopengl0" in (out / "findings.md").read_text()
     same = {name: content for name, content in results(out).items() if "findings" not in name}
     assert same == {name: content for name, content in results(reference).items() if "findings" not in name}
@@ -437,7 +437,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     )
     out = tmp_path / "out"
     run_experiment(config, out)
-    study = write_tables(out)
+    write_tables(study := Study(out))
     problem = study.problems[0]
     run = study.classic_runs["Face", "quadric_collapse"]
     smallest = min(r.arrays["F"][:, 1].min() for r in study.all_runs if r.record["problem"] == "Face")
@@ -460,7 +460,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     # nothing is done again
     before = results(out)
     assert run_experiment(config, out).finished == 0
-    write_tables(out)
+    write_tables(Study(out))
     assert results(out) == before
 
 
@@ -592,7 +592,7 @@ def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findin
     np.testing.assert_array_equal(arrays["rms_error"], arrays["F"][:, 0])
     study = Study(tmp_path / "out")
     assert study.surface(study.problems[0]).total_weight == pytest.approx(45.0)
-    write_tables(tmp_path / "out")
+    write_tables(Study(tmp_path / "out"))
     said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
     assert "On face the *error* is the RMS error (root mean square), not the sum of the deviations." in said
     assert "attribute *importance*" in said

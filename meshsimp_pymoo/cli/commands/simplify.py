@@ -68,11 +68,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     budget.add_argument("--generations", type=whole(1), metavar="N")
 
     search = parser.add_argument_group("how to search")
+    offered = {name: preset.about for name, preset in PRESETS.items() if preset.whole_front}
     search.add_argument(
         "--algorithm",
-        choices=[name for name, preset in PRESETS.items() if preset.whole_front],
+        choices=list(offered),
         default=Search.algorithm,
-        help="preset (default: %(default)s)",
+        help="; ".join(f"{name}: {about}" for name, about in offered.items()) + " (default: %(default)s)",
     )
     search.add_argument(
         "--population", type=whole(2), default=Search.population, metavar="N", help="(default: %(default)s)"
