@@ -208,7 +208,7 @@ CLAIMS = (
         "classic_alike",
         "The two classic methods do not differ",
         "no different",
-        (("quadric_collapse", "vertex_clustering"),),
+        (PAPER_CLASSIC,),
         ("hvr", "epsilon"),
     ),
     Claim(

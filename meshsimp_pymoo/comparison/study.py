@@ -42,6 +42,7 @@ from meshsimp_pymoo.comparison.analysis import (
     rank_sum,
     unary_scores,
 )
+from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.indicators import non_dominated
@@ -69,12 +70,8 @@ EPSILON_SHIFT = 0.01
 # A method without chance has one run, under this name.
 NO_SEED = 0
 
-CLASSIC_NAMES = {
-    "quadric_collapse": "MeshLab quadric",
-    "quadric_collapse_unit": "MeshLab quadric, unit size",
-    "quadric_collapse_boundary": "MeshLab quadric, border kept",
-    "vertex_clustering": "MeshLab clustering",
-}
+# What tables call the methods without chance.
+CLASSIC_NAMES = {name: method.label for name, method in MESHLAB_METHODS.items()}
 
 
 @dataclass(frozen=True)
