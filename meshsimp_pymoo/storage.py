@@ -358,20 +358,25 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
             f"{folder / 'front.npz'}: solution {too_few[0]} keeps {kept[too_few[0]].sum()} vertices, but "
             f"front.csv says its mesh has {quality['vertices'][too_few[0]]}"
         )
-    record = folder / "run.json"
-    try:
-        run = json.loads(record.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
-        raise ResultError(f"{record}: cannot be read ({reason_of(problem)})") from None
-    if not isinstance(run, dict) or run.get("solutions") != count:
-        raise ResultError(f"{record}: is not the record of this front of {count} solutions")
-    _check_record(run, count, record)
+    run = read_record(folder / "run.json", count)
     series = _read_series(folder / "series.csv")
     return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series)
 
 
-def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
-    """Refuse a record whose parts are not of the kind that others rely on, or that an earlier version wrote."""
+def read_record(path: Path, count: int) -> dict[str, Any]:
+    """Read the record of a front of so many solutions, whose parts are then of the kind that others rely on.
+
+    Raises
+    ------
+    ResultError
+        If it is missing, damaged, of another front or of an earlier version.
+    """
+    try:
+        run = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
+    if not isinstance(run, dict) or run.get("solutions") != count:
+        raise ResultError(f"{path}: is not the record of this front of {count} solutions")
     model, chosen, objectives = run.get("model"), run.get("chosen"), run.get("objectives")
     wrong = [name for name in ("options", "rules", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
     if not isinstance(model, dict):
@@ -389,6 +394,7 @@ def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
             f"{path}: is of an earlier version, which stored how a model is read and what counts otherwise; simplify "
             "the model again"
         )
+    return run
 
 
 def _are_objectives(names: Any) -> bool:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -242,3 +243,22 @@ def test_a_front_of_another_grid_is_not_read(out, path):
             read_tiled_front(out, open_grid(path, spacing=30.0))
     finally:
         (out / "gone.npz").rename(out / "nested.npz")
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"model": {"hash": "0", "file": None}}, "run.json: model.name is not what a front's record holds"),
+        ({"model": {"name": "relief.npy", "hash": "0", "file": 3}}, "run.json: model.file is not"),
+        ({"solutions": 3}, "run.json: is not the record of this front of"),
+        ({"options": {"spacing": "wide"}}, "run.json: cannot be read (spacing is 'wide': expected a number"),
+        ({"options": [1]}, "run.json: options is not"),
+    ],
+)
+def test_a_damaged_record_is_answered_in_one_line(out, tmp_path, capsys, changed, message):
+    shutil.copytree(out, tmp_path / "out")
+    record = tmp_path / "out" / "run.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | changed))
+    assert main(["pick", str(tmp_path / "out"), "--knee"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line
