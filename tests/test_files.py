@@ -165,13 +165,13 @@ def test_the_old_folder_comes_back_where_a_process_was_killed_between_two_rename
     assert entries(tmp_path) == ["out", "out/front.csv"]
 
 
-def test_what_a_folder_replaced_before_its_process_was_killed_is_removed(tmp_path):
+def test_what_a_folder_replaced_before_its_process_was_killed_is_removed_where_it_is_made_anew(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "new").touch()
     (tmp_path / ".out.0123abcd.old" / "tables").mkdir(parents=True)
-    put_back(tmp_path / "out")
-    assert len(left_beside(tmp_path / "out", "old")) == 1  # perhaps somebody is at it
     put_back(tmp_path / "out", tidy=True)
+    assert len(left_beside(tmp_path / "out", "old")) == 1  # perhaps nobody has these results elsewhere
+    put_back(tmp_path / "out", tidy=True, replaced=True)
     assert entries(tmp_path) == ["out", "out/new"]
 
 

@@ -75,7 +75,7 @@ def write_tables(study: Study) -> list[verdicts.Finding]:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
             warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=3)
     found: list[verdicts.Finding] = []
-    put_back(study.out / "tables", tidy=True)
+    put_back(study.out / "tables", tidy=True, replaced=True)
     with new_folder(study.out / "tables", replace=True, flush=False) as folder:
         for budget in study.budgets:
             for scoring in study.scorings:
@@ -114,7 +114,7 @@ def _write_figures(study: Study, progress: Callable[[float, float, str], None] |
             for indicator in ("hvr", "cardinality"):
                 drawings.append((f"{where}/{indicator}.png", partial(figures.box_figure, study, cases, indicator)))
             drawings.append((f"{where}/selected.png", partial(figures.selected_figure, study, cases)))
-    put_back(study.out / "figures", tidy=True)
+    put_back(study.out / "figures", tidy=True, replaced=True)
     with new_folder(study.out / "figures", replace=True, flush=False) as folder:
         for done, (path, draw) in enumerate(drawings):
             if progress is not None:

@@ -162,7 +162,10 @@ def test_a_run_without_a_mesh_is_named_and_left_out(tmp_path):
 
 def test_one_run_of_one_method_is_report_enough(tmp_path):
     out = store(tmp_path / "out", {"A": {"X": {7: [(1.0, 2)]}}})
+    (out / ".tables.0123abcd.old").mkdir()  # of reports that were killed
+    (out / ".tables.4567abcd.partial").mkdir()
     write_tables(Study(out))
+    assert not list(out.glob(".tables.*"))
     scores = (out / "tables" / slug(BUDGET) / NEAREST / "scores.csv").read_text()
     assert scores.splitlines()[1].startswith("A,X,1,1.0,,1.0,,1.0,,1.0,,1.0,")
     assert "not decided here" in (out / "findings.md").read_text()
