@@ -128,7 +128,7 @@ def _put_in_place(partial: Path, target: Path, folder: str | os.PathLike[str], r
         shutil.rmtree(old)
 
 
-def put_back(folder: str | os.PathLike[str], *, tidy: bool = False) -> None:
+def put_back(folder: str | os.PathLike[str], *, tidy: bool = False, replaced: bool = False) -> None:
     """Mend what a process left that was killed while it put a folder in place.
 
     Parameters
@@ -137,12 +137,15 @@ def put_back(folder: str | os.PathLike[str], *, tidy: bool = False) -> None:
         The folder. If it is gone, and what it held before stands aside, that becomes the folder again.
     tidy : bool
         Remove unfinished folders beside it too; only for who holds the folder.
+    replaced : bool
+        Remove what still stands aside, too; only where all that it held is made anew.
     """
     target = Path(folder).resolve()
     if not target.exists() and (old := left_beside(target, "old")):
         old[0].rename(target)
-    for unfinished in left_beside(target, "partial") if tidy else ():
-        shutil.rmtree(unfinished, ignore_errors=True)
+    for kind, unwanted in (("partial", tidy), ("old", replaced)):
+        for left in left_beside(target, kind) if unwanted else ():
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def left_beside(target: Path, kind: str) -> list[Path]:

@@ -12,6 +12,7 @@ It comes from a pymoo result or from a folder that was written before, and shows
 from __future__ import annotations
 
 import base64
+import inspect
 import io
 import operator
 import os
@@ -20,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,7 @@ from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
+from meshsimp_pymoo.opening import applicable
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
@@ -42,7 +44,7 @@ from meshsimp_pymoo.storage import (
     write_front,
     write_solution,
 )
-from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES, Quality, quality_of
+from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES, Measure, Quality, quality_of
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Refitted, Simplified
 
@@ -62,7 +64,13 @@ START = "adaptive thinning (start)"
 START_POINTS = 200
 
 
-class FrontSolution:
+if TYPE_CHECKING:
+    _Numbers: TypeAlias = Quality  # so that type checkers and editors know the properties that are set below
+else:
+    _Numbers = object
+
+
+class FrontSolution(_Numbers):
     """One solution of a front: its numbers, and its mesh when it is asked for.
 
     Attributes
@@ -82,11 +90,6 @@ class FrontSolution:
         self.solution = solution
         self.quality: Quality = front.quality[solution]
         self.kept: BoolArray = front.kept[solution]
-
-    def __getattr__(self, name: str) -> Any:
-        if name in MEASURES:
-            return getattr(self.quality, name)
-        raise AttributeError(f"a solution of a front has no {name!r}; its numbers are {', '.join(MEASURES)}")
 
     @cached_property
     def simplified(self) -> Simplified:
@@ -179,6 +182,20 @@ class FrontSolution:
             f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}", fontsize=10
         )
         return _png(figure)
+
+
+def _number(name: str, measure: Measure) -> property:
+    """Return the property of a solution that is one of its numbers."""
+
+    def value(solution: FrontSolution) -> Any:
+        return getattr(solution.quality, name)
+
+    meaning, unit = (f": {measure.meaning}" if measure.meaning else ""), (f" [{measure.unit}]" if measure.unit else "")
+    return property(value, doc=f"{measure.label[0].upper()}{measure.label[1:]}{meaning}{unit}.")
+
+
+for _name, _measure in MEASURES.items():
+    setattr(FrontSolution, _name, _number(_name, _measure))
 
 
 class Front(Sequence[FrontSolution]):
@@ -425,8 +442,9 @@ class Front(Sequence[FrontSolution]):
         ----------
         triangles : int
             The most accurate solution of at most that many triangles.
-        error, mean_error, rms_error, max_error, ... : float
-            The smallest solution with at most that much of a measure (see `Quality`) [model units].
+        LIMITS : float
+            The smallest solution with at most that much of a measure; see
+            :class:`~meshsimp_pymoo.surface.measures.Quality`.
 
         Raises
         ------
@@ -443,12 +461,12 @@ class Front(Sequence[FrontSolution]):
         ((name, most),) = limits.items()
         values = np.array([getattr(q, name) for q in self.quality])
         fitting = np.flatnonzero(values <= most)
-        what = name.replace("_", " ")
         if not len(fitting):
+            label, least = MEASURES[name].label, values.min()
             raise LookupError(
-                f"no solution of {self.name} has a {what} of at most {most:g}; the least is {values.min():.6g}"
-                if name != "triangles"
-                else f"no solution of {self.name} has at most {most:g} triangles; the smallest has {values.min()}"
+                f"the least {label} of a solution of {self.name} is {least:.6g}, and {most:g} was asked for"
+                if MEASURES[name].unit
+                else f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
             )
         if name == "triangles":
             accuracy = self.F[fitting, 0]
@@ -604,8 +622,10 @@ class Front(Sequence[FrontSolution]):
         at = knee(self.F)
         rows = sorted({*even_selection(len(self), SHOWN_ROWS), at})
         picture = base64.b64encode(self._repr_png_()).decode()
-        names = ("triangles", "vertices", "error", "mean_error", "max_error")
-        header = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in ("solution", *names))
+        # what a mesh consists of, its error, and what it can be chosen by
+        shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name == "error"]
+        names = sorted(shown, key=lambda name: bool(MEASURES[name].unit))
+        header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]
@@ -642,7 +662,8 @@ class Front(Sequence[FrontSolution]):
                     raise ResultError(f"{where}: has other rules than this {type(source).__name__}: {rules}; {way_out}")
                 problem = MeshProblem(source, objectives=objectives)
             else:
-                problem = MeshProblem(source, options=options, rules=rules, objectives=objectives)
+                how = applicable(source, options)
+                problem = MeshProblem(source, options=how, rules=rules, objectives=objectives)
         except ModelError as trouble:
             if model is not None:
                 raise
@@ -655,6 +676,7 @@ class Front(Sequence[FrontSolution]):
                 * (facts.get("vertices") != problem.model.n_vertices)
                 + f"; {way_out}"
             )
+        problem.options = options  # a model that was given in memory is the same one, and was read so
         return problem
 
     def _model_file(self) -> Path | str:
@@ -665,6 +687,18 @@ class Front(Sequence[FrontSolution]):
             if beside.is_file():
                 return beside
         return self.name
+
+
+def _say_limits() -> None:
+    """Let the signature and the documentation of ``best`` name every measure."""
+    own = inspect.signature(Front.best)
+    limits = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in MEASURES]
+    Front.best.__signature__ = own.replace(parameters=[own.parameters["self"], *limits])  # type: ignore[attr-defined]
+    others = ", ".join(name for name in MEASURES if name != "triangles")
+    Front.best.__doc__ = (Front.best.__doc__ or "").replace("LIMITS", others)
+
+
+_say_limits()
 
 
 def starting_front(problem: MeshProblem, algorithm: Any) -> dict[str, FloatArray]:

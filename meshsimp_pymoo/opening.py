@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
@@ -12,7 +13,7 @@ from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
-from meshsimp_pymoo.formats.table import are_given, described, listed, read_source
+from meshsimp_pymoo.formats.table import described, listed, read_source
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.orient import front_patch
 
@@ -31,7 +32,7 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
     model : path, built-in name, trimesh.Trimesh, SourceMesh or OpenModel
         The mesh; a file wins over a built-in model of the same name, and an :class:`OpenModel` is returned as it is.
     options : Options
-        How it is read.
+        How it is read; what cannot apply (see :func:`applicable`) is refused.
 
     Returns
     -------
@@ -50,6 +51,11 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
     (9, 8)
     """
     if isinstance(model, OpenModel):
+        if options != DEFAULT:
+            raise ModelError(
+                f"{model.name}: is a model that was read already, so that nothing can be said of how to read it; leave "
+                f"{_given(options)} out, or give the file"
+            )
         return model
     return build_model(open_source(model, options), up=options.up)
 
@@ -67,23 +73,40 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
     ModelError
         If there is neither a file nor a built-in model of this name, or it cannot be used.
     """
-    if options.patch not in (None, "front"):
-        raise ModelError(f'patch={options.patch!r} is unknown; use patch="front" or leave it out')
     source = _source_of(model, options)
     return front_patch(source, options.up) if options.patch == "front" else source
 
 
+def applicable(model: Any, options: Options) -> Options:
+    """Return how a model is read as far as that applies to what it is given as, the other settings by default.
+
+    All of it applies to a file; ``up`` and ``patch`` to a mesh that is in memory or built in; nothing to an OpenModel,
+    which was read already.
+    """
+    if isinstance(model, OpenModel):
+        return DEFAULT
+    if isinstance(model, (str, os.PathLike)) and _is_file(model):
+        return options
+    return replace(options, **{name: getattr(DEFAULT, name) for name in described()})
+
+
 def _source_of(model: Source, options: Options) -> SourceMesh:
-    if isinstance(model, SourceMesh):
-        return model
     if isinstance(model, (str, os.PathLike)):
-        return read_source(model, options) if _is_file(model) else _built_in(os.fspath(model), options)
-    if hasattr(model, "vertices") and hasattr(model, "faces"):
-        return from_trimesh(model)
-    raise TypeError(
-        "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
-        f"not {type(model).__name__}"
-    )
+        if _is_file(model):
+            return read_source(model, options)
+        source, what = load(os.fspath(model)), "a built-in model"
+    elif isinstance(model, SourceMesh):
+        source, what = model, "a mesh in memory"
+    elif hasattr(model, "vertices") and hasattr(model, "faces"):
+        source, what = from_trimesh(model), "a mesh in memory"
+    else:
+        raise TypeError(
+            "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
+            f"not {type(model).__name__}"
+        )
+    if applicable(model, options) != options:
+        raise ModelError(f"{source.name}: {listed(described())} are for files; {what} has its own samples")
+    return source
 
 
 def _is_file(model: str | os.PathLike[str]) -> bool:
@@ -93,9 +116,5 @@ def _is_file(model: str | os.PathLike[str]) -> bool:
     return is_there(Path(text)) or looks_like_file or not isinstance(model, str)
 
 
-def _built_in(name: str, options: Options) -> SourceMesh:
-    source = load(name)
-    names = described()
-    if are_given(names, options):
-        raise ModelError(f"{name}: {listed(names)} are for files; a built-in model has its own samples")
-    return source
+def _given(options: Options) -> str:
+    return listed(f"{name}={value!r}" for name, value in vars(options).items() if value != getattr(DEFAULT, name))

@@ -34,6 +34,7 @@ from meshsimp_pymoo.surface.measures import (
     VERTICES,
     Quality,
     as_quality,
+    checked_objectives,
 )
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
@@ -88,7 +89,7 @@ class MeshProblem(ElementwiseProblem):
     rules : Rules, optional
         What counts, in one object; the settings given by name replace its own.
     objectives : tuple of str, optional
-        What is minimised: one or more of "error" (the sum of w_p d_p), "rms_error" and "max_error" (see
+        What is minimised: one or more of OBJECTIVES (see
         :class:`~meshsimp_pymoo.surface.measures.Quality`), then "triangles". All come from the same evaluation. By
         default the measure of the rules, "error" unless they say otherwise, and "triangles".
     max_triangles : int, optional
@@ -124,10 +125,11 @@ class MeshProblem(ElementwiseProblem):
 
     Notes
     -----
-    ``out`` also holds ``error``, ``vertices``, ``mean_error``, ``rms_error``, ``max_error`` and ``uncovered``, whatever
-    the objectives, so that ``result.opt.get("max_error")`` works; with ``regions`` also their errors,
-    ``region_error``. A subset that emits no triangle is no mesh; it gets the worst objectives, N times the diagonal and
-    2 N triangles, which any mesh dominates.
+    Whatever the objectives, ``out`` also holds
+    REPORTED,
+    so that ``result.opt.get("max_error")`` works; with ``regions`` also their errors, ``region_error``. A subset that
+    emits no triangle is no mesh; it gets the worst objectives, N times the diagonal and 2 N triangles, which any mesh
+    dominates.
 
     Examples
     --------
@@ -169,7 +171,7 @@ class MeshProblem(ElementwiseProblem):
                 )
             self.surface: Surface = cast("Surface", model)
             names = objectives if objectives is not None else (self.surface.rules.measure, "triangles")
-            self.objectives = _checked_objectives(names)
+            self.objectives = checked_objectives(names)
             if self.objectives[0] != self.surface.rules.measure:
                 raise ValueError(
                     f"the first objective is {self.objectives[0]!r}, and the surface's rules measure "
@@ -177,7 +179,7 @@ class MeshProblem(ElementwiseProblem):
                 )
         else:
             measure = (rules or Rules()).measure
-            self.objectives = _checked_objectives(objectives if objectives is not None else (measure, "triangles"))
+            self.objectives = checked_objectives(objectives if objectives is not None else (measure, "triangles"))
             rules = taken(Rules, rules, named | {"measure": self.objectives[0]})
             self.surface = HeightSurface(open_model(model, self.options), rules)
         self.max_triangles = max_triangles
@@ -271,7 +273,7 @@ class MeshProblem(ElementwiseProblem):
 
     def _worst_row(self) -> FloatArray:
         """Return the numbers of a mesh that every other one dominates."""
-        surface, row = self.surface, np.empty(REGIONS)
+        surface, row = self.surface, np.full(REGIONS, np.nan)
         row[ERROR] = surface.total_weight * surface.diagonal
         row[SQUARES] = surface.total_weight * surface.diagonal**2
         row[MAXIMUM] = surface.diagonal
@@ -327,7 +329,14 @@ class MeshProblem(ElementwiseProblem):
         return self
 
 
-MeshProblem.__doc__ = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+def _doc() -> str:
+    """Return the documentation of MeshProblem with what the tables know."""
+    doc = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+    doc = doc.replace("OBJECTIVES", ", ".join(f'"{name}"' for name in OBJECTIVES))
+    return doc.replace("REPORTED", ", ".join(f"``{name}``" for name in REPORTED))
+
+
+MeshProblem.__doc__ = _doc()
 
 
 def _signature() -> inspect.Signature:
@@ -353,18 +362,6 @@ def _refuse_unknown(kwargs: dict[str, Any]) -> None:
         raise TypeError(
             f"MeshProblem has no argument {unknown[0]!r}" + (f"; did you mean {near[0]!r}?" if near else "")
         )
-
-
-def _checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
-    """Return the objectives as a tuple, or raise a ValueError that says what they must be."""
-    names = (objectives,) if isinstance(objectives, str) else tuple(objectives)
-    measures = names[:-1]
-    if names[-1:] != ("triangles",) or not measures or set(measures) - set(OBJECTIVES) or len(set(names)) < len(names):
-        raise ValueError(
-            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, OBJECTIVES))}, each "
-            "once, and 'triangles' last, as in ('error', 'triangles')"
-        )
-    return names
 
 
 def _require_bool(X: Any) -> None:

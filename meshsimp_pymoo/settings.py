@@ -4,6 +4,10 @@
 of ``MeshProblem`` and their documentation, the options of the shell command, the keys of a YAML file, and what a folder
 stores and reads back. A new setting is a new field, and nothing else. Nothing heavy is imported here: the shell
 command's ``--help`` is made of it.
+
+Whoever sets something - a word of a command line, YAML, Python, a record that is read back - goes through the same
+:class:`Kind` when the object is made (:func:`settle`). So what an object holds is plain data that can be stored, and
+what was stored can be read back.
 """
 
 from __future__ import annotations
@@ -12,24 +16,30 @@ import dataclasses
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+import reprlib
+import sys
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-# A whole number beyond this is not exact as a float any more; a real one beyond MOST_REAL overflows when squared twice.
+from meshsimp_pymoo.errors import InputError
+
+# A whole number beyond this is not exact as a float any more; a real one beyond MOST_REAL has infinite products.
 MOST_WHOLE = 2**53
 MOST_REAL = 1e300
+# The largest number there is: what GDAL writes, negated, where a raster has no sample.
+LARGEST = sys.float_info.max
 
 
 class Kind(Protocol):
-    """What values a setting takes; both ways to read one raise a ValueError that says what was expected."""
+    """What values a setting takes; both ways to read one take the same, or raise a ValueError with what is expected."""
 
     def from_text(self, text: str) -> Any:
         """Return the value that a word of a command line means."""
         ...
 
     def from_plain(self, value: Any) -> Any:
-        """Return the value that plain data (of YAML, of JSON) means."""
+        """Return the value that plain data (of YAML, of JSON, of Python with arrays as lists) means; plain data too."""
         ...
 
 
@@ -48,21 +58,7 @@ class Choice(NamedTuple):
             return str(value)
         near = difflib.get_close_matches(str(value).lower(), self.names, 1, 0.6)
         meant = f"unknown (did you mean {near[0]!r}?); " if near else ""
-        raise ValueError(f"{meant}expected one of {', '.join(self.names)}")
-
-
-class Text:
-    """A name."""
-
-    def from_text(self, text: str) -> str:
-        """Return the name."""
-        return text
-
-    def from_plain(self, value: Any) -> str:
-        """Return the name."""
-        if not isinstance(value, str) or not value.strip():
-            raise ValueError("expected a text")
-        return value
+        raise ValueError(f"{meant}expected {'one of ' * (len(self.names) > 1)}{', '.join(self.names)}")
 
 
 class Whole(NamedTuple):
@@ -72,23 +68,28 @@ class Whole(NamedTuple):
 
     def from_text(self, text: str) -> int:
         """Return the number."""
-        if not re.fullmatch(r"[+-]?\d+", text) or int(text) < self.least:
-            raise ValueError(f"{text!r} is not a whole number of at least {self.least}")
-        return int(text)
+        value = int(text) if re.fullmatch(r"[+-]?\d+", text) else None
+        if value is None or not self.least <= value <= MOST_WHOLE:
+            raise ValueError(f"{text!r} is not {self._expected(value)}")
+        return value
 
     def from_plain(self, value: Any) -> int:
         """Return the number."""
         if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= MOST_WHOLE:
-            most = " and at most 2**53" if isinstance(value, int) and value > MOST_WHOLE else ""
-            raise ValueError(f"expected a whole number of at least {self.least}{most}")
+            raise ValueError(f"expected {self._expected(value)}")
         return value
+
+    def _expected(self, value: Any) -> str:
+        most = " and at most 2**53" if isinstance(value, int) and value > MOST_WHOLE else ""
+        return f"a whole number of at least {self.least}{most}"
 
 
 class Real(NamedTuple):
-    """A finite number, at least (or, with ``strict``, above) the least."""
+    """A finite number, at least (or, with ``strict``, above) the least, of a size of at most the most."""
 
     least: float | None = None
     strict: bool = False
+    most: float = MOST_REAL
 
     def from_text(self, text: str) -> float:
         """Return the number."""
@@ -98,24 +99,26 @@ class Real(NamedTuple):
             value = math.nan
         if not math.isfinite(value):
             raise ValueError(f"{text!r} is not a finite number")
-        if self.least is not None and self.strict and value <= self.least:
+        if self._is_small(value):
+            if not self.strict:
+                raise ValueError(f"{text!r} is below {self.least:g}")
             raise ValueError(f"{text!r} is not {'positive' if self.least == 0 else f'above {self.least:g}'}")
-        if self.least is not None and value < self.least:
-            raise ValueError(f"{text!r} is below {self.least:g}")
+        if abs(value) > self.most:
+            raise ValueError(f"{text!r} is larger than {self.most:g}")
         return value
 
     def from_plain(self, value: Any) -> float:
         """Return the number."""
-        is_number = not isinstance(value, bool) and isinstance(value, (int, float))
-        if (
-            not is_number
-            or not abs(value) < MOST_REAL
-            or (self.least is not None and (value < self.least or (self.strict and value == self.least)))
-        ):
+        is_number = not isinstance(value, bool) and isinstance(value, (int, float)) and value == value
+        if not is_number or self._is_small(value) or abs(value) > self.most:
             limit = "" if self.least is None else f" {'of more than' if self.strict else 'of at least'} {self.least:g}"
-            limit += f" and below {MOST_REAL:g}" if is_number and abs(value) >= MOST_REAL else ""
+            if is_number and abs(value) > self.most:
+                limit += f"{limit and ' and'} no larger than {self.most:g}"
             raise ValueError(f"expected a number{limit}")
         return float(value)
+
+    def _is_small(self, value: float) -> bool:
+        return self.least is not None and (value < self.least or (self.strict and value == self.least))
 
 
 class Steps:
@@ -137,28 +140,30 @@ class Steps:
 
 
 class Part:
-    """A part of a grid: column, row, columns, rows."""
+    """A part of a grid: column, row, columns, rows; of at least two columns and rows."""
+
+    LEAST = (0, 0, 2, 2)
 
     def from_text(self, text: str) -> tuple[int, ...]:
         """Return the four numbers."""
         parts = text.split(",")
-        if len(parts) != 4:
+        if len(parts) != len(self.LEAST):
             raise ValueError(f"{text!r} is not COLUMN,ROW,COLUMNS,ROWS")
-        return tuple(Whole(least).from_text(part) for part, least in zip(parts, (0, 0, 2, 2), strict=True))
+        return tuple(Whole(least).from_text(part) for part, least in zip(parts, self.LEAST, strict=True))
 
     def from_plain(self, value: Any) -> tuple[int, ...]:
         """Return the four numbers."""
-        if not isinstance(value, list) or len(value) != 4:
+        if not isinstance(value, list) or len(value) != len(self.LEAST):
             raise ValueError("expected [column, row, columns, rows]")
-        return tuple(Whole(0).from_plain(part) for part in value)
+        return tuple(Whole(least).from_plain(part) for part, least in zip(value, self.LEAST, strict=True))
 
 
 class Direction:
     """A direction in space: "auto", an axis with or without a sign, or three numbers."""
 
-    def from_text(self, text: str) -> str:
+    def from_text(self, text: str) -> str | list[float]:
         """Return the text; what it means is found out beside the model."""
-        return text
+        return self.from_plain(text)
 
     def from_plain(self, value: Any) -> str | list[float]:
         """Return a text or three numbers that are not all 0."""
@@ -188,15 +193,28 @@ class Pins(NamedTuple):
 
 
 class Weights:
-    """The name of numbers, or the numbers themselves."""
+    """The name of numbers, or the numbers themselves; NaN, in plain data None, where there is nothing to weigh."""
 
     def from_text(self, text: str) -> str:
         """Return the name."""
-        return text
+        return str(self.from_plain(text))
 
     def from_plain(self, value: Any) -> Any:
         """Return the name or the list."""
-        return value if isinstance(value, list) and value else Text().from_plain(value)
+        if isinstance(value, list) and value:
+            return [self._number(part) for part in value]
+        if isinstance(value, str) and value.strip():
+            return value
+        raise ValueError("expected the name of an attribute, or a list of numbers")
+
+    def _number(self, value: Any) -> Any:
+        if isinstance(value, list):
+            return [self._number(part) for part in value]
+        if value is None:
+            return math.nan
+        if not isinstance(value, (bool, int, float)):
+            raise ValueError(f"expected a list of numbers, and {reprlib.repr(value)} is none")
+        return value
 
 
 class Setting(NamedTuple):
@@ -247,6 +265,25 @@ def defaults_of(kind: type[Any]) -> dict[str, Any]:
     return {item.name: item.default for item in dataclasses.fields(kind)}
 
 
+def settle(settings: Any) -> None:
+    """Bring the settings of an object that is being made to what their kinds make of them: its ``__post_init__``.
+
+    Raises
+    ------
+    InputError
+        If a value is none that the setting takes.
+    """
+    defaults = defaults_of(type(settings))
+    for name, known in settings_of(type(settings)).items():
+        value = getattr(settings, name)
+        if value is None and defaults[name] is None:
+            continue
+        try:
+            object.__setattr__(settings, name, known.kind.from_plain(_plain(value)))
+        except ValueError as problem:
+            raise InputError(f"{name} is {reprlib.repr(value)}: {problem}") from None
+
+
 def taken(kind: type[Settings], base: Settings | None, arguments: dict[str, Any]) -> Settings:
     """Take a class's settings out of keyword arguments, which lose them, and return them, others as in ``base``."""
     names = [name for name in settings_of(kind) if name in arguments]
@@ -254,8 +291,8 @@ def taken(kind: type[Settings], base: Settings | None, arguments: dict[str, Any]
 
 
 def plain(settings: Any) -> dict[str, Any]:
-    """Return settings as plain data, for JSON: all of them, arrays as lists."""
-    return {name: _plain(getattr(settings, name)) for name in settings_of(type(settings))}
+    """Return settings as plain data, for JSON: all of them, tuples as lists, no number (NaN) as None."""
+    return {name: _stored(getattr(settings, name)) for name in settings_of(type(settings))}
 
 
 def read_back(kind: type[Settings], stored: Any) -> Settings:
@@ -263,23 +300,16 @@ def read_back(kind: type[Settings], stored: Any) -> Settings:
 
     Raises
     ------
-    ValueError
+    InputError
         If that is no mapping, or a name in it is none of the class's, or a value is none that the setting takes.
     """
     if not isinstance(stored, Mapping):
-        raise ValueError(f"{stored!r} holds no {kind.__name__.lower()}")
-    known, defaults = settings_of(kind), defaults_of(kind)
-    values = {}
-    for name, value in stored.items():
+        raise InputError(f"{reprlib.repr(stored)} holds no {kind.__name__.lower()}")
+    known = settings_of(kind)
+    for name in stored:
         if name not in known:
-            raise ValueError(f"{name!r} is none of the {kind.__name__.lower()}: {', '.join(known)}")
-        if value == defaults[name]:
-            continue
-        try:
-            values[name] = known[name].kind.from_plain(value)
-        except ValueError as problem:
-            raise ValueError(f"{name} is {value!r}: {problem}") from None
-    return kind(**values)
+            raise InputError(f"{name!r} is none of the {kind.__name__.lower()}: {', '.join(known)}")
+    return kind(**stored)
 
 
 def documentation(*kinds: type[Any], indent: str = "    ") -> str:
@@ -305,8 +335,15 @@ def _wrapped(text: str, indent: str, width: int = 120) -> Iterable[str]:
 
 
 def _plain(value: Any) -> Any:
+    """Return a value of Python's as YAML or JSON would have it: arrays and whatever else has parts as lists."""
     if hasattr(value, "tolist"):  # an array, or a number of NumPy's
         return value.tolist()
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping)):
         return [_plain(part) for part in value]
     return value
+
+
+def _stored(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_stored(part) for part in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

@@ -9,14 +9,15 @@
                        the columns REFIT_COLUMNS too
     OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
     OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
-    OUT/run.json       settings, seed, package versions, evaluations, seconds, hash of the model
+    OUT/run.json       the model with its hash, how it was read (options), what counted (rules), what was minimised
+                       (objectives), how it was searched and written (settings, seed), package versions, evaluations,
+                       seconds
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
 
 All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
-the same front. Floats are written
-with the fewest digits that read back to the same number. Everything is written to a hidden folder beside OUT,
-flushed to the disk and then renamed, so that OUT is either complete or absent.
+the same front. Floats are written with the fewest digits that read back to the same number. Everything is written to a
+hidden folder beside OUT, flushed to the disk and then renamed, so that OUT is either complete or absent.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ from meshsimp_pymoo.files import (
 )
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality
-from meshsimp_pymoo.surface.surface import Original, Refitted, Surface
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
+from meshsimp_pymoo.surface.surface import Original, Refitted, Surface, require_rules
 
 FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
@@ -236,6 +237,7 @@ def write_front(
     ValueError
         If the front is empty, holds a number that is not finite, or does not fit the model.
     """
+    require_rules(surface, "write_front")
     model = surface.model
     kept = np.asarray(kept, dtype=bool)
     if len(quality) == 0:
@@ -290,8 +292,8 @@ def write_front(
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         packed = np.packbits(kept[order], axis=1)
-        own = {"source_index": model.source_index.astype(np.int64)} | surface.stored_arrays()
-        write_npz(partial / "front.npz", F=F[order], kept=packed, **own)
+        rows_of_file = model.source_index.astype(np.int64)
+        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=rows_of_file)
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
@@ -356,29 +358,53 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
             f"{folder / 'front.npz'}: solution {too_few[0]} keeps {kept[too_few[0]].sum()} vertices, but "
             f"front.csv says its mesh has {quality['vertices'][too_few[0]]}"
         )
-    record = folder / "run.json"
-    try:
-        run = json.loads(record.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
-        raise ResultError(f"{record}: cannot be read ({reason_of(problem)})") from None
-    if not isinstance(run, dict) or run.get("solutions") != count:
-        raise ResultError(f"{record}: is not the record of this front of {count} solutions")
-    _check_record(run, count, record)
+    run = read_record(folder / "run.json", count)
     series = _read_series(folder / "series.csv")
     return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series)
 
 
-def _check_record(run: dict[str, Any], count: int, path: Path) -> None:
-    """Refuse a record whose parts are not of the kind that others rely on."""
-    model, chosen = run.get("model") or {}, run.get("chosen")
-    parts = ("model", "options", "rules", "settings", "versions")
-    wrong = [name for name in parts if not isinstance(run.get(name) or {}, dict)]
-    if not wrong:
-        wrong = [f"model.{key}" for key in ("name", "hash", "file") if not isinstance(model.get(key) or "", str)]
+def read_record(path: Path, count: int) -> dict[str, Any]:
+    """Read the record of a front of so many solutions, whose parts are then of the kind that others rely on.
+
+    Raises
+    ------
+    ResultError
+        If it is missing, damaged, of another front or of an earlier version.
+    """
+    try:
+        run = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
+    if not isinstance(run, dict) or run.get("solutions") != count:
+        raise ResultError(f"{path}: is not the record of this front of {count} solutions")
+    model, chosen, objectives = run.get("model"), run.get("chosen"), run.get("objectives")
+    wrong = [name for name in ("options", "rules", "settings", "versions") if not isinstance(run.get(name) or {}, dict)]
+    if not isinstance(model, dict):
+        wrong.append("model")
+    else:
+        wrong += [f"model.{key}" for key in ("name", "hash") if not isinstance(model.get(key), str)]
+        wrong += ["model.file"] * (not isinstance(model.get("file") or "", str))
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
         wrong.append("chosen")
+    wrong += ["objectives"] * (objectives is not None and not _are_objectives(objectives))
     if wrong:
         raise ResultError(f"{path}: {', '.join(wrong)} is not what a front's record holds; write the front again")
+    if "footprint" in (run.get("settings") or {}) and not {"options", "rules"} & set(run):
+        raise ResultError(
+            f"{path}: is of an earlier version, which stored how a model is read and what counts otherwise; simplify "
+            "the model again"
+        )
+    return run
+
+
+def _are_objectives(names: Any) -> bool:
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return False
+    try:
+        checked_objectives(names)
+    except ValueError:
+        return False
+    return True
 
 
 def mesh_arrays(

@@ -14,6 +14,7 @@ import sys
 import time
 from importlib import metadata
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,14 +27,15 @@ from meshsimp_pymoo import Front, MeshProblem, memetic
 from meshsimp_pymoo.cli import main, searching
 from meshsimp_pymoo.cli.commands.completion import SHELLS
 from meshsimp_pymoo.cli.parser import make_parser
-from meshsimp_pymoo.cli.terminal import front_in_words
+from meshsimp_pymoo.cli.terminal import described, front_in_words
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import write_mesh, written_formats
+from meshsimp_pymoo.formats.table import all_formats, write_mesh, written_formats
 from meshsimp_pymoo.front import FrontSolution
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
+from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES, Measure, Quality
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.warming import SEARCH, compile_here
 
@@ -239,7 +241,7 @@ def test_a_target_that_was_not_reached_says_so_and_leaves_the_front(tmp_path, ca
     faces = np.vstack([roof.faces, [0, 1, 25]])
     write_mesh(tmp_path / "twin.ply", points, faces)
     assert run("simplify", tmp_path / "twin.ply", "-o", tmp_path / "out", "--max-error", "0.5", *QUICK) == 1
-    said = r"no chosen mesh: no solution of .*twin\.ply has a max error of at most 0\.5; the least is \d+.*; search"
+    said = r"no chosen mesh: the least max error of a solution of .*twin\.ply is \d+.*, and 0\.5 was asked for; search"
     assert re.search(said, capsys.readouterr().err)
     assert (tmp_path / "out" / "front.csv").is_file()
     assert not (tmp_path / "out" / "chosen.ply").exists()
@@ -606,6 +608,12 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(tmp_path, capsy
         (("--spacing", "0"), r"'0' is not one or two positive numbers"),
         (("--spacing", "2"), r"roof:5: spacing, nodata, window and max_edge are for files"),
         (("--nodata", "x"), r"'x' is not a finite number"),
+        (("--pieces",), r"--pieces is for tiles, and this model is searched in one piece; leave it out"),
+        (("--jobs", "2", "--tile", "none"), r"--jobs is for tiles"),
+        (("--dask", "tcp://localhost:8786"), r"--dask is for tiles"),
+        (("--max-edge", "1e301"), r"'1e301' is larger than 1e\+300"),
+        (("--up", ""), r"argument --up: expected an axis such as z or -x"),
+        (("--weights", ""), r"argument --weights: expected the name of an attribute"),
         (("--meshes", "some"), r"'some' is not a whole number of at least 0"),
         (("--format", "doc"), r"invalid choice: 'doc'"),
         (("--gen", "3"), r"unrecognized arguments: --gen 3; did you mean --generations\? \(see meshsimp simplify --h"),
@@ -735,7 +743,7 @@ def test_pick_without_a_file_says_what_it_would_be(picked, capsys):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        (("--triangles", "1"), 1, r"no solution of face:200 has at most 1 triangles; the smallest has 2; nothing is w"),
+        (("--triangles", "1"), 1, r"no solution of face:200 has at most 1 triangles; the least is 2; nothing is w"),
         (("--solution", "9999"), 2, r"has the solutions 0 to \d+; --solution 9999 is none of them"),
         ((), 2, r"one of the arguments --triangles .* is required \(see meshsimp pick --help\)"),
         (("--knee", "-o", "a.doc"), 2, r"a\.doc: the suffix '\.doc' says no format that can be written; use one"),
@@ -910,6 +918,15 @@ def test_info_describes_even_what_would_be_refused(tmp_path, capsys):
     assert err.startswith(f"meshsimp: {tmp_path / 'box.ply'}: ")
 
 
+def test_a_mesh_is_described_by_every_measure_that_means_something(monkeypatch):
+    quality = Quality(1234.56789, 12345, 6200, 0.123456, 0.234567, 3.456789, 1500)
+    said = "12,345 triangles, error 1234.57, mean 0.1235, RMS 0.2346, max 3.457, uncovered 1500"
+    assert described(quality) == said
+    new = Measure(lambda table, weight: 0.0, label="median error", meaning="half deviate by less", unit="model units")
+    monkeypatch.setitem(MEASURES, "median_error", new)
+    assert described(SimpleNamespace(**vars(quality), median_error=0.5)) == f"{said}, median 0.5"
+
+
 def test_info_without_a_model_lists_the_built_in_ones(capsys):
     assert run("info") == 0
     out = capsys.readouterr().out
@@ -940,6 +957,17 @@ def test_the_version_is_that_of_the_installed_package(capsys):
     assert done.value.code == 0
     assert capsys.readouterr().out == f"meshsimp {installed}\n"
     assert meshsimp_pymoo.__version__ == installed
+
+
+def test_help_says_which_grids_are_cut_into_tiles_and_what_each_measure_and_algorithm_is(capsys):
+    with pytest.raises(SystemExit):
+        run("simplify", "--help")
+    said = " ".join(capsys.readouterr().out.split())
+    counted = [suffix for kind in all_formats() if kind.count_samples for suffix in kind.suffixes]
+    assert set(counted) >= {".npy", ".asc", ".tif", ".tiff"}
+    assert f"for {', '.join(counted[:-1])} and {counted[-1]} from 2 million samples on)" in said
+    assert all(f"{measure.minimised} ({measure.meaning})" in said for measure in OBJECTIVES.values())
+    assert all(f"{name}: {PRESETS[name].about}" in said for name in ALGORITHMS)
 
 
 def test_the_choices_offered_are_those_of_the_library():
@@ -1040,7 +1068,11 @@ def test_refitted_meshes_stand_beside_the_others_and_the_referee_agrees(tmp_path
     ("options", "message"),
     [
         (["--measure", "l2"], "--measure: invalid choice: 'l2' (choose from l1, rms, max); did you mean l1?"),
-        (["--measure", "max", "--algorithm", "memetic"], "--measure max is not for the memetic search"),
+        (
+            ["--measure", "max", "--algorithm", "memetic"],
+            "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
+            "use --algorithm nsga2_v1 or nsga2_v2 or moead with it, or --measure l1 or rms",
+        ),
         (["--weights", "sharpness"], "no per-vertex attribute 'sharpness' to weigh by; it has: none"),
     ],
 )

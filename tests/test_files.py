@@ -165,6 +165,16 @@ def test_the_old_folder_comes_back_where_a_process_was_killed_between_two_rename
     assert entries(tmp_path) == ["out", "out/front.csv"]
 
 
+def test_what_a_folder_replaced_before_its_process_was_killed_is_removed_where_it_is_made_anew(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "new").touch()
+    (tmp_path / ".out.0123abcd.old" / "tables").mkdir(parents=True)
+    put_back(tmp_path / "out", tidy=True)
+    assert len(left_beside(tmp_path / "out", "old")) == 1  # perhaps nobody has these results elsewhere
+    put_back(tmp_path / "out", tidy=True, replaced=True)
+    assert entries(tmp_path) == ["out", "out/new"]
+
+
 def test_only_a_folder_s_own_remains_are_touched(tmp_path):
     others = [".out.2.0123abcd.partial", ".outer.0123abcd.partial", ".out.0123abc.partial", ".out.0123abcg.partial"]
     for name in others:

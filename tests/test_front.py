@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import builtins
 import dataclasses
+import inspect
 import itertools
 import json
 import pickle
+import pydoc
 import re
 import shutil
 import sys
@@ -22,6 +24,7 @@ from pymoo.problems import get_problem
 from meshsimp_pymoo import (
     Front,
     FrontOutput,
+    FrontSolution,
     HalfPlaneCrossover,
     MeshProblem,
     NeighbourShift,
@@ -43,6 +46,7 @@ from meshsimp_pymoo.front import starting_front
 from meshsimp_pymoo.indicators import hypervolume_ratio, knee
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
+from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
 from meshsimp_pymoo.surface.measures import MEASURES
 
@@ -177,11 +181,30 @@ def test_a_solution_has_its_numbers_and_its_mesh(front):
     assert (solution.mean_error, solution.rms_error, solution.max_error) == (q.mean_error, q.rms_error, q.max_error)
     assert solution.uncovered == q.uncovered
     assert {name: getattr(solution, name) for name in MEASURES} == dataclasses.asdict(q)
-    with pytest.raises(AttributeError, match="a solution of a front has no 'eror'; its numbers are error, triangles"):
-        _ = solution.eror
     assert isinstance(solution.mesh, trimesh.Trimesh)
     assert len(solution.mesh.faces) == solution.triangles == len(solution.faces)
     assert solution.simplified.deviation.sum() == pytest.approx(solution.error)
+
+
+def test_help_and_editors_know_the_numbers_of_a_solution_and_the_limits_of_a_choice(front):
+    said = pydoc.render_doc(FrontSolution, renderer=pydoc.plaintext)
+    for name, measure in MEASURES.items():
+        assert name in dir(front[0])
+        assert isinstance(getattr(FrontSolution, name), property)
+        assert measure.label in getattr(FrontSolution, name).__doc__.lower().replace("rms", "RMS")
+        assert f"  {name}\n" in said
+    assert list(inspect.signature(front.best).parameters) == list(MEASURES)
+    assert "error, vertices, mean_error, rms_error, max_error, uncovered : float" in Front.best.__doc__
+
+
+def test_what_goes_wrong_in_a_property_is_reported_as_it_is(front):
+    class Broken(FrontSolution):
+        @property
+        def area(self):
+            return self.faces.are
+
+    with pytest.raises(AttributeError, match=r"'numpy\.ndarray' object has no attribute 'are'"):
+        _ = Broken(front, 0).area
 
 
 # ------------------------------------------------------------------------------------------------------------- choosing
@@ -202,10 +225,14 @@ def test_best_within_a_measure_is_the_smallest(front, name):
 
 
 def test_a_limit_that_nothing_meets_says_how_near_the_front_comes(front):
-    with pytest.raises(LookupError, match="no solution of face:200 has at most 1 triangles; the smallest has 2"):
+    with pytest.raises(LookupError, match="no solution of face:200 has at most 1 triangles; the least is 2"):
         front.best(triangles=1)
-    with pytest.raises(LookupError, match=r"face:200 has a max error of at most 1e-09; the least is \d"):
+    with pytest.raises(LookupError, match=r"no solution of face:200 has at most -1 uncovered; the least is 0"):
+        front.best(uncovered=-1)
+    with pytest.raises(LookupError, match=r"the least max error of a solution of face:200 is .*, and 1e-09 was asked"):
         front[:-1].best(max_error=1e-9)
+    with pytest.raises(LookupError, match=r"the least RMS error of a solution of face:200 is .*, and 0 was asked for"):
+        front[:-1].best(rms_error=0)
     with pytest.raises(TypeError, match=r"best\(\) takes one limit, such as triangles=500 .*; 2 are given"):
         front.best(triangles=5, error=3)
     with pytest.raises(TypeError, match="0 are given"):
@@ -378,6 +405,10 @@ def test_how_the_model_was_read_is_remembered(tmp_path):
     assert np.ptp(front[-1].mesh.vertices[:, :2], axis=0).tolist() == [50, 80]
     assert front.problem.surface.rules == Rules(footprint="hull", outside="ignore")
     assert front.problem.options == problem.options == Options(spacing=(10, 20), nodata=-9999)
+    again = Front.load(tmp_path / "out", model=problem.model)  # a model in memory was read in that way, too
+    assert Front.load(again.save(tmp_path / "again", meshes=0, page=False)).problem.options == problem.options
+    surface = Front.load(tmp_path / "out", model=problem.surface)
+    assert surface.problem.options == problem.options
 
 
 def test_a_front_can_be_pickled(front):
@@ -401,6 +432,13 @@ def test_a_notebook_shows_the_picture_and_a_table_with_the_knee(front):
     page = front._repr_html_()
     assert "data:image/png;base64," in page
     assert f"<td>{front.knee().solution} (knee)</td>" in page
+    header = "".join(
+        f"<th>{word}</th>" for word in ("solution", "triangles", "vertices", "error", "mean error", "max error")
+    )
+    assert f"<tr>{header}</tr>" in page
+    first = front.quality[0]
+    numbers = (first.triangles, first.vertices, first.error, first.mean_error, first.max_error)
+    assert "".join(f"<td>{number:.6g}</td>" for number in numbers) in page
     rows = page.count("<tr>") - 1
     assert 3 <= rows <= 13
     assert (f"{len(front) - rows} more solutions are not listed" in page) == (rows < len(front))
@@ -501,7 +539,7 @@ def test_errors_at_sizes_are_those_of_the_best_small_enough():
 
 
 @pytest.mark.parametrize(
-    "pin", [[12, 7], 12, (1, 2), np.array([3, 4]), np.array([[0.0, 0.5]]), "hull", ["hull", 12]], ids=str
+    "pin", [[12, 7], 12, (1, 2), np.array([3, 4]), np.array([[0.0, 0.5]]), "hull", ["hull", 12], {7}], ids=str
 )
 def test_what_is_pinned_is_pinned_again_when_the_front_is_read(pin, tmp_path):
     problem = MeshProblem("roof:5", pin=pin)
@@ -520,3 +558,15 @@ def test_weights_by_number_count_again_when_the_front_is_read(weights, tmp_path)
     again = Front.load(tmp_path / "out")
     assert again.quality == front.quality
     assert again.problem.evaluate(problem.pinned).tolist() == problem.evaluate(problem.pinned).tolist()
+
+
+def test_a_grid_with_gaps_and_weights_without_numbers_there_is_read_again(tmp_path):
+    heights = np.random.default_rng(1).random((6, 7))
+    heights[2:4, 3] = -LARGEST  # what GDAL writes where there is no sample
+    np.save(tmp_path / "dem.npy", heights)
+    weights = np.where(heights < 0, np.nan, 1.0 + heights)
+    problem = MeshProblem(tmp_path / "dem.npy", nodata=-LARGEST, weights=weights)
+    Front.from_subsets(problem, problem.pinned, ends=True).save(tmp_path / "out", page=False)
+    again = Front.load(tmp_path / "out").problem
+    assert again.options == problem.options == Options(nodata=-LARGEST)
+    assert again.model.hash == problem.model.hash

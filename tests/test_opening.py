@@ -11,6 +11,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.opening import open_model, open_source
+from meshsimp_pymoo.problem import MeshProblem
 
 
 def test_a_file_wins_over_a_built_in_of_its_name(tmp_path, monkeypatch):
@@ -40,7 +41,7 @@ def test_whatever_a_mesh_is_given_as_the_model_is_the_same(tmp_path):
     mesh = trimesh.Trimesh(source.points, source.faces, process=False)
     np.save(tmp_path / "z.npy", np.arange(12.0).reshape(3, 4) ** 2)
     expected = open_model("face:200")
-    for given in (source, mesh, expected):
+    for given in (source, mesh):
         model = open_model(given, Options(up="z"))
         assert_array_equal(model.points, expected.points)
         assert_array_equal(model.faces, expected.faces)
@@ -48,14 +49,30 @@ def test_whatever_a_mesh_is_given_as_the_model_is_the_same(tmp_path):
     assert open_model(tmp_path / "z.npy").hash == open_model(str(tmp_path / "z.npy")).hash
 
 
+@pytest.mark.parametrize(
+    ("of_file", "value"), [("spacing", 2.0), ("nodata", -1.0), ("window", (0, 0, 2, 2)), ("max_edge", 3.0)]
+)
+def test_what_describes_a_file_is_refused_for_a_mesh_in_memory(of_file, value):
+    source = load("face:200")
+    for given in (source, trimesh.Trimesh(source.points, source.faces, process=False)):
+        with pytest.raises(ModelError, match="spacing, nodata, window and max_edge are for files; a mesh in memory"):
+            open_model(given, Options(**{of_file: value}))
+
+
+@pytest.mark.parametrize("how", [{"up": "z"}, {"up": np.array([0, 0, 1.0]), "patch": "front"}, {"spacing": 2.0}])
+def test_nothing_can_be_said_of_how_to_read_a_model_that_was_read(how):
+    with pytest.raises(ModelError, match=f"face:200: is a model that was read already, .* leave {next(iter(how))}="):
+        open_model(open_model("face:200"), Options(**how))
+    with pytest.raises(ModelError, match="is a model that was read already"):
+        MeshProblem(open_model("face:200"), **how)
+
+
 def test_what_is_no_mesh_is_refused_by_type():
     with pytest.raises(TypeError, match="not int"):
         open_model(7)
 
 
-def test_a_patch_is_cut_out_on_the_way_and_must_be_one_that_is_known():
+def test_a_patch_is_cut_out_on_the_way():
     ball = trimesh.creation.icosphere(3)
     lid = open_source(ball, Options(up="z", patch="front"))
     assert 0 < len(lid.faces) < len(ball.faces)
-    with pytest.raises(ModelError, match="patch='back' is unknown"):
-        open_model("roof:3", Options(patch="back"))

@@ -38,7 +38,7 @@ from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import ThreadRunner
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import ERROR, TRIANGLES
+from meshsimp_pymoo.surface.measures import ERROR, MEASURES, OBJECTIVES, TRIANGLES
 
 
 @pytest.fixture(scope="module")
@@ -130,8 +130,8 @@ def test_constraints_bound_triangles_and_error():
         ({"max_triangles": 0}, "leaves no mesh"),
         ({"max_error": -1.0}, "is no error"),
         ({"max_error": float("nan")}, "is no error"),
-        ({"footprint": "box"}, "'box' is unknown"),
-        ({"outside": "zero"}, "'zero' is unknown"),
+        ({"footprint": "box"}, "footprint is 'box': expected one of model, hull"),
+        ({"outside": "zero"}, "outside is 'zero': expected one of nearest, ignore"),
         ({"n_threads": 0}, "no number of threads"),
     ],
 )
@@ -175,7 +175,8 @@ def test_a_surface_brings_its_rules_and_takes_no_other_ones():
     assert problem.surface is surface
     assert problem.model is surface.model
     assert problem.objectives == ("rms_error", "triangles")
-    for arguments in ({"footprint": "model"}, {"rules": Rules()}, {"spacing": 2.0}, {"options": Options(up="z")}):
+    others = ({"footprint": "model"}, {"rules": Rules()}, {"spacing": 2.0}, {"options": Options(up="z")})
+    for arguments in (*others, {"up": np.array([0, 0, 1])}):
         with pytest.raises(TypeError, match="a HeightSurface is a model that was read, with its rules; make an"):
             MeshProblem(surface, **arguments)
     with pytest.raises(ValueError, match=r"the surface's rules measure 'rms_error'; .* Rules\(measure='error'\)"):
@@ -202,6 +203,20 @@ def test_the_objectives_are_the_named_numbers_of_the_same_evaluation(problem, ob
         np.testing.assert_array_equal(F, [getattr(problem.quality(kept), name) for name in objectives])
     np.testing.assert_array_equal(out["error"], problem.evaluate(subsets(problem, 5))[:, 0])
     assert (other.evaluate(subsets(problem, 5)) < other.worst).all()
+
+
+def test_a_number_that_the_worst_mesh_is_not_given_is_none(problem, monkeypatch):
+    assert np.isfinite(problem._worst_row()).all()
+    monkeypatch.setattr("meshsimp_pymoo.problem.REGIONS", 5000)  # so many that memory held something there before
+    row = problem._worst_row()
+    assert np.isfinite(row[:6]).all()
+    assert np.isnan(row[6:]).all()
+
+
+def test_the_documentation_names_every_objective_and_every_number_beside_them():
+    assert all(f'"{name}"' in MeshProblem.__doc__ for name in OBJECTIVES)
+    assert ", ".join(f"``{name}``" for name in MEASURES if name != "triangles") in MeshProblem.__doc__
+    assert not {"SETTINGS", "OBJECTIVES", "REPORTED"} & set(MeshProblem.__doc__.split())
 
 
 def test_a_bound_on_the_error_is_one_on_the_first_objective():

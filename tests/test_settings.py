@@ -14,8 +14,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo.errors import InputError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.settings import (
+    LARGEST,
     MOST_REAL,
     MOST_WHOLE,
     Choice,
@@ -24,7 +26,6 @@ from meshsimp_pymoo.settings import (
     Pins,
     Real,
     Steps,
-    Text,
     Weights,
     Whole,
     defaults_of,
@@ -42,12 +43,13 @@ from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES, PINS, Rules
 
 TEXTS = [
     (Choice(("hull", "model")), "hull", "hull"),
-    (Text(), "importance", "importance"),
     (Weights(), "importance", "importance"),
     (Whole(), "12", 12),
     (Whole(-3), "-3", -3),
     (Real(), "-1.5e3", -1500.0),
     (Real(0), "0", 0.0),
+    (Real(), "-1e300", -MOST_REAL),
+    (Real(most=LARGEST), "-1.7976931348623157e+308", -LARGEST),
     (Steps(), "2.5", (2.5, 2.5)),
     (Steps(), "2,3", (2.0, 3.0)),
     (Part(), "0,1,20,30", (0, 1, 20, 30)),
@@ -68,6 +70,10 @@ WRONG_TEXTS = [
     (Real(0), "-1", "'-1' is below 0"),
     (Real(0, strict=True), "0", "'0' is not positive"),
     (Real(2, strict=True), "2", "'2' is not above 2"),
+    (Real(), "-1e301", r"'-1e301' is larger than 1e\+300"),
+    (Whole(), str(MOST_WHOLE + 1), r"is not a whole number of at least 0 and at most 2\*\*53"),
+    (Weights(), "", "expected the name of an attribute, or a list of numbers"),
+    (Direction(), "", "expected an axis"),
     (Steps(), "1,2,3", "'1,2,3' is not one or two positive numbers"),
     (Steps(), "-1", "not one or two positive numbers"),
     (Steps(), "a", "'a' is not a finite number"),
@@ -78,12 +84,13 @@ WRONG_TEXTS = [
 ]
 PLAIN = [
     (Choice(("hull", "model")), "model", "model"),
-    (Text(), "importance", "importance"),
     (Weights(), "importance", "importance"),
     (Weights(), [1, 2.5], [1, 2.5]),
     (Weights(), [[1, 2], [3, 4]], [[1, 2], [3, 4]]),
     (Whole(), MOST_WHOLE, MOST_WHOLE),
     (Real(), 3, 3.0),
+    (Real(), MOST_REAL, MOST_REAL),
+    (Real(most=LARGEST), -LARGEST, -LARGEST),
     (Steps(), 2, (2.0, 2.0)),
     (Steps(), [2, 3.5], (2.0, 3.5)),
     (Part(), [0, 1, 20, 30], (0, 1, 20, 30)),
@@ -96,23 +103,25 @@ PLAIN = [
 WRONG_PLAIN = [
     (Choice(("hull", "model")), "Hull", r"did you mean 'hull'\?"),
     (Choice(("hull", "model")), None, "expected one of hull, model"),
-    (Text(), " ", "expected a text"),
-    (Text(), 3, "expected a text"),
-    (Weights(), [], "expected a text"),
-    (Weights(), 3, "expected a text"),
+    (Choice(("front",)), 3, "^expected front$"),
+    (Weights(), [], "expected the name of an attribute, or a list of numbers"),
+    (Weights(), 3, "expected the name of an attribute"),
+    (Weights(), [1, "2"], "expected a list of numbers, and '2' is none"),
     (Whole(), True, "expected a whole number of at least 0"),
     (Whole(), 1.0, "expected a whole number"),
     (Whole(), MOST_WHOLE + 1, r"at least 0 and at most 2\*\*53"),
     (Real(), "3", "^expected a number$"),
     (Real(), False, "expected a number"),
     (Real(), math.nan, "expected a number"),
-    (Real(), math.inf, "below 1e\\+300"),
+    (Real(), math.inf, r"^expected a number no larger than 1e\+300"),
+    (Real(most=LARGEST), -math.inf, "no larger than 1.79769e"),
     (Real(0), -1, "expected a number of at least 0"),
     (Real(0, strict=True), 0, "expected a number of more than 0"),
-    (Real(), MOST_REAL, r"below 1e\+300"),
+    (Real(0), 10**400, r"^expected a number of at least 0 and no larger than 1e\+300"),
     (Steps(), [], r"expected one number or two, \[dx, dy\]"),
     (Steps(), [1, 2, 3], r"expected one number or two"),
     (Steps(), 0, "more than 0"),
+    (Part(), [0, 0, 1, 5], "expected a whole number of at least 2"),
     (Part(), [1, 2, 3], r"expected \[column, row, columns, rows\]"),
     (Part(), "0,0,2,2", "expected .column, row"),
     (Direction(), [0, 0, 0], "three numbers that are not all 0"),
@@ -151,8 +160,8 @@ def test_data_that_are_none_are_refused_with_what_was_expected(kind, given, mess
 
 # ------------------------------------------------------------------------------------------ stored and read back
 
-reals = st.floats(-1e299, 1e299)
-positive = st.floats(1e-300, 1e299)
+reals = st.floats(-MOST_REAL, MOST_REAL)
+positive = st.floats(1e-300, MOST_REAL)
 wholes = st.integers(0, 10**6)
 directions = st.lists(st.floats(-10, 10), min_size=3, max_size=3).filter(any)
 positions = st.lists(reals, min_size=2, max_size=3)
@@ -166,8 +175,8 @@ SETTINGS = {
     "up": st.one_of(st.sampled_from(["auto", "z", "-x"]), directions),
     "patch": st.none() | st.just("front"),
     "spacing": st.none() | st.tuples(positive, positive),
-    "nodata": st.none() | reals,
-    "window": st.none() | st.tuples(wholes, wholes, wholes, wholes),
+    "nodata": st.none() | st.floats(allow_nan=False, allow_infinity=False),
+    "window": st.none() | st.tuples(wholes, wholes, *2 * [wholes.map(lambda count: count + 2)]),
     "max_edge": st.none() | positive,
     "footprint": st.sampled_from(FOOTPRINTS),
     "outside": st.sampled_from(OUTSIDES),
@@ -197,6 +206,46 @@ def test_arrays_tuples_and_numbers_of_numpy_are_stored_as_plain_data(values):
     assert read_back(Rules, plain(rules)).weights == [0.0, 1.0, 2.0]
 
 
+def test_what_python_takes_is_made_plain_at_once_so_that_settings_can_be_compared_and_stored():
+    given = Options(up=np.array([0, 0, 2]), spacing=np.float32(2), window=np.array([0, 0, 4, 4]))
+    assert given == Options(up=(0, 0, 2), spacing=(2, 2), window=[0, 0, 4, 4]) != Options()
+    assert (given.up, given.spacing, given.window) == ([0.0, 0.0, 2.0], (2.0, 2.0), (0, 0, 4, 4))
+    rules = Rules(pin=(row for row in (7, 12)), weights=np.array([1, 2.5], np.float32))
+    assert rules == Rules(pin=np.array([7, 12]), weights=(1.0, 2.5)) != Rules()
+    assert read_back(Rules, json.loads(json.dumps(plain(rules)))) == rules
+
+
+def test_a_weight_that_is_no_number_is_stored_as_nothing_and_read_back():
+    rules = Rules(weights=np.array([[1.0, np.nan], [2.0, 3.0]]))
+    assert plain(rules)["weights"] == [[1.0, None], [2.0, 3.0]]
+    again = read_back(Rules, json.loads(json.dumps(plain(rules), allow_nan=False)))
+    np.testing.assert_array_equal(again.weights, [[1.0, np.nan], [2.0, 3.0]])
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "message"),
+    [
+        (Options, {"window": (0.0, 0.0, 4, 4)}, r"window is \(0\.0, 0\.0, 4, 4\): expected a whole number"),
+        (Options, {"window": (-1, 0, 4, 4)}, "window is .*: expected a whole number of at least 0"),
+        (Options, {"spacing": (1, 2, 3)}, "spacing is .*: expected one number or two"),
+        (Options, {"spacing": "wide"}, "spacing is 'wide': expected a number"),
+        (Options, {"nodata": math.nan}, "nodata is nan: expected a number"),
+        (Options, {"max_edge": math.inf}, "max_edge is inf: expected a number of more than 0 and no larger than"),
+        (Options, {"patch": "back"}, "patch is 'back': expected front$"),
+        (Options, {"up": ""}, "up is '': expected an axis"),
+        (Rules, {"pin": {"hull": True}}, "pin is .*: expected corners, hull, or a list"),
+        (Rules, {"weights": " "}, "weights is ' ': expected the name of an attribute"),
+        (Rules, {"weights": np.array(["a"] * 1000)}, "weights is .*: expected a list of numbers, and 'a' is none"),
+        (Rules, {"footprint": None}, "footprint is None: expected one of model, hull"),
+    ],
+)
+def test_what_could_not_be_read_back_is_refused_when_it_is_given(kind, given, message):
+    with pytest.raises(InputError, match=message) as caught:
+        kind(**given)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 200
+
+
 def test_defaults_are_read_back_and_missing_settings_have_them():
     for kind in (Options, Rules):
         assert read_back(kind, {}) == read_back(kind, plain(kind())) == kind()
@@ -211,7 +260,8 @@ def test_defaults_are_read_back_and_missing_settings_have_them():
         ({"foot": "hull"}, "'foot' is none of the rules: footprint, outside, pin, weights, measure"),
         ({"footprint": "hul"}, r"footprint is 'hul': unknown \(did you mean 'hull'\?\)"),
         ({"pin": {}}, "pin is {}: expected corners, hull, or a list"),
-        ({"weights": 3}, "weights is 3: expected a text"),
+        ({"weights": 3}, "weights is 3: expected the name of an attribute"),
+        ({"footprint": None}, "footprint is None: expected one of model, hull"),
     ],
 )
 def test_what_was_stored_of_nothing_like_it_is_refused(stored, message):

@@ -237,6 +237,12 @@ def test_an_empty_or_unfinished_front_is_refused(tmp_path, model, solutions):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_model_in_place_of_a_surface_is_told_apart(tmp_path, model, solutions):
+    kept, simplified = solutions
+    with pytest.raises(TypeError, match=r"write_front: a OpenModel has no rules; give a surface"):
+        write_front(tmp_path / "out", model, [s.quality for s in simplified], kept, meshes=0)
+
+
 def spoil_csv(line, column, value):
     def spoil(folder):
         rows = [row.split(",") for row in (folder / "front.csv").read_text().splitlines()]
@@ -364,7 +370,17 @@ DAMAGE = {
     "chosen beyond": (change_run(chosen=12), r"run\.json: chosen is not what a front's record holds"),
     "chosen no number": (change_run(chosen="0"), r"run\.json: chosen is not"),
     "model no mapping": (change_run(model="face.ply"), r"run\.json: model is not"),
-    "file no text": (change_run(model={"file": 3}), r"run\.json: model\.file is not"),
+    "file no text": (change_run(model={"name": "", "hash": "", "file": 3}), r"run\.json: model\.file is not"),
+    "no model": (change_run(model=None), r"run\.json: model is not"),
+    "model without a name": (change_run(model={"hash": "0"}), r"run\.json: model\.name is not"),
+    "unknown objectives": (change_run(objectives=["foo", "triangles"]), r"run\.json: objectives is not what a front"),
+    "objectives without triangles": (change_run(objectives=["error"]), r"run\.json: objectives is not"),
+    "objectives in a list": (change_run(objectives=[["error"], "triangles"]), r"run\.json: objectives is not"),
+    "objectives in a mapping": (change_run(objectives={"error": 1, "triangles": 2}), r"run\.json: objectives is not"),
+    "of an earlier version": (
+        change_run(settings={"footprint": "hull", "outside": "ignore"}, objectives=["error", "triangles"]),
+        r"run\.json: is of an earlier version, .*; simplify the model again",
+    ),
     "deep run": (lambda f: (f / "run.json").write_text("[" * 100_000), r"run\.json: cannot be read"),
     "other run": (spoil_run, r"run\.json: is not the record of this front of 12 solutions"),
     "no folder": (lambda f: shutil.rmtree(f), r"out: no such folder"),

@@ -16,6 +16,9 @@ from meshsimp_pymoo.surface.rules import Rules
 
 Part = TypeVar("Part")
 
+# From this many samples on, a grid is thinned tile by tile without being asked.
+TILED_FROM = 2_000_000
+
 
 @dataclass(frozen=True)
 class Search:
@@ -93,11 +96,16 @@ class Request:
     tiling: Tiling
 
     @property
+    def wanted(self) -> dict[str, Any]:
+        """What of it is worth a place in the record of any results: which mesh was wanted, how meshes are written."""
+        shown = {name: getattr(self.output, name) for name in ("format", "meshes")}
+        return self.wish.limits | ({"pick": "knee"} if self.wish.knee else {}) | shown
+
+    @property
     def recorded(self) -> dict[str, Any]:
-        """What of it is worth a place in the record of its results, beside options and rules."""
+        """What of it is worth a place in the record of what was searched, beside options and rules."""
         search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
-        shown = {name: getattr(self.output, name) for name in ("format", "meshes", "refit")}
-        return search | self.wish.limits | ({"pick": "knee"} if self.wish.knee else {}) | shown
+        return search | self.wanted | {"refit": self.output.refit}
 
 
 def request_of(args: argparse.Namespace) -> Request:

@@ -29,7 +29,7 @@ from meshsimp_pymoo.cli.terminal import (
     say,
     stop_if_interrupted,
 )
-from meshsimp_pymoo.cli.tiling import simplify_tiled, wants_tiles
+from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, shared_frame
@@ -71,11 +71,17 @@ def simplify(request: Request, shown: Stages) -> int:
             if not output.quiet:
                 why = re.split("; only|, and tiles", str(reason))[0]
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
+    else:
+        refuse_alone(request.tiling)
     _claim(output, search)
-    if PRESETS[search.algorithm].sums_only and not OBJECTIVES[request.rules.measure].is_sum:
+    measure = OBJECTIVES[request.rules.measure]
+    if PRESETS[search.algorithm].sums_only and not measure.is_sum:
+        others = [name for name, preset in PRESETS.items() if preset.whole_front and not preset.sums_only]
+        sums = [known.minimised for known in OBJECTIVES.values() if known.is_sum]
         raise UsageError(
-            "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
-            "use --algorithm nsga2_v1 with it, or --measure rms"
+            f"--measure {measure.minimised} is not for the {search.algorithm} search, which thins and moves vertices "
+            f"by sums over the vertices; use --algorithm {' or '.join(others)} with it, or --measure "
+            f"{' or '.join(sums)}"
         )
     with compiling((*SEARCH, "scores") if output.refit else SEARCH, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):

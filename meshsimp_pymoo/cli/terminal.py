@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
+from meshsimp_pymoo.surface.measures import MEASURES
+
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
@@ -211,11 +213,14 @@ def warnings_as_lines() -> Iterator[None]:
 
 
 def described(quality: Quality) -> str:
-    """Return all numbers of a mesh in words."""
-    return (
-        f"{quality.triangles:,} triangles, error {quality.error:.6g}, mean {quality.mean_error:.4g}, "
-        f"RMS {quality.rms_error:.4g}, max {quality.max_error:.4g}, uncovered {quality.uncovered}"
-    )
+    """Return the size of a mesh, and each of its numbers that has a meaning of its own, in words."""
+    said = [f"{quality.triangles:,} triangles"]
+    for name, measure in MEASURES.items():
+        if measure.meaning:
+            value = getattr(quality, name)
+            number = f"{value:.{6 if name == 'error' else 4}g}" if measure.unit else f"{value}"
+            said.append(f"{measure.label.removesuffix(' error')} {number}")
+    return ", ".join(said)
 
 
 def say(line: str) -> None:

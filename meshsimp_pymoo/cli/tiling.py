@@ -6,13 +6,13 @@ import json
 import os
 import shutil
 import time
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from meshsimp_pymoo.cli.arguments import numbered
 from meshsimp_pymoo.cli.preparing import compiling
-from meshsimp_pymoo.cli.requests import Output, Request, Search, Tiling, Wish
+from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling, Wish
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.files import locked
@@ -38,14 +38,12 @@ from meshsimp_pymoo.tiles.output import (
 from meshsimp_pymoo.warming import SEARCH
 from meshsimp_pymoo.workers import EngineError, open_engine
 
-# From this many samples on, a grid is thinned tile by tile without being asked.
-TILED_FROM = 2_000_000
-# What tiles do not know; refused where it is not what asks for nothing.
-UNKNOWN: dict[type[Any], tuple[str, ...]] = {
-    Search: ("time", "evaluations", "generations", "algorithm"),
-    Rules: ("pin", "weights", "measure"),
-    Options: ("max_edge", "patch"),
-    Output: ("refit",),
+# What tiles know, or what makes no difference to them; all else is refused where it is not what asks for nothing.
+KNOWN: dict[type[Any], tuple[str, ...]] = {
+    Search: ("seed", "threads", "checkpoint"),  # nothing is left to chance, and finished tiles are always saved
+    Rules: ("footprint", "outside"),  # a grid without gaps fills its hull
+    Options: ("up", "spacing", "nodata", "window"),
+    Output: ("folder", "overwrite", "format", "meshes", "page", "quiet", "json"),
 }
 
 
@@ -55,6 +53,16 @@ def wants_tiles(request: Request) -> bool:
         count = count_samples(request.model, window=request.options.window)
         return count is not None and count >= TILED_FROM
     return bool(request.tiling.tile)
+
+
+def refuse_alone(tiling: Tiling) -> None:
+    """Refuse what is said of tiles where a model is searched in one piece."""
+    for item in fields(tiling):
+        if item.name != "tile" and getattr(tiling, item.name) != item.default:
+            raise UsageError(
+                f"--{item.name} is for tiles, and this model is searched in one piece; leave it out, or ask for tiles "
+                f"(--tile {TILE})"
+            )
 
 
 def simplify_tiled(request: Request, shown: Stages) -> int:
@@ -96,7 +104,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
             front, chosen, missed = _choose(wish, front, threads)
             run = {
                 "options": plain(request.options),
-                "settings": request.recorded | {"tile": tile, "most": what["most"]},
+                "settings": request.wanted | {"tile": tile, "most": what["most"]},
                 "seconds": round(time.perf_counter() - start, 3),
                 "read_seconds": round(shown.seconds["reading"], 3),
                 "compile_seconds": round(compiled.seconds, 3),
@@ -158,11 +166,11 @@ def _has_pieces(out: Path) -> bool:
 
 def _refuse_unknown(request: Request) -> None:
     for part in (request.search, request.rules, request.options, request.output):
-        for name in UNKNOWN[type(part)]:
-            if getattr(part, name) != getattr(type(part), name):
+        for item in fields(part):
+            if item.name not in KNOWN[type(part)] and getattr(part, item.name) != item.default:
                 raise UsageError(
-                    f"--{name.replace('_', '-')} does not go with tiles, which are thinned and not searched; leave it "
-                    "out, or do without tiles (--tile none)"
+                    f"--{item.name.replace('_', '-')} does not go with tiles, which are thinned and not searched; "
+                    "leave it out, or do without tiles (--tile none)"
                 )
     if request.wish.triangles == 1:
         raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence, Sized
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -207,7 +208,7 @@ CLAIMS = (
         "classic_alike",
         "The two classic methods do not differ",
         "no different",
-        (("quadric_collapse", "vertex_clustering"),),
+        (PAPER_CLASSIC,),
         ("hvr", "epsilon"),
     ),
     Claim(
@@ -351,10 +352,16 @@ def _other_errors(study: Study) -> list[str]:
         models = ", ".join(problem.name for problem in study.problems if problem.rules.measure == measure)
         row = MEASURES[measure]
         said.append(f"On {models} the *error* is the {row.label} ({row.meaning}), not the sum of the deviations.")
-    for weights in dict.fromkeys(problem.rules.weights for problem in study.problems if problem.rules.weights):
-        models = ", ".join(problem.name for problem in study.problems if problem.rules.weights == weights)
-        said.append(f"On {models} each vertex counts by its attribute *{weights}*.")
-    return said
+    weighed: dict[str, list[str]] = {}
+    for problem in study.problems:
+        if problem.rules.weights is not None:
+            weighed.setdefault(_weighed_by(problem.rules.weights), []).append(problem.name)
+    return said + [f"On {', '.join(models)} each vertex counts by {what}." for what, models in weighed.items()]
+
+
+def _weighed_by(weights: Any) -> str:
+    """Return what weights are: an attribute of the file, or numbers that stand in the configuration."""
+    return f"its attribute *{weights}*" if isinstance(weights, str) else "a number of its own, from the configuration"
 
 
 def table(all_findings: Sequence[Finding]) -> Table:

@@ -32,10 +32,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.surface.surface import Surface, require_rules
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.measures import Quality
-    from meshsimp_pymoo.surface.surface import Surface
 
 __all__ = [
     "MESHLAB_METHODS",
@@ -292,13 +292,39 @@ def vertex_clustering(vertices: ArrayLike, faces: ArrayLike, triangles: int) -> 
     return merged + centre, remaining
 
 
-MESHLAB_METHODS: dict[str, Callable[[ArrayLike, ArrayLike, int], Mesh]] = {
-    "quadric_collapse": partial(quadric_collapse, preserve_boundary=False, unit_diagonal=False),
-    "quadric_collapse_unit": partial(quadric_collapse, preserve_boundary=False, unit_diagonal=True),
-    "quadric_collapse_boundary": partial(quadric_collapse, preserve_boundary=True, unit_diagonal=True),
-    "vertex_clustering": vertex_clustering,
+@dataclass(frozen=True)
+class Method:
+    """A classic method: ``method(vertices, faces, triangles) -> (vertices, faces)``.
+
+    Attributes
+    ----------
+    label : str
+        What tables call it.
+    simplify : callable
+        The function that does it.
+    """
+
+    label: str
+    simplify: Callable[[ArrayLike, ArrayLike, int], Mesh]
+
+    def __call__(self, vertices: ArrayLike, faces: ArrayLike, triangles: int) -> Mesh:
+        """Simplify a mesh to about so many triangles."""
+        return self.simplify(vertices, faces, triangles)
+
+
+MESHLAB_METHODS = {
+    "quadric_collapse": Method(
+        "MeshLab quadric", partial(quadric_collapse, preserve_boundary=False, unit_diagonal=False)
+    ),
+    "quadric_collapse_unit": Method(
+        "MeshLab quadric, unit size", partial(quadric_collapse, preserve_boundary=False, unit_diagonal=True)
+    ),
+    "quadric_collapse_boundary": Method(
+        "MeshLab quadric, border kept", partial(quadric_collapse, preserve_boundary=True, unit_diagonal=True)
+    ),
+    "vertex_clustering": Method("MeshLab clustering", vertex_clustering),
 }
-"""The methods by name: ``method(vertices, faces, triangles) -> (vertices, faces)``."""
+"""The methods by name."""
 
 
 def meshlab_front(
@@ -329,6 +355,7 @@ def meshlab_front(
     ValueError
         If a method is unknown or a number of triangles impossible; nothing is computed then.
     """
+    require_rules(surface, "meshlab_front")
     model = surface.model
     numbers = [int(number) for number in triangles]
     for name in methods:

@@ -55,25 +55,27 @@ def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, floa
     ResultError
         If there is no experiment, or none of its runs is finished.
     """
-    study, found = _write_tables(out)
+    study = Study(out)
+    found = write_tables(study)
     _write_figures(study, progress)
     put_text(study.out / "report.html", experiment_page(study, found))
     return study
 
 
-def write_tables(out: str | os.PathLike[str]) -> Study:
-    """Write the tables and findings of an experiment, without figures and without its page."""
-    return _write_tables(out)[0]
+def write_tables(study: Study) -> list[verdicts.Finding]:
+    """Write the tables, findings and times of an experiment, without its figures and its page; return the findings.
 
-
-def _write_tables(out: str | os.PathLike[str]) -> tuple[Study, list[verdicts.Finding]]:
-    study = Study(out)
+    Warns
+    -----
+    ExperimentWarning
+        If runs are missing, damaged or without a mesh.
+    """
     for what, items in (("missing", study.missing), ("damaged", study.damaged), ("without a mesh", study.empty)):
         if items:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
             warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=3)
     found: list[verdicts.Finding] = []
-    put_back(study.out / "tables", tidy=True)
+    put_back(study.out / "tables", tidy=True, replaced=True)
     with new_folder(study.out / "tables", replace=True, flush=False) as folder:
         for budget in study.budgets:
             for scoring in study.scorings:
@@ -91,7 +93,7 @@ def _write_tables(out: str | os.PathLike[str]) -> tuple[Study, list[verdicts.Fin
     put_text(study.out / "findings.md", verdicts.page(study, found))
     put_text(study.out / "times.csv", tables.times(study).csv())
     put_text(study.out / "times.md", verdicts.times_page(study))
-    return study, found
+    return found
 
 
 def _write_figures(study: Study, progress: Callable[[float, float, str], None] | None) -> None:
@@ -112,7 +114,7 @@ def _write_figures(study: Study, progress: Callable[[float, float, str], None] |
             for indicator in ("hvr", "cardinality"):
                 drawings.append((f"{where}/{indicator}.png", partial(figures.box_figure, study, cases, indicator)))
             drawings.append((f"{where}/selected.png", partial(figures.selected_figure, study, cases)))
-    put_back(study.out / "figures", tidy=True)
+    put_back(study.out / "figures", tidy=True, replaced=True)
     with new_folder(study.out / "figures", replace=True, flush=False) as folder:
         for done, (path, draw) in enumerate(drawings):
             if progress is not None:

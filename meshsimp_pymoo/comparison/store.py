@@ -40,7 +40,8 @@ from meshsimp_pymoo.surface.model import OpenModel
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 EXPERIMENT_FILE = "experiment.json"
-FORMAT = 1
+# Of the records; another number wherever what they hold is spelled otherwise. 2: rules and options whole.
+FORMAT = 2
 WAY_OUT = "mend that, and the same command does what is missing"
 
 # Hexadecimal digits of a key: 64 bits, where a study has some thousand runs.
@@ -203,7 +204,9 @@ def read_run(path: Path) -> StoredRun:
         raise ResultError(f"{path}: is damaged ({reason_of(problem)})") from None
     if not whole:
         raise ResultError(f"{path}: is damaged (its content does not have its checksum)")
-    if record.get("format") != FORMAT or fingerprint(record["description"]) != _key(path):
+    if record.get("format") != FORMAT:
+        raise ResultError(f"{path}: is not of the format {FORMAT} that this version reads")
+    if fingerprint(record["description"]) != _key(path):
         raise ResultError(f"{path}: is not the run that its name says")
     npz = path.with_suffix(".npz")
     try:

@@ -42,8 +42,9 @@ from meshsimp_pymoo.comparison.analysis import (
     rank_sum,
     unary_scores,
 )
-from meshsimp_pymoo.comparison.store import RunStore, StoredRun, read_experiment, read_model
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
+from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -69,12 +70,8 @@ EPSILON_SHIFT = 0.01
 # A method without chance has one run, under this name.
 NO_SEED = 0
 
-CLASSIC_NAMES = {
-    "quadric_collapse": "MeshLab quadric",
-    "quadric_collapse_unit": "MeshLab quadric, unit size",
-    "quadric_collapse_boundary": "MeshLab quadric, border kept",
-    "vertex_clustering": "MeshLab clustering",
-}
+# What tables call the methods without chance.
+CLASSIC_NAMES = {name: method.label for name, method in MESHLAB_METHODS.items()}
 
 
 @dataclass(frozen=True)
@@ -245,6 +242,20 @@ class Study:
     def __init__(self, out: str | os.PathLike[str]) -> None:
         self.out = Path(out)
         self.content = read_experiment(self.out)
+        store = RunStore(self.out)
+        try:
+            self._take(store)
+        except (AttributeError, KeyError, TypeError, ValueError) as problem:
+            what = f"{problem} is missing" if isinstance(problem, KeyError) else reason_of(problem)
+            raise ResultError(
+                f"{self.out / EXPERIMENT_FILE}: is damaged ({what}); `meshsimp run` writes it anew"
+            ) from None
+        self.damaged = store.damaged
+        if not self._runs:
+            raise ResultError(f"{self.out}: none of its runs is finished; `meshsimp run` does them")
+
+    def _take(self, store: RunStore) -> None:
+        """Take over what the record says, and the runs that it names."""
         self.title: str = self.content["title"]
         self.skipped: list[str] = list(self.content["skipped"])
         self.missing: list[str] = []
@@ -263,14 +274,10 @@ class Study:
         ]
         self.budgets: list[str] = [item["name"] for item in self.content["budgets"]]
         self.methods: list[str] = [item["name"] for item in self.content["algorithms"]]
-        store = RunStore(self.out)
         self._runs: dict[tuple[str, str, str, int], list[StoredRun]] = {}
         self._expected = {item["name"]: len(item["merged_values"]) for item in self.content["algorithms"]}
         self._fill(store)
         self._classic = self._read_classic(store)
-        self.damaged = store.damaged
-        if not self._runs:
-            raise ResultError(f"{self.out}: none of its runs is finished; `meshsimp run` does them")
 
     def _fill(self, store: RunStore) -> None:
         for item in self.content["runs"]:

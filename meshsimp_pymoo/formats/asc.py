@@ -19,11 +19,10 @@ HEADER_BYTES = 2000
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
     """Read an ESRI ASCII grid: a line per key, then the rows of heights from north to south."""
-    from meshsimp_pymoo.formats.source.heights import grid_source, steps_of
+    from meshsimp_pymoo.formats.source.heights import grid_source
     from meshsimp_pymoo.formats.source.numbers import parse_numbers
 
-    steps = steps_of(options.spacing, name)
-
+    steps = options.steps
     text = path.read_bytes().decode("utf-8", errors="replace")
     header: dict[str, float] = {}
     at = 0

@@ -69,9 +69,9 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     ModelWarning
         If its coordinates are degrees.
     """
-    from meshsimp_pymoo.formats.source.heights import check_window, grid_mesh, steps_of
+    from meshsimp_pymoo.formats.source.heights import check_window, grid_mesh
 
-    steps = steps_of(options.spacing, name)
+    steps = options.steps
     with _opened(path, name) as raster:
         kind, shape = _checked_band(raster, name)
         column, row, columns, rows = check_window(options.window, shape, name)
@@ -143,10 +143,10 @@ class RasterHeights:
 
         import numpy as np
 
-        from meshsimp_pymoo.formats.source.heights import check_window, steps_of
+        from meshsimp_pymoo.formats.source.heights import check_window
 
         self.dtype = np.dtype(np.float64)
-        steps = steps_of(options.spacing, name)
+        steps = options.steps
         self.path, self.name = path, name
         self._lock = threading.Lock()
         with _opened(path, name, keep=True) as raster:
@@ -331,8 +331,6 @@ def _placement(raster: Any, steps: tuple[float, float] | None, name: str) -> tup
     if steps is not None:
         if (b, d) != (0, 0) or a <= 0 or e >= 0:
             raise ModelError(f"{name}: its transform turns or mirrors it, so one spacing cannot say it; leave it out")
-        if not all(math.isfinite(step) and step > 0 for step in steps):
-            raise ModelError(f"{name}: the spacing is {steps}; give positive numbers")
         a, e = steps[0], -steps[1]
 
     def place(row: IntArray, column: IntArray) -> tuple[Any, Any]:

@@ -73,9 +73,6 @@ def _is_beside(uri: str) -> bool:
     return not re.search(r"[:\\%\0]|^/|(^|/)\.\.(/|$)", uri)
 
 
-# ---------------------------------------------------------------------------------------------- grids
-
-
 def _write(path: Path, mesh: OutMesh) -> None:
     """Write a GLB of one node with one mesh, whose coordinates are those from the origin."""
     import json

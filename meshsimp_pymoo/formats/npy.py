@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.files import read_npy
-    from meshsimp_pymoo.formats.source.heights import grid_source, steps_of
+    from meshsimp_pymoo.formats.source.heights import grid_source
 
-    dx, dy = steps_of(options.spacing, name) or (1.0, 1.0)
+    dx, dy = options.steps or (1.0, 1.0)
     with path.open("rb") as stream:
         height = read_npy(stream, path.stat().st_size, name)
     return grid_source(height, dx, dy, nodata=options.nodata, name=name, window=options.window)

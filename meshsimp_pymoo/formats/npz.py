@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.files import read_npz
-    from meshsimp_pymoo.formats.source.heights import grid_source, steps_of
+    from meshsimp_pymoo.formats.source.heights import grid_source
 
-    steps = steps_of(options.spacing, name)
+    steps = options.steps
     with path.open("rb") as stream:
         arrays = read_npz(stream, name)
     if not arrays:

@@ -70,9 +70,6 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     return build_source(table[:, :3], faces, attributes, name)
 
 
-# ------------------------------------------------------------ through trimesh
-
-
 def _write(path: Path, mesh: OutMesh) -> None:
     from meshsimp_pymoo.formats.source.scenes import EXACT_DIGITS, export
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from meshsimp_pymoo.settings import Choice, Direction, Part, Real, Steps, setting
+from meshsimp_pymoo.settings import LARGEST, Choice, Direction, Part, Real, Steps, setting, settle
 
 # The part of a grid to take: column, row, columns, rows.
 Window = tuple[int, int, int, int]
@@ -13,7 +13,13 @@ Window = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class Options:
-    """How a model is read. The fields are arguments of ``MeshProblem``, options of the shell and keys of YAML files."""
+    """How a model is read. The fields are arguments of ``MeshProblem``, options of the shell and keys of YAML files.
+
+    Raises
+    ------
+    InputError
+        If a value is none that the setting takes.
+    """
 
     up: Any = setting(
         "auto",
@@ -41,7 +47,7 @@ class Options:
     )
     nodata: float | None = setting(
         None,
-        kind=Real(),
+        kind=Real(most=LARGEST),
         accepts="float, optional",
         doc="Height that means 'no sample' in a height grid, beside NaN; by default what the file says, else none.",
         help="height that means no sample in a height grid",
@@ -68,6 +74,14 @@ class Options:
         metavar="L",
         describes="cloud",
     )
+
+    def __post_init__(self) -> None:
+        settle(self)
+
+    @property
+    def steps(self) -> tuple[float, float] | None:
+        """The sample distances along rows and columns, if they are given."""
+        return cast("tuple[float, float] | None", self.spacing)
 
 
 DEFAULT = Options()

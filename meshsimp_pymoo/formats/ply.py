@@ -190,9 +190,6 @@ def _attributes(vertex: dict[str, Any], name: str) -> dict[str, AnyArray]:
     return attributes
 
 
-# ---------------------------------------------------------------------------------------------- OBJ and OFF
-
-
 def _write(path: Path, mesh: OutMesh) -> None:
     """Write a binary PLY with double coordinates; trimesh's own writer stores single precision."""
     import numpy as np

@@ -271,11 +271,7 @@ def described(sort: str | None = None) -> list[str]:
 def are_given(names: Iterable[str], options: Options) -> bool:
     """Tell whether one of these settings differs from its default."""
     defaults = defaults_of(Options)
-    pairs = [(getattr(options, name), defaults[name]) for name in names]
-    # an array is never a default, and is not to be compared with one
-    return any(
-        value is not default and (type(value) is not type(default) or value != default) for value, default in pairs
-    )
+    return any(getattr(options, name) != defaults[name] for name in names)
 
 
 def refuse_foreign(name: str, sort: str, options: Options) -> None:

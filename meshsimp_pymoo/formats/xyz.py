@@ -124,7 +124,4 @@ def _table_shape(body: bytes, name: str, columns: tuple[int, int, int] | None) -
     return width, count
 
 
-# ---------------------------------------------------------------------------------------------- LAS and LAZ
-
-
 register(Format("xyz", (".xyz", ".pts", ".txt", ".csv"), "text of x y z", "cloud", read=_read))

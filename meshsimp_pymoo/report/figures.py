@@ -20,13 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.measures import MEASURES, require_measure
+from meshsimp_pymoo.surface.surface import Surface, require_rules
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from meshsimp_pymoo.surface.surface import Surface
 
 __all__ = [
     "error_figure",
@@ -99,6 +98,7 @@ def plot_front(
     F = np.asarray(getattr(front, "F", front), dtype=np.float64)
     if F.ndim != 2 or F.shape[1] != 2 or len(F) == 0:
         raise ValueError(f"a front has the shape (solutions, 2): error and triangles; this one has {F.shape}")
+    require_measure(measure)
     ax = ax if ax is not None else _new_axes((6.4, 4.8))
     as_mean = measure == "error" and n_points is not None
     unit = np.array([n_points if as_mean and n_points else 1.0, 1.0])
@@ -280,6 +280,7 @@ def plot_error(
     matplotlib axes
         The axes.
     """
+    require_rules(surface, "plot_error")
     size = np.abs(np.asarray(deviation, dtype=np.float64))
     if size.shape != (surface.n_vertices,):
         raise ValueError(f"deviation has the shape {size.shape}; the model has {surface.n_vertices} vertices")
@@ -337,6 +338,7 @@ def front_figure(
     """
     from matplotlib.figure import Figure
 
+    require_rules(surface, "front_figure")
     F = np.asarray(F, dtype=np.float64)
     model, view = surface.model, surface.view
     width, depth = np.ptp(view.points[:, :2], axis=0)
@@ -418,6 +420,7 @@ def error_figure(
     """
     from matplotlib.figure import Figure
 
+    require_rules(surface, "error_figure")
     width, depth = np.ptp(surface.view.points[:, :2], axis=0)
     share = float(np.clip(depth / width, 0.4, 1.6)) if width > 0 else 1.0
     figure = Figure(figsize=(7.2, 6.0 * share + 0.9), dpi=110, layout="constrained")

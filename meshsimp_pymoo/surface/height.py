@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, triangulate_subset
 from meshsimp_pymoo.surface.ground import Ground, make_ground
 from meshsimp_pymoo.surface.live import Live, build, lent_live
@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.pins import pinned_vertices
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, require_rules
 
 # A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
 # metres.
@@ -208,10 +208,6 @@ class HeightSurface:
             raised, error = own, before
         return Refitted(mesh.faces, rows, raised, error, before, min(bound, error))
 
-    def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return nothing: the row of each vertex in the file says it all."""
-        return {}
-
     def _checked(self, kept: Any) -> BoolArray:
         row = np.array(kept, order="C")
         if row.dtype != np.bool_:
@@ -252,6 +248,8 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
 
     Raises
     ------
+    TypeError
+        If this is no surface but a model, which has no rules.
     ValueError
         If the subset spans no triangle, or the tolerance is not positive.
 
@@ -266,4 +264,5 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
     >>> refit_heights(roof, roof.pinned).error
     3.0
     """
+    require_rules(surface, "refit_heights")
     return surface.refit(kept, tolerance=tolerance)

@@ -3,14 +3,15 @@
 A measure is a field of `Quality`; its row (`Measure`) says how it comes from the numbers that evaluation adds up, what
 it is called, and what it can be used for. The columns of ``front.csv``, the attributes of a front's solutions, the
 wishes of the shell command, the objectives of a problem and the rows of the page follow from the table. A new measure
-is a new field here and, if evaluation does not add up what it needs, a new column there.
+is a new field here and, if it needs a number that the columns below do not hold, a new one of these, which all
+who make such rows fill (``CONTRIBUTING.md`` lists them).
 
 Nothing heavy is imported here: the shell command's ``--help`` is made of the table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -160,6 +161,18 @@ def measured(table: Any, measure: str, total_weight: float) -> Any:
     """
     require_measure(measure)
     return MEASURES[measure].of(table, total_weight)
+
+
+def checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
+    """Return the objectives as a tuple, or raise a ValueError that says what they must be."""
+    names = (objectives,) if isinstance(objectives, str) else tuple(objectives)
+    measures = names[:-1]
+    if names[-1:] != ("triangles",) or not measures or set(measures) - set(OBJECTIVES) or len(set(names)) < len(names):
+        raise ValueError(
+            f"objectives={names!r} cannot be minimised; name one or more of {', '.join(map(repr, OBJECTIVES))}, each "
+            "once, and 'triangles' last, as in ('error', 'triangles')"
+        )
+    return names
 
 
 def require_measure(measure: str, *, summed_for: str = "") -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from meshsimp_pymoo.settings import Choice, Pins, Weights, setting
-from meshsimp_pymoo.surface.measures import OBJECTIVES, require_measure
+from meshsimp_pymoo.settings import Choice, Pins, Weights, setting, settle
+from meshsimp_pymoo.surface.measures import OBJECTIVES
 
 FOOTPRINTS = ("model", "hull")
 OUTSIDES = ("nearest", "ignore")
@@ -20,8 +20,8 @@ class Rules:
 
     Raises
     ------
-    ValueError
-        If a word is none of those known.
+    InputError
+        If a value is none that the setting takes.
     """  # noqa: D205
 
     footprint: str = setting(
@@ -69,11 +69,7 @@ class Rules:
     )
 
     def __post_init__(self) -> None:
-        for name, known in (("footprint", FOOTPRINTS), ("outside", OUTSIDES)):
-            if getattr(self, name) not in known:
-                choices = ", ".join(map(repr, known))
-                raise ValueError(f"{name}={getattr(self, name)!r} is unknown; choose one of {choices}")
-        require_measure(self.measure)
+        settle(self)
 
 
 DEFAULT = Rules()

@@ -233,10 +233,6 @@ class Surface(Protocol):
         """Return the mesh of one subset with its vertices moved to where its error is least, or ended at ``until``."""
         ...
 
-    def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return what ``front.npz`` must hold of the surface beside the row of each vertex in the file."""
-        ...
-
     def ground(self) -> Any | None:
         """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
         ...
@@ -249,6 +245,15 @@ class Surface(Protocol):
         ...
 
 
+def require_rules(surface: Any, who: str) -> None:
+    """Raise a TypeError if somebody who needs a surface gets a model, which has no rules."""
+    if not hasattr(surface, "rules"):
+        raise TypeError(
+            f"{who}: a {type(surface).__name__} has no rules; give a surface, such as problem.surface or "
+            "HeightSurface(model)"
+        )
+
+
 def movable_ground(surface: Surface, who: str) -> Any:
     """Return a surface's ground for somebody who moves vertices.
 
@@ -259,11 +264,7 @@ def movable_ground(surface: Surface, who: str) -> Any:
     ValueError
         If it has no ground, or its measure is no sum.
     """
-    if not hasattr(surface, "ground"):
-        raise TypeError(
-            f"{who}: a {type(surface).__name__} has no rules; give a surface, such as problem.surface or "
-            "HeightSurface(model)"
-        )
+    require_rules(surface, who)
     require_measure(surface.rules.measure, summed_for=who)
     ground = surface.ground()
     if ground is None:

@@ -188,7 +188,8 @@ class HeightGrid:
         if self.nodata is not None:
             # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
             own = self.heights.dtype
-            missing |= values == (float(own.type(self.nodata)) if own.kind == "f" else self.nodata)
+            with np.errstate(over="ignore"):
+                missing |= values == (float(own.type(self.nodata)) if own.kind == "f" else self.nodata)
         if missing.any():
             i, j = np.argwhere(missing)[0]
             row = int(rows[i]) if np.ndim(rows) else rows + int(i)
@@ -213,7 +214,7 @@ def open_grid(
         A ``.npy`` file is mapped into memory and a GeoTIFF opened, and both are read by windows only; any other file is
         read whole first. A model's vertices must be all the crossings of rows and columns, and nothing else.
     options : Options, optional
-        How it is read; a grid with samples of the height ``nodata`` is refused.
+        How it is read; a grid with samples of the height ``nodata`` is refused, as is what cannot apply.
     **kwargs
         Settings of :class:`~meshsimp_pymoo.formats.options.Options` that differ from those, such as ``spacing``.
 
@@ -226,19 +227,20 @@ def open_grid(
     if kwargs:
         raise TypeError(f"open_grid has no argument {next(iter(kwargs))!r}; it takes {', '.join(settings_of(Options))}")
     if isinstance(model, HeightGrid):
+        if options != Options():
+            raise ModelError(f"{model.name}: is a grid that is open already; say how it is read where it is opened")
         return model
     if isinstance(model, OpenModel):
-        return _grid_of_model(model)
+        return _grid_of_model(open_model(model, options))
     if not isinstance(model, (str, os.PathLike)):
+        _refuse_other_sides("grid", options)
         return _grid_of_heights("grid", placed_heights(np.asanyarray(model), "grid", options))
     path = Path(model)
     kind = format_of_input(path)
     if kind is None or kind.open_heights is None or not path.is_file():
         return _grid_of_model(open_model(model, options))
-    if options.up not in ("auto", "z", "+z"):
-        raise ModelError(f"{path}: heights of a grid are along z; leave up={options.up!r} out")
     name = str(path)
-    refuse_foreign(name, kind.sort, options)
+    _refuse_other_sides(name, options)
     with guarded(kind, name):
         return _grid_of_heights(name, kind.open_heights(path, name, options))
 
@@ -261,6 +263,15 @@ def count_samples(model: str | os.PathLike[str], *, window: Window | None = None
         return int(window[2]) * int(window[3])
     with guarded(kind, str(path)):
         return kind.count_samples(path, str(path))
+
+
+def _refuse_other_sides(name: str, options: Options) -> None:
+    """Refuse what says nothing of heights over rows and columns."""
+    refuse_foreign(name, "grid", options)
+    if options.up not in ("auto", "z", "+z"):
+        raise ModelError(f"{name}: heights of a grid are along z; leave up={options.up!r} out")
+    if options.patch is not None:
+        raise ModelError(f"{name}: all of a grid faces up; leave patch={options.patch!r} out")
 
 
 def _grid_of_heights(name: str, found: PlacedHeights) -> HeightGrid:

@@ -9,7 +9,8 @@
     OUT/meshes/         007_412.ply is solution 7, of 412 triangles
     OUT/chosen.ply      the solution that was asked for, if one was; with pieces, a folder of that name
     OUT/front.png       the front
-    OUT/run.json        settings, package versions, seconds, hash of the grid, where on Earth it is
+    OUT/run.json        the grid with its hash and where on Earth it is, how it was read (options), tiles and what was
+                        wanted (settings), package versions, seconds
     OUT/tiles/          while the work is going on: finished tiles, which the same call finds again
 
 The finished folder is put in place as a whole; see `meshsimp_pymoo.storage`. A process that is killed at any moment
@@ -48,6 +49,7 @@ from meshsimp_pymoo.storage import (
     even_selection,
     package_versions,
     read_front_csv,
+    read_record,
     spelled_value,
 )
 from meshsimp_pymoo.tiles.front import TiledFront
@@ -234,7 +236,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
 
     folder = Path(folder)
     columns = read_front_csv(folder / "front.csv")[0]
-    record = _read_record(folder)
+    record = read_record(folder / "run.json", len(columns["error"]))
     if record["model"]["hash"] != grid.hash:
         raise ResultError(f"{folder}: is not a front of {grid.name}, whose heights or spacing are others")
     path = folder / NESTED_FILE
@@ -261,21 +263,11 @@ def is_tiled(folder: str | os.PathLike[str]) -> bool:
 
 def stored_model(folder: str | os.PathLike[str]) -> tuple[str, Options]:
     """Return where the grid of a stored tiled front was, and how it was read."""
-    record = _read_record(Path(folder))
+    count = len(read_front_csv(Path(folder) / "front.csv")[1])
+    record = read_record(Path(folder) / "run.json", count)
     file = record["model"].get("file")
     name = record["model"]["name"] if file is None else str((Path(folder) / file).resolve())
     try:
         return name, read_back(Options, record.get("options") or {})
     except ValueError as problem:
         raise ResultError(f"{Path(folder) / 'run.json'}: cannot be read ({problem}); simplify again") from None
-
-
-def _read_record(folder: Path) -> dict[str, Any]:
-    path = folder / "run.json"
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(record["model"]["hash"], str):
-            raise TypeError("the hash of its model is no text")
-    except (OSError, ValueError, KeyError, TypeError) as problem:
-        raise ResultError(f"{path}: cannot be read ({problem}); simplify again") from None
-    return record

@@ -379,7 +379,7 @@ def test_nothing_but_pymoos_own_kinds_is_called(tmp_path, algorithms, said, monk
          "at most 5,000"),
         ({"seeds": f"[{'9' * 400}]"}, "at most 2\\*\\*53"),
         ({"budgets": f"[{{generations: {'9' * 400}}}]"}, "at most 2\\*\\*53"),
-        ({"budgets": f"[{{seconds: {'9' * 400}}}]"}, "below 1e\\+300"),
+        ({"budgets": f"[{{seconds: {'9' * 400}}}]"}, "no larger than 1e\\+300"),
         ({"problems": f"['{'x' * 300}.ply']"}, "too long"),
     ],
 )  # fmt: skip

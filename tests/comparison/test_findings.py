@@ -191,7 +191,7 @@ def test_seconds_change_nothing_but_the_times(tmp_path):
     texts = []
     for name, seconds in (("a", {}), ("b", {"N1": 77.0})):
         out = study(tmp_path / name, {"N1": 1.0, "MD": 1.0}, seconds=seconds).out
-        write_tables(out)
+        write_tables(Study(out))
         texts.append(
             {p.relative_to(out): p.read_text() for p in out.rglob("*.*") if p.suffix in (".csv", ".md", ".tex")}
         )
@@ -204,7 +204,7 @@ def test_seconds_change_nothing_but_the_times(tmp_path):
 )
 def test_no_name_of_a_model_is_a_tag_or_a_link_in_markdown(tmp_path, evil):
     out = study(tmp_path, {"N1": 1.0, "MD": 1.0}, models=(evil, "M2")).out
-    write_tables(out)
+    write_tables(Study(out))
     pages = {path.name: path.read_text() for path in out.rglob("*.md")}
     assert {"findings.md", "times.md", "scores.md"} <= set(pages)
     assert any("onerror" in text or "javascript" in text for text in pages.values())

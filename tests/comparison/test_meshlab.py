@@ -291,6 +291,8 @@ class TestFront:
 
     def test_refuses_everything_before_it_computes_anything(self, surface, monkeypatch):
         monkeypatch.setattr(meshlab, "_filtered", None)
+        with pytest.raises(TypeError, match="meshlab_front: a OpenModel has no rules; give a surface"):
+            meshlab_front(surface.model, [4])
         with pytest.raises(ValueError, match="unknown MeshLab method 'qem': choose among quadric_collapse, "):
             meshlab_front(surface, [100], methods=("quadric_collapse", "qem"))
         with pytest.raises(ValueError, match="801 triangles were asked for"):

@@ -22,9 +22,9 @@ from meshsimp_pymoo.comparison import analysis, meshlab, runner
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.comparison.figures import meshes_figure
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
-from meshsimp_pymoo.comparison.report import write_tables
+from meshsimp_pymoo.comparison.report import write_report, write_tables
 from meshsimp_pymoo.comparison.runner import plan, run_experiment
-from meshsimp_pymoo.comparison.store import ExperimentWarning, RunStore, read_run
+from meshsimp_pymoo.comparison.store import FORMAT, ExperimentWarning, RunStore, read_run
 from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
@@ -65,7 +65,7 @@ def reference(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reference")
     (folder / "tiny.yaml").write_text(CONFIG, encoding="utf-8")
     run_experiment(folder / "tiny.yaml", folder / "out")
-    write_tables(folder / "out")
+    write_tables(Study(folder / "out"))
     return folder / "out"
 
 
@@ -184,7 +184,7 @@ def test_a_changed_configuration_does_what_is_new_and_names_what_is_stale(config
     assert done.finished == RUNS // 3  # the new seed; a new name is no new run
     assert done.reused == 2 * RUNS // 3
     assert first.path.exists()
-    study = write_tables(stored)
+    write_tables(study := Study(stored))
     assert study.methods == ["Other", "N2", "G1"]
     for case in study.cases.values():
         assert set(case.runs["Other"]) == {2, 3, 4}
@@ -263,7 +263,7 @@ def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored
     record = record_of(stored, problem="Face", algorithm="N2", seed=2, budget="6 generations")
     damaged = spoil(record)
     with pytest.warns(ExperimentWarning, match="left out of the report") as caught:
-        study = write_tables(stored)
+        write_tables(study := Study(stored))
     assert any(damaged.name in line for line in study.damaged)
     assert any("Face / N2 / seed 2" in str(w.message) for w in caught)
     assert 2 not in study.cases["Face", "6 generations", "searched"].runs["N2"]
@@ -271,7 +271,7 @@ def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored
     with pytest.warns(ExperimentWarning, match=f"{damaged.name}.*computed again"):
         done = run_experiment(config, stored)
     assert done.finished == 1
-    write_tables(stored)
+    write_tables(Study(stored))
     assert results(stored) == results(reference)
 
 
@@ -279,7 +279,7 @@ def test_a_merged_front_that_lacks_a_run_is_left_out(stored):
     path = record_of(stored, problem="Face", algorithm="G1", seed=1, budget="6 generations")
     path.unlink()
     with pytest.warns(ExperimentWarning, match="missing: Face / G1"):
-        study = write_tables(stored)
+        write_tables(study := Study(stored))
     assert set(study.cases["Face", "6 generations", "searched"].runs["G1"]) == {2, 3}
     assert set(study.cases["Face", "6 generations", "searched"].runs["N1"]) == {1, 2, 3}
 
@@ -304,7 +304,7 @@ def test_ctrl_c_leaves_the_finished_runs(config, tmp_path, reference):
     finished = len(list((out / "runs").glob("*.json")))
     assert RUNS // 2 <= finished < RUNS
     assert run_experiment(config, out).reused == finished
-    write_tables(out)
+    write_tables(Study(out))
     assert results(out) == results(reference)
 
 
@@ -320,7 +320,7 @@ def in_a_child(config: str, out: str, begun: str) -> None:
     experiment = read_experiment_file(config)
     Path(begun).touch()
     run_experiment(experiment, out)
-    write_tables(out)
+    write_tables(Study(out))
 
 
 @pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a fork server")
@@ -380,7 +380,7 @@ def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(con
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExperimentWarning)  # runs of the seeds that are not asked for any more
         assert run_experiment(config, out).reused > 0
-    write_tables(out)
+    write_tables(Study(out))
     assert results(out) == results(reference)
 
 
@@ -391,7 +391,7 @@ def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
         DaskEngine(cluster.scheduler_address) as engine,
     ):
         run_experiment(config, tmp_path / "out", engine=engine)
-    write_tables(tmp_path / "out")
+    write_tables(Study(tmp_path / "out"))
     assert results(tmp_path / "out") == results(reference)
 
 
@@ -421,7 +421,7 @@ def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_ski
         done = run_experiment(config, out)
     assert done.finished == RUNS
     assert "libopengl0" in done.skipped[0]
-    write_tables(out)
+    write_tables(Study(out))
     assert "libopengl0" in (out / "findings.md").read_text()
     same = {name: content for name, content in results(out).items() if "findings" not in name}
     assert same == {name: content for name, content in results(reference).items() if "findings" not in name}
@@ -437,7 +437,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     )
     out = tmp_path / "out"
     run_experiment(config, out)
-    study = write_tables(out)
+    write_tables(study := Study(out))
     problem = study.problems[0]
     run = study.classic_runs["Face", "quadric_collapse"]
     smallest = min(r.arrays["F"][:, 1].min() for r in study.all_runs if r.record["problem"] == "Face")
@@ -460,7 +460,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     # nothing is done again
     before = results(out)
     assert run_experiment(config, out).finished == 0
-    write_tables(out)
+    write_tables(Study(out))
     assert results(out) == before
 
 
@@ -592,7 +592,48 @@ def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findin
     np.testing.assert_array_equal(arrays["rms_error"], arrays["F"][:, 0])
     study = Study(tmp_path / "out")
     assert study.surface(study.problems[0]).total_weight == pytest.approx(45.0)
-    write_tables(tmp_path / "out")
+    write_tables(Study(tmp_path / "out"))
     said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
     assert "On face the *error* is the RMS error (root mean square), not the sum of the deviations." in said
     assert "attribute *importance*" in said
+
+
+def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp_path):
+    numbers = [round(0.1 * row, 1) for row in range(25)]
+    (tmp_path / "study.yaml").write_text(
+        f"problems: [{{model: 'roof:5', weights: {numbers}}}, {{name: square, model: 'roof:5', weights: "
+        f"{[numbers[row : row + 5] for row in range(0, 25, 5)]}}}, 'roof:3']\n"
+        "algorithms: [{preset: nsga2_v1, parameters: {pop_size: 12}}]\nseeds: [1]\nbudgets: [{generations: 2}]\n",
+        encoding="utf-8",
+    )
+    assert run_experiment(tmp_path / "study.yaml", tmp_path / "out", jobs=1).finished == 3
+    study = write_report(tmp_path / "out")
+    assert [problem.rules.weights for problem in study.problems[::2]] == [numbers, None]
+    assert study.surface(study.problems[0]).total_weight == pytest.approx(sum(numbers))
+    said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
+    assert "On roof:5, square each vertex counts by a number of its own, from the configuration." in said
+    assert said.count("each vertex counts") == 1
+
+
+def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one_line(stored, capsys):
+    record = stored / "experiment.json"
+    content = json.loads(record.read_text(encoding="utf-8"))
+    assert content["format"] == FORMAT == 2
+
+    def told(**changed):
+        record.write_text(json.dumps(content | changed), encoding="utf-8")
+        assert main(["report", str(stored)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    without_rules = [{key: item[key] for key in item if key != "rules"} for item in content["problems"]]
+    assert "experiment.json: is not of the format 2 that this version reads; run it again" in told(
+        format=1, problems=without_rules
+    )
+    assert "experiment.json: is damaged ('rules' is missing); `meshsimp run` writes it anew" in told(
+        problems=without_rules
+    )
+    assert "experiment.json: is damaged (footprint is 3: expected one of model, hull)" in told(
+        problems=[problem | {"rules": {"footprint": 3}} for problem in content["problems"]]
+    )
+    assert "experiment.json: is damaged (" in told(runs=[None])

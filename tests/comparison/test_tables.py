@@ -156,13 +156,16 @@ def test_a_run_without_a_mesh_is_named_and_left_out(tmp_path):
     fronts = {"A": {"N1": {1: [(1.0, 2)], 2: []}}}
     out = store(tmp_path / "out", fronts)
     with pytest.warns(ExperimentWarning, match="without a mesh: A / N1 / seed 2"):
-        study = write_tables(out)
+        write_tables(study := Study(out))
     assert set(study.cases["A", BUDGET, NEAREST].runs["N1"]) == {1}
 
 
 def test_one_run_of_one_method_is_report_enough(tmp_path):
     out = store(tmp_path / "out", {"A": {"X": {7: [(1.0, 2)]}}})
-    write_tables(out)
+    (out / ".tables.0123abcd.old").mkdir()  # of reports that were killed
+    (out / ".tables.4567abcd.partial").mkdir()
+    write_tables(Study(out))
+    assert not list(out.glob(".tables.*"))
     scores = (out / "tables" / slug(BUDGET) / NEAREST / "scores.csv").read_text()
     assert scores.splitlines()[1].startswith("A,X,1,1.0,,1.0,,1.0,,1.0,,1.0,")
     assert "not decided here" in (out / "findings.md").read_text()

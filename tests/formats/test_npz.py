@@ -43,7 +43,6 @@ def test_a_bad_archive_is_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "none.npz", "w") as archive:
         archive.writestr("readme.txt", "nothing")
     assert "no arrays" in refusal(tmp_path / "none.npz")
-    refusal(write(tmp_path, "b.npz", (tmp_path / "dx.npz").read_bytes()), spacing=(1, 2, 3))
 
 
 def test_an_archived_array_that_declares_more_than_its_file_holds_allocates_nothing(tmp_path):

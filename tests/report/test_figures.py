@@ -29,6 +29,27 @@ def ax():
     return Figure().subplots()
 
 
+def test_a_measure_that_is_none_is_refused_before_anything_is_drawn(ax, roof):
+    for draw in (
+        lambda: plot_front([[1.0, 2.0]], ax, measure="sum of squares"),
+        lambda: front_figure(roof, [[1.0, 2.0]], [], measure="sum of squares"),
+    ):
+        with pytest.raises(ValueError, match="measure='sum of squares' is unknown; choose one of 'error'"):
+            draw()
+    assert not ax.lines
+
+
+def test_a_model_in_place_of_a_surface_is_told_apart(roof):
+    nothing = np.zeros(25)
+    for draw in (
+        lambda: plot_error(roof.model, nothing),
+        lambda: error_figure(roof.model, nothing, nothing),
+        lambda: front_figure(roof.model, [[1.0, 2.0]], []),
+    ):
+        with pytest.raises(TypeError, match=r"a OpenModel has no rules; give a surface, such as problem\.surface"):
+            draw()
+
+
 @pytest.fixture(scope="module")
 def roof():
     return HeightSurface(open_model("roof:5"))

@@ -152,10 +152,6 @@ class Circle:
         error = mesh.quality.error
         return Refitted(mesh.faces, rows, self.points[rows], error, error, 0.0)
 
-    def stored_arrays(self) -> dict[str, AnyArray]:
-        """Return nothing: the row of each point in the file says it all."""
-        return {}
-
     def ground(self) -> Any | None:
         """Return the points and the measure."""
         return Round(np.ascontiguousarray(self.places.ravel()), OBJECTIVES[self.rules.measure].squared)

@@ -194,5 +194,7 @@ def test_one_unknown_height_is_the_weighted_median():
 def test_impossible_calls_are_refused(model):
     with pytest.raises(ValueError, match="tolerance=0 is not positive"):
         refit_heights(surface(model), subset(model, 0.5), tolerance=0)
+    with pytest.raises(TypeError, match=r"refit_heights: a OpenModel has no rules; give a surface, such as problem"):
+        refit_heights(model, subset(model, 0.5))
     with pytest.raises(ValueError, match="span no triangle"):
         refit_heights(surface(model), np.zeros(model.n_vertices, bool))

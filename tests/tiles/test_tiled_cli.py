@@ -1,6 +1,8 @@
 """``meshsimp simplify --tile``: what a person with a big height grid sees and gets."""
 
+import dataclasses
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -11,8 +13,10 @@ from cracks import find_cracks
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import tiling as tiled_command
+from meshsimp_pymoo.cli.parser import make_parser
+from meshsimp_pymoo.cli.requests import Search, request_of
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import ResultError, UsageError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source, write_mesh
 from meshsimp_pymoo.opening import open_model
@@ -48,7 +52,7 @@ def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
     assert 690 <= len(chosen.faces) <= 700
     assert find_cracks(chosen.points, chosen.faces) == 0
     record = json.loads((out / "run.json").read_text())
-    assert record["settings"]["tile"] == 64
+    assert set(record["settings"]) == {"triangles", "format", "meshes", "tile", "most"}  # nothing of a search
     assert record["model"]["vertices"] == np.load(path).size
 
 
@@ -117,6 +121,9 @@ def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
     [
         (["--time", "5s"], "--time does not go with tiles"),
         (["--algorithm", "nsga2_v1"], "--algorithm does not go with tiles"),
+        (["--population", "50"], "--population does not go with tiles"),
+        (["--max-edge", "5"], "--max-edge does not go with tiles"),
+        (["--refit"], "--refit does not go with tiles"),
         (["--pin", "hull"], "--pin does not go with tiles"),
         (["--measure", "rms"], "--measure does not go with tiles"),
         (["--window", "0,0,5000,10"], "does not lie within"),
@@ -134,6 +141,16 @@ def test_what_tiles_cannot_do_is_refused_in_one_line(path, tmp_path, capsys, opt
     assert not list(tmp_path.glob("out/*.csv"))
 
 
+def test_each_part_of_a_request_is_known_to_tiles_or_refused(path, tmp_path, monkeypatch):
+    request = request_of(make_parser().parse_args(["simplify", str(path), "--tile", "64"]))
+    tiled_command._refuse_unknown(request)
+    new = dataclasses.make_dataclass("Search", [("smoothing", int, 0)], bases=(Search,), frozen=True)
+    monkeypatch.setitem(tiled_command.KNOWN, new, tiled_command.KNOWN[Search])
+    tiled_command._refuse_unknown(dataclasses.replace(request, search=new()))
+    with pytest.raises(UsageError, match="--smoothing does not go with tiles"):
+        tiled_command._refuse_unknown(dataclasses.replace(request, search=new(smoothing=3)))
+
+
 def test_a_scan_is_not_cut_into_tiles(tmp_path, capsys):
     assert main(["simplify", "face:300", "-o", str(tmp_path / "out"), "--tile", "64"]) == 2
     assert "only a height grid without gaps can be cut into tiles" in capsys.readouterr().err
@@ -149,7 +166,7 @@ def test_a_big_grid_with_gaps_is_searched_in_one_piece_unless_tiles_are_asked_fo
     assert main([*command, "--tile", "64"]) == 2
     assert "only a grid without gaps can be cut into tiles" in capsys.readouterr().err
     assert main([*command, "--evaluations", "150", "--algorithm", "nsga2_v1"]) == 2  # these options are not for tiles
-    assert main([*command, "--population", "10"]) == 0
+    assert main(command) == 0
     told = capsys.readouterr().err
     assert "no height at row 5, column 11; so it is not cut into tiles but searched in one piece" in told
     assert (tmp_path / "out" / "front.csv").exists()
@@ -226,3 +243,22 @@ def test_a_front_of_another_grid_is_not_read(out, path):
             read_tiled_front(out, open_grid(path, spacing=30.0))
     finally:
         (out / "gone.npz").rename(out / "nested.npz")
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"model": {"hash": "0", "file": None}}, "run.json: model.name is not what a front's record holds"),
+        ({"model": {"name": "relief.npy", "hash": "0", "file": 3}}, "run.json: model.file is not"),
+        ({"solutions": 3}, "run.json: is not the record of this front of"),
+        ({"options": {"spacing": "wide"}}, "run.json: cannot be read (spacing is 'wide': expected a number"),
+        ({"options": [1]}, "run.json: options is not"),
+    ],
+)
+def test_a_damaged_record_is_answered_in_one_line(out, tmp_path, capsys, changed, message):
+    shutil.copytree(out, tmp_path / "out")
+    record = tmp_path / "out" / "run.json"
+    record.write_text(json.dumps(json.loads(record.read_text()) | changed))
+    assert main(["pick", str(tmp_path / "out"), "--knee"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line

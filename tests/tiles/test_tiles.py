@@ -14,6 +14,7 @@ from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import thinning
+from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.coarse import SEARCHED, CoarseGrid, move
@@ -91,6 +92,7 @@ def test_a_height_that_means_no_sample_is_refused():
     z = np.arange(70.0, dtype=np.float32).reshape(7, 10)
     with pytest.raises(ModelError, match="no height at row 3, column 4"):
         tiled_front(open_grid(z, nodata=34), tile=64)
+    assert open_grid(z, nodata=-LARGEST).hash == open_grid(z).hash  # beyond what its heights can be
 
 
 def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
@@ -101,6 +103,30 @@ def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
     (tmp_path / "z.npy").write_bytes(b"\x93NUMPY nonsense")
     with pytest.raises(ModelError, match="not a whole NumPy array file"):
         open_grid(tmp_path / "z.npy")
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({"patch": "front"}, "all of a grid faces up; leave patch='front' out"),
+        ({"up": "-z"}, "heights of a grid are along z; leave up='-z' out"),
+        ({"max_edge": 3.0}, "max_edge describes point clouds"),
+    ],
+)
+def test_what_says_nothing_of_a_grid_is_refused(tmp_path, how, message):
+    heights = np.random.default_rng(1).random((5, 6))
+    np.save(tmp_path / "z.npy", heights)
+    for grid in (heights, tmp_path / "z.npy"):
+        with pytest.raises(ModelError, match=message):
+            open_grid(grid, **how)
+
+
+@pytest.mark.parametrize("how", [{"spacing": 2.0}, {"up": "z"}, {"nodata": -9999.0}])
+def test_a_grid_or_a_model_that_is_open_already_is_not_read_in_another_way(how):
+    with pytest.raises(ModelError, match="is a grid that is open already"):
+        open_grid(SMALL_GRID, **how)
+    with pytest.raises(ModelError, match="is a model that was read already"):
+        open_grid(SMALL, **how)
 
 
 # --------------------------------------------------------------------------------------------------------- the mesh

@@ -45,9 +45,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         tile,
         whole,
     )
-    from meshsimp_pymoo.cli.requests import Output, Search
+    from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Search
     from meshsimp_pymoo.formats.options import Options
-    from meshsimp_pymoo.formats.table import written_formats
+    from meshsimp_pymoo.formats.table import all_formats, listed, written_formats
     from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
     from meshsimp_pymoo.surface.measures import OBJECTIVES
     from meshsimp_pymoo.surface.rules import Rules
@@ -71,11 +71,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     budget.add_argument("--generations", type=whole(1), metavar="N")
 
     search = parser.add_argument_group("how to search")
+    offered = {name: preset.about for name, preset in PRESETS.items() if preset.whole_front}
     search.add_argument(
         "--algorithm",
-        choices=[name for name, preset in PRESETS.items() if preset.whole_front],
+        choices=list(offered),
         default=Search.algorithm,
-        help="preset (default: %(default)s)",
+        help="; ".join(f"{name}: {about}" for name, about in offered.items()) + " (default: %(default)s)",
     )
     search.add_argument(
         "--population", type=whole(2), default=Search.population, metavar="N", help="(default: %(default)s)"
@@ -88,12 +89,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     add_checkpoint(search, "the state of the search is saved in OUT", " (tiles are always saved)")
 
+    counted = [suffix for kind in all_formats() if kind.count_samples is not None for suffix in kind.suffixes]
     tiles = parser.add_argument_group("big height grids, thinned tile by tile in bounded memory")
     tiles.add_argument(
         "--tile",
         type=tile,
         metavar="N|none",
-        help="samples along one side of a tile (default: 512, for .npy, .asc and .tif from 2 million samples on)",
+        help=f"samples along one side of a tile (default: 512, for {listed(counted)} from {TILED_FROM / 1e6:g} million "
+        "samples on)",
     )
     tiles.add_argument("--pieces", action="store_true", help="write the chosen mesh in pieces, one for each tile")
     add_workers(tiles)
@@ -102,13 +105,13 @@ def add(parser: argparse.ArgumentParser) -> None:
     rules = parser.add_argument_group("what counts")
     add_settings(rules, Rules)
     spelled = {measure.minimised: name for name, measure in OBJECTIVES.items()}
+    meanings = ", ".join(f"{measure.minimised} ({measure.meaning})" for measure in OBJECTIVES.values())
     rules.add_argument(
         "--measure",
         type=str.lower,
         choices=list(spelled),
         default=next(iter(spelled)),
-        help="error that is made small beside the triangles: the sum of the deviations, their root mean square or "
-        "their maximum (default: %(default)s)",
+        help=f"error that is made small beside the triangles: {meanings} (default: %(default)s)",
     )
 
     output = parser.add_argument_group("what is written and shown")

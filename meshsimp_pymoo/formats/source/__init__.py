@@ -139,6 +139,3 @@ def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None)
             f"{name}: coordinates reach {np.abs(xyz).max():g}; rescale the model to below {COORDINATE_LIMIT:g}"
         )
     return xyz
-
-
-# ------------------------------------------------------------ files and messages

@@ -249,7 +249,7 @@ def placed_heights(heights: AnyArray, name: str, options: Options) -> PlacedHeig
             raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
         heights = heights.data
     _check_heights(heights, name)
-    dx, dy = steps_of(options.spacing, name) or (1.0, 1.0)
+    dx, dy = options.steps or (1.0, 1.0)
     _check_steps(dx, dy, name)
     column, row, columns, rows = check_window(options.window, (heights.shape[0], heights.shape[1]), name)
     return PlacedHeights(
@@ -263,17 +263,6 @@ def placed_heights(heights: AnyArray, name: str, options: Options) -> PlacedHeig
 
 
 # -------------------------------------------------------------------------------------------------------------- checks
-
-
-def steps_of(spacing: float | tuple[float, float] | None, name: str) -> tuple[float, float] | None:
-    """Return the distances of columns and rows, if they are given."""
-    if spacing is None:
-        return None
-    try:
-        dx, dy = np.broadcast_to(np.asarray(spacing, dtype=np.float64), 2).tolist()
-    except ValueError:
-        raise ModelError(f"{name}: the spacing is {spacing!r}; give one number or (dx, dy)") from None
-    return dx, dy
 
 
 def _check_heights(heights: AnyArray, name: str) -> None:

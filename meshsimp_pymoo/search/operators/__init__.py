@@ -1,25 +1,12 @@
 """Operators for bool chromosomes over the vertices of a mesh, for use with any pymoo algorithm.
 
-``OPERATORS[kind][name]`` is the table behind the names in configuration files:
-
-========== =============== ======================== ==========================================
-kind       name            class                    what it does
-========== =============== ======================== ==========================================
-sampling   random_subset   `RandomSubset`           a random size, then a random subset of it
-sampling   nested          `NestedSubsets`          thinned subsets of all sizes
-crossover  uniform         `SubsetUniformCrossover` every gene from either parent
-crossover  oax             `OAX`                    segments by main effects, orthogonal array
-crossover  half_plane      `HalfPlaneCrossover`     the sides of a random line, exchanged
-crossover  region          `RegionCrossover`        each region from the parent that does it for less
-mutation   neighbour_shift `NeighbourShift`         kept vertices move to neighbours
-mutation   relocation      `Relocation`             annealed moves of kept vertices
-mutation   size_step       `SizeStep`               some more vertices, or some fewer
-repair     pinned_corners  `PinnedCorners`          pinned vertices are kept
-duplicates packed          `PackedDuplicates`       exact duplicates out, by hashing
-========== =============== ======================== ==========================================
+``OPERATORS[kind][name]`` is the table behind the names in configuration files. An operator is one file, its row here,
+and its name where names are spelled out for type checkers: in ``__all__`` here and, since all operators are public, in
+``meshsimp_pymoo/__init__.py``.
 
 All of them draw from pymoo's ``random_state`` alone, never change their input, and take from the problem only
-``pinned``, ``model`` and ``n_var`` (the thinning and annealing ones also its ``footprint`` and ``outside``).
+``n_var``, ``pinned`` and ``surface``; `RegionCrossover` also takes ``regions``, and `OAX` has the problem evaluate what
+it tries.
 """
 
 from __future__ import annotations

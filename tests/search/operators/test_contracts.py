@@ -15,7 +15,9 @@ from numpy.testing import assert_array_equal
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.population import Population
 
+import meshsimp_pymoo
 from meshsimp_pymoo import MeshProblem
+from meshsimp_pymoo.search import operators
 from meshsimp_pymoo.search.operators import OPERATORS
 
 PROBLEM = MeshProblem("peaks:6", regions=12)
@@ -57,6 +59,14 @@ def cross(name: str, parents: np.ndarray, seed: int, **kwargs: Any) -> np.ndarra
     assert len(children) == crossover.n_offsprings * len(parents)
     assert all(not child.evaluated for child in children)
     return children.get("X").reshape(crossover.n_offsprings, len(parents), -1)
+
+
+def test_every_operator_of_the_table_is_a_name_of_its_room_and_of_the_package() -> None:
+    names = sorted(OPERATORS[kind][name].__name__ for kind, name in ALL)
+    assert sorted(operators.__all__) == sorted(["OPERATORS", *names])
+    assert set(names) <= set(meshsimp_pymoo.__all__)
+    for kind, name in ALL:
+        assert getattr(meshsimp_pymoo, OPERATORS[kind][name].__name__) is OPERATORS[kind][name]
 
 
 @pytest.mark.parametrize(("kind", "name"), ALL)
