@@ -169,8 +169,7 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
 
 def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | None:
     """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
-    if (seconds := keeper.request.search.time) is not None:
-        shown.expect("searching", seconds)
+    timed = keeper.request.search.time is not None
     with shown.stage("searching", "searching") as show:
         algorithm, before = keeper.begin()
         start = time.perf_counter()
@@ -181,7 +180,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
                 algorithm.next()
                 found, generations = algorithm.opt, algorithm.n_iter - 1
                 words = front_in_words(problem.model, algorithm.evaluator.n_eval, found.get("F"))
-                show(algorithm.termination.perc, words)
+                show(0.0 if timed else algorithm.termination.perc, words)  # the clock knows better
                 keeper.keep()
             keeper.keep(last=True)
         except KeyboardInterrupt:

@@ -16,7 +16,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, cached_property
 from inspect import getclosurevars
 from pathlib import Path
 from types import CodeType
@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import llvmlite
 import platformdirs
 from numba.core import config
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, NullCache, _CacheLocator
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 
 from meshsimp_pymoo.compiling.linking import is_known
 from meshsimp_pymoo.errors import CodeWarning, reason_of
@@ -42,30 +42,40 @@ class Place(NamedTuple):
 
     #: None where no folder can be written: the code is made again by each process.
     folder: Path | None
-    #: Folders that cannot be used, each with the reason.
+    #: Where there may be some: that folder, and those before it that somebody else has filled.
+    readable: tuple[Path, ...] = ()
+    #: Folders that cannot be written, each with the reason.
     refused: tuple[str, ...] = ()
 
 
-def _candidates() -> Iterator[Path]:
-    """Yield the folders that may hold machine code, the best first; one that the user names is the only one."""
+def _candidates() -> list[Path]:
+    """Return the folders that may hold machine code, the best first; one that the user names is the only one."""
     if config.CACHE_DIR:
-        yield Path(config.CACHE_DIR) / PACKAGE
-        return
-    yield HERE / "__pycache__"
+        return [Path(config.CACHE_DIR) / PACKAGE]
     # two installations have different code
     home = hashlib.sha256(os.fsencode(HERE)).hexdigest()[:12]
-    yield Path(platformdirs.user_cache_dir(PACKAGE, appauthor=False)) / home
-    owner = os.getuid() if hasattr(os, "getuid") else "user"
-    yield Path(tempfile.gettempdir()) / f"{PACKAGE}-{owner}" / home
+    found = [HERE / "__pycache__", Path(platformdirs.user_cache_dir(PACKAGE, appauthor=False)) / home]
+    with suppress(OSError):  # there may be no folder for temporary files
+        owner = os.getuid() if hasattr(os, "getuid") else "user"
+        found.append(Path(tempfile.gettempdir()) / f"{PACKAGE}-{owner}" / home)
+    # who has no home has a cache folder named ~, wherever they are
+    return [folder for folder in found if folder.is_absolute()]
+
+
+def _check_owner(folder: Path) -> None:
+    """Refuse a folder for temporary files that somebody else has made: what is in it would be run."""
+    parent = folder.parent
+    if not hasattr(os, "getuid") or parent.parent != Path(tempfile.gettempdir()):
+        return
+    for part in (folder, parent):
+        if part.lstat().st_uid != os.getuid():
+            raise PermissionError(None, "belongs to somebody else")
 
 
 def _prepare(folder: Path) -> None:
-    """Make a folder, if need be, and see that it can be written, by us alone: what is in it is run."""
+    """Make a folder, if need be, and see that it can be written."""
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    for part in (folder, folder.parent):
-        found = part.lstat()
-        if hasattr(os, "getuid") and part.parent == Path(tempfile.gettempdir()) and found.st_uid != os.getuid():
-            raise PermissionError(None, "belongs to somebody else")
+    _check_owner(folder)
     tempfile.TemporaryFile(dir=folder).close()
 
 
@@ -74,17 +84,20 @@ def place() -> Place:
     """Return where machine code is kept: the first folder that can be written.
 
     ``NUMBA_CACHE_DIR`` if it is set; else the package's own folder, the user's cache folder, the folder for temporary
-    files.
+    files. What somebody who may write it has left in the package's folder, as in an image, is read there.
     """
-    refused = []
+    refused: list[str] = []
+    readable: list[Path] = []
     for folder in _candidates():
         try:
             _prepare(folder)
         except OSError as problem:
             refused.append(f"{folder}: {reason_of(problem)}")
+            if folder.parent == HERE and folder.is_dir():
+                readable.append(folder)
         else:
-            return Place(folder, tuple(refused))
-    return Place(None, tuple(refused))
+            return Place(folder, (*readable, folder), tuple(refused))
+    return Place(None, tuple(readable), tuple(refused))
 
 
 # ----------------------------------------------------------------------------------------------- what code is made from
@@ -158,18 +171,30 @@ class _Locator(_CacheLocator):
         return module if is_known() else f"{module}-O{int(config.OPT)}{'v' if config.LOOP_VECTORIZE else ''}"
 
     @classmethod
-    def from_function(cls, function: Any, _: str) -> Any:
-        """Return the locator of a function."""
-        folder = place().folder
-        return None if folder is None else cls(function, folder)
+    def from_function(cls, function: Any, py_file: str) -> Any:
+        """Return nothing: a locator is for a folder, see below."""
 
 
-class _Impl(CompileResultCacheImpl):
-    _locator_classes = (_Locator,)
+class _Locators(NamedTuple):
+    """In the place of Numba's classes of locators: one folder."""
+
+    folder: Path
+
+    def from_function(self, function: Any, _: str) -> _Locator:
+        """Return the locator of a function in the folder."""
+        return _Locator(function, self.folder)
 
 
 class _Files(FunctionCache):
-    _impl_class = _Impl
+    """The files of a function in a folder."""
+
+    def __init__(self, function: Any, folder: Path) -> None:
+        self._impl_class = type("_Impl", (CompileResultCacheImpl,), {"_locator_classes": (_Locators(folder),)})
+        super().__init__(function)
+
+    def keys(self) -> Any:
+        """Return for what types and machines there is code."""
+        return self._cache_file._load_index()
 
 
 def _is_own(sig: Any) -> bool:
@@ -189,45 +214,45 @@ class Stored:
         self._function = function
         self._begun: dict[int, float] = {}
 
-    @property
-    def _files(self) -> Any:
-        if "files" not in self.__dict__:
-            self.files = NullCache() if place().folder is None else _Files(self._function)
-        return self.files
+    @cached_property
+    def files(self) -> list[_Files]:
+        """Where there may be code; the last is where it is kept, if :func:`place` has a folder."""
+        return [_Files(self._function, folder) for folder in place().readable]
 
     @property
     def cache_path(self) -> str | None:
         """The folder."""
-        path: str | None = self._files.cache_path
-        return path
+        folder = place().folder
+        return None if folder is None else str(folder)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled function, if it is there and can be read; what cannot is made again."""
-        found = None
-        if _is_own(sig):
+        for files in self.files if _is_own(sig) else ():
             try:
-                found = self._files.load_overload(sig, target_context)
+                found = files.load_overload(sig, target_context)
             except Exception as problem:  # whatever unpickling half a file may raise
                 with suppress(OSError):
-                    self._files.flush()
+                    files.flush()
                 _warn_once(
-                    f"compiled code in {self.cache_path} cannot be read ({reason_of(problem)}); it is made again"
+                    f"compiled code in {files.cache_path} cannot be read ({reason_of(problem)}); it is made again"
                 )
-        if found is None:
-            self._begun[threading.get_ident()] = time.perf_counter()
-            for told in _listeners:
-                told(self._function, None)
-        return found
+            else:
+                if found is not None:
+                    return found
+        self._begun[threading.get_ident()] = time.perf_counter()
+        for told in list(_listeners):
+            told(self._function, None)
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled function, if it is for records of this package and there is room."""
         seconds = time.perf_counter() - self._begun.pop(threading.get_ident(), time.perf_counter())
-        for told in _listeners:
+        for told in list(_listeners):
             told(self._function, seconds)
-        if not _is_own(sig):
+        if place().folder is None or not _is_own(sig):
             return
         try:
-            self._files.save_overload(sig, data)
+            self.files[-1].save_overload(sig, data)
         except OSError as problem:
             _warn_once(
                 f"compiled code cannot be kept in {self.cache_path} ({reason_of(problem)}); it is made each time"
@@ -235,26 +260,27 @@ class Stored:
 
     def is_stored(self, target_context: Any) -> bool:
         """Tell whether there is code on disk for this machine, whatever the types."""
-        if isinstance(self._files, NullCache):
-            return False
-        try:
-            index = self._files._cache_file._load_index()
-        except Exception:  # see load_overload
-            return False
         machine = target_context.codegen().magic_tuple()
-        return any(key[1] == machine for key in index)
+        for files in self.files:
+            with suppress(Exception):  # see load_overload, which says so
+                if any(key[1] == machine for key in files.keys()):
+                    return True
+        return False
 
     def enable(self) -> None:
         """See Numba."""
-        self._files.enable()
+        for files in self.files:
+            files.enable()
 
     def disable(self) -> None:
         """See Numba."""
-        self._files.disable()
+        for files in self.files:
+            files.disable()
 
     def flush(self) -> None:
         """Forget what is on disk."""
-        self._files.flush()
+        for files in self.files:
+            files.flush()
 
 
 def has_code(function: Any) -> bool:

@@ -67,12 +67,28 @@ def test_the_first_place_that_can_be_written_is_taken(fresh_place, n):
 
 def test_a_folder_that_is_named_is_the_only_one(fresh_place, tmp_path):
     fresh_place.setattr(store.config, "CACHE_DIR", str(tmp_path / "named"))
-    assert place() == (tmp_path / "named" / "meshsimp_pymoo", ())
+    folder = tmp_path / "named" / "meshsimp_pymoo"
+    assert place() == (folder, (folder,), ())
     assert place().folder.is_dir()
     place.cache_clear()
     (tmp_path / "file").write_text("")
     fresh_place.setattr(store.config, "CACHE_DIR", str(tmp_path / "file"))
     assert place().folder is None
+
+
+def test_who_has_no_home_gets_no_folder_named_so(fresh_place):
+    fresh_place.setattr(store.config, "CACHE_DIR", "")
+    fresh_place.setattr(store.platformdirs, "user_cache_dir", lambda *_, **__: "~/.cache/meshsimp_pymoo")
+    assert all(folder.is_absolute() for folder in store._candidates())
+
+
+def test_without_a_folder_for_temporary_files_there_is_one_place_less(fresh_place):
+    def none():
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    fresh_place.setattr(store.config, "CACHE_DIR", "")
+    fresh_place.setattr(tempfile, "gettempdir", none)
+    assert len(store._candidates()) == 2
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owners here")
@@ -193,6 +209,25 @@ def test_code_is_made_once_and_then_read(kept, tmp_path):
     assert not loaded(kept())
     assert store.has_code(kept())
     assert loaded(kept())
+
+
+def test_code_that_an_image_brings_along_is_read_by_who_cannot_write_it(kept, tmp_path, monkeypatch):
+    """It was compiled by root, say, beside the package; whoever runs it has another folder."""
+    image, own = tmp_path / "site" / "__pycache__", tmp_path / "own"
+
+    def prepare(folder):
+        if folder == image:
+            raise PermissionError(13, "Permission denied")
+        folder.mkdir()
+
+    monkeypatch.setattr(store, "HERE", image.parent)
+    monkeypatch.setattr(store, "_candidates", lambda: [image, own])
+    assert not loaded(kept())
+    place.cache_clear()
+    monkeypatch.setattr(store, "_prepare", prepare)
+    assert place().folder == own
+    assert loaded(kept())
+    assert list(own.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", ["nbi", "nbc"])

@@ -149,7 +149,8 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.cli.terminal import Stages
 
     request = request_of(args)
-    with Stages(request.output.quiet, Path(request.model).name, STAGES) as shown:
+    plan = STAGES if request.search.time is None else STAGES | {"searching": request.search.time}
+    with Stages(request.output.quiet, Path(request.model).name, plan) as shown:
         with shown.stage("starting", "starting"):  # what is imported takes longer than a person waits without a sign
             from meshsimp_pymoo.cli.searching import simplify
         return simplify(request, shown)
