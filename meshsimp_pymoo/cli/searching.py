@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -87,10 +88,11 @@ def simplify(request: Request, shown: Stages) -> int:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
             format_to_write(output.format).check(problem.model)
+        read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
         _refuse_impossible(problem, request.wish)
     shown.expect("writing", WRITING_SECONDS[0] + WRITING_SECONDS[1] * problem.n_var**0.5)
-    with Keeper(problem, request, compiled.seconds) as keeper:
+    with Keeper(problem, request, {"read_seconds": read_seconds, "compile_seconds": compiled.seconds}) as keeper:
         found = _search(problem, keeper, shown)
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
@@ -209,16 +211,16 @@ class Keeper:
         What is searched.
     request : Request
         How, where the results go, and whether old ones give way.
-    compile_seconds : float
-        What was compiled before took so long.
+    before : mapping, optional
+        What was done before, and how long it took [s].
     """
 
-    def __init__(self, problem: MeshProblem, request: Request, compile_seconds: float = 0.0) -> None:
+    def __init__(self, problem: MeshProblem, request: Request, before: Mapping[str, float] | None = None) -> None:
         self.problem = problem
         self.request = request
         self.search = request.search
         self.output = request.output
-        self.compile_seconds = compile_seconds
+        self.before = dict(before or {})
         self.path = self.output.folder / CHECKPOINT
         self.is_held = False
         self._checkpoints: Checkpoints | None = None
@@ -323,8 +325,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
             "generations": found.generations,
             "evaluations": found.evaluations,
             "seconds": round(found.seconds, 3),
-            "read_seconds": round(shown.seconds["reading"], 3),
-            "compile_seconds": round(keeper.compile_seconds, 3),
+            **{name: round(seconds, 3) for name, seconds in keeper.before.items()},
             **({} if fitted is None else {"refit_seconds": round(shown.seconds["refitting"], 3)}),
             "interrupted": found.interrupted,
         }
@@ -407,7 +408,7 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
             else {"mesh": chosen_path, "solution": chosen.solution, **asdict(chosen.quality)},
             "evaluations": found.evaluations,
             "seconds": round(found.seconds, 3),
-            "compile_seconds": round(keeper.compile_seconds, 3),
+            "compile_seconds": round(keeper.before["compile_seconds"], 3),
             "seed": search.seed,
         }
         if any(origin):
@@ -429,8 +430,8 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
     raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
     page = ", report.html" if output.page else ""
     print(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + raised)
-    if keeper.compile_seconds >= 1.0:
-        print(f"compiled once for this machine: {keeper.compile_seconds:.0f} s, not counted as search")
+    if (compiled := keeper.before["compile_seconds"]) >= 1.0:
+        print(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
     if any(origin):
         place = ", ".join(f"{value:.15g}" for value in origin)
         print(f"origin of the glb meshes: ({place}); each file puts itself back there")

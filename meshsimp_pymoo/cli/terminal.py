@@ -85,6 +85,10 @@ def front_in_words(model: OpenModel, evaluations: int, F: FloatArray) -> str:
     return " ".join(["error", *so_far, f"after {evaluations:,} evaluations"])
 
 
+def _is_seen(quiet: bool) -> bool:
+    return not quiet and sys.stderr.isatty()
+
+
 class Stages:
     """The progress of a command as a whole: one bar and one estimate of the time left, over stages that follow.
 
@@ -103,6 +107,7 @@ class Stages:
         #: What each stage has taken [s].
         self.seconds: dict[str, float] = {}
         self._plan = dict(plan)
+        self._is_shown = _is_seen(quiet)
         self._shown = ExitStack()
         self._draw = self._shown.enter_context(bar(quiet, name, timed=False))
         self._begun = time.perf_counter()
@@ -136,13 +141,15 @@ class Stages:
                 draw()
 
         ticking = threading.Thread(target=tick, name="meshsimp-progress", daemon=True)
-        ticking.start()
+        if self._is_shown:
+            ticking.start()
         try:
             yield show
         finally:
             done.set()
-            ticking.join()
-            draw()
+            if self._is_shown:
+                ticking.join()
+                draw()
             self.seconds[stage] = self.seconds.get(stage, 0.0) + time.perf_counter() - begun
 
     def close(self) -> None:
@@ -167,7 +174,7 @@ def bar(quiet: bool, name: str, *, timed: bool = True) -> Iterator[Callable[[flo
 
     With ``timed`` the time that is left is reckoned from the shares.
     """
-    if quiet or not sys.stderr.isatty():
+    if not _is_seen(quiet):
         yield lambda share, state: None
         return
     from rich.console import Console
