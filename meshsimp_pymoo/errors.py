@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import unicodedata
 import warnings
 
 # Of a foreign exception's text, in a line of ours.
@@ -33,6 +34,10 @@ class CodeWarning(UserWarning):
     """Compiled code cannot be kept or read: nothing is wrong but the time it takes to make it again."""
 
 
+class PictureWarning(UserWarning):
+    """A picture or a page could not be made; the results are there."""
+
+
 class ModelWarning(UserWarning):
     """The input is usable, but something in it was dropped or is doubtful."""
 
@@ -45,6 +50,20 @@ def reason_of(error: BaseException) -> str:
     """
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return " ".join(str(text).split())[:LONGEST_REASON]
+
+
+def printable(text: object, *, keep: str = "") -> str:
+    r"""Return a text that can be shown anywhere: escapes in place of control characters and of what is no Unicode.
+
+    Names of files and of what is in them may hold anything; a terminal would obey some of it. ``keep`` stays as it is.
+
+    >>> print(printable("face.ply"), printable("a\x1b[31mb\udce4"))
+    face.ply a\x1b[31mb\udce4
+    """
+    return "".join(
+        ascii(c)[1:-1] if c not in keep and unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c
+        for c in str(text)
+    )
 
 
 def raise_if_memory(error: BaseException) -> None:

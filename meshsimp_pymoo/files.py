@@ -8,10 +8,11 @@ import io
 import math
 import os
 import secrets
+import shlex
 import shutil
 import warnings
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import IO
@@ -19,7 +20,7 @@ from typing import IO
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray
-from meshsimp_pymoo.errors import ModelError, ResultError, raise_if_memory, reason_of
+from meshsimp_pymoo.errors import ModelError, PictureWarning, ResultError, raise_if_memory, reason_of
 
 # Deflate cannot shrink data by more than 1032:1, so a .npz member that claims more is a forgery.
 DEFLATE_LIMIT = 1100
@@ -267,12 +268,37 @@ def stays_inside(folder: Path, name: str) -> bool:
 # ---------------------------------------------------------------------------------------------- tables and archives
 
 
+def as_argument(path: str | os.PathLike[str]) -> str:
+    """Return a path as a shell takes it for one: quoted, and no option.
+
+    >>> as_argument("a b"), as_argument("-o")
+    ("'a b'", './-o')
+    """
+    text = os.fspath(path)
+    return shlex.quote(f".{os.sep}{text}" if text.startswith("-") else text)
+
+
 def write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Write a heading and rows of cells that are text already."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)
+
+
+def draw_into(folder: Path, drawings: Mapping[str, Callable[[Path], object]]) -> None:
+    """Make pictures and pages in a folder of results; what fails is a warning and costs none of the results."""
+    for name, draw in drawings.items():
+        try:
+            draw(folder / name)
+        except Exception as problem:  # whatever a library may not like about a name, a font or the memory
+            with suppress(OSError):
+                (folder / name).unlink(missing_ok=True)
+            warnings.warn(
+                f"{name} could not be made ({reason_of(problem)}); the rest of the results is complete",
+                PictureWarning,
+                stacklevel=3,
+            )
 
 
 def write_npz(path: Path, **arrays: AnyArray) -> None:

@@ -538,7 +538,7 @@ class Front(Sequence[FrontSolution]):
         def fitted(solution: int) -> Refitted | None:
             return self[solution].refitted if refit is True else refit.get(solution) if refit else None
 
-        def draw(unfinished: Path) -> None:
+        def draw_front(path: Path) -> None:
             from meshsimp_pymoo.report.figures import front_figure, panel_rows
 
             F = self.F
@@ -552,11 +552,12 @@ class Front(Sequence[FrontSolution]):
                 measure=self.objectives[0],
                 series=self.series,
             )
-            figure.savefig(unfinished / "front.png")
-            if page:
-                from meshsimp_pymoo.report.page import write_page
+            figure.savefig(path)
 
-                write_page(read_front(unfinished), problem, folder=folder, knee=knee(F))
+        def draw_page(path: Path) -> None:
+            from meshsimp_pymoo.report.page import write_page
+
+            write_page(read_front(path.parent), problem, folder=folder, knee=knee(self.F))
 
         record = self.run | dict(run or {})
         record |= {
@@ -576,7 +577,7 @@ class Front(Sequence[FrontSolution]):
             refit=fitted if refit is not False else None,
             series=self.series,
             run=record,
-            extra=draw,
+            drawings={"front.png": draw_front} | ({"report.html": draw_page} if page else {}),
             overwrite=overwrite,
         )
 

@@ -39,6 +39,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
+    draw_into,
     new_folder,
     partial_folder,
     path_from,
@@ -184,7 +185,7 @@ def write_front(
     refit: Callable[[int], Refitted | None] | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
-    extra: Callable[[Path], None] | None = None,
+    drawings: Mapping[str, Callable[[Path], object]] | None = None,
     overwrite: bool = False,
 ) -> Path:
     """Write a front, its meshes and the record of its run to a new folder, all or nothing.
@@ -220,8 +221,9 @@ def write_front(
         written to ``series.csv``.
     run : mapping, optional
         What to record in run.json beside the package versions and the model.
-    extra : callable, optional
-        Called with the unfinished folder before it is put in place, to add files to it (a figure, say).
+    drawings : mapping of str to callable, optional
+        Pictures and pages by name, made once all else is written: called with the file to make. What fails is a
+        warning and costs none of the results.
     overwrite : bool
         Replace results that exist.
 
@@ -312,8 +314,7 @@ def write_front(
         (partial / "run.json").write_text(
             json.dumps(record, indent=2, default=_plain, allow_nan=False) + "\n", encoding="utf-8"
         )
-        if extra is not None:
-            extra(partial)
+        draw_into(partial, drawings or {})
     return folder
 
 

@@ -650,7 +650,7 @@ def test_anything_unexpected_keeps_its_traceback(tmp_path, monkeypatch):
     def fail(*args, **kwargs):
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr("meshsimp_pymoo.report.figures.front_figure", fail)
+    monkeypatch.setattr("meshsimp_pymoo.storage.write_npz", fail)
     with pytest.raises(ZeroDivisionError, match="a bug"):
         run("simplify", "roof:5", "-o", tmp_path / "out", *QUICK)
     assert list(tmp_path.iterdir()) == []

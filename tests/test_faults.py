@@ -329,7 +329,12 @@ def test_disk_full_in_mid_search_is_a_warning_and_the_search_goes_on(tmp_path, w
 
 def test_disk_full_while_writing_is_one_line_and_the_rerun_completes(tmp_path, whole, monkeypatch, capsys):
     out = stopped(tmp_path / "out", monkeypatch)
-    with small_files(20_000):  # the checkpoint fits, the figure does not
+
+    def full(*_, **__):
+        raise OSError(27, "File too large")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("meshsimp_pymoo.storage.write_npz", full)
         assert simplify(out) == 2
     said = one_line(capsys)
     assert "out: cannot be written (File too large); make room" in said
@@ -338,6 +343,17 @@ def test_disk_full_while_writing_is_one_line_and_the_rerun_completes(tmp_path, w
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
     assert simplify(out) == 0
     assert reproducible(out) == whole
+
+
+def test_disk_full_while_drawing_costs_the_picture_alone(tmp_path, monkeypatch, capsys):
+    out = stopped(tmp_path / "out", monkeypatch)
+    capsys.readouterr()
+    with small_files(20_000):  # all fits but the figure
+        assert simplify(out) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("meshsimp: warning: front.png could not be made (File too large); ")
+    assert not (out / "front.png").exists()
+    assert len(read_front(out).F) > 1
 
 
 @pytest.fixture
@@ -355,8 +371,9 @@ def small_disk(tmp_path):
 
 def test_a_really_full_disk(small_disk, whole, monkeypatch, capsys):
     out = stopped(small_disk / "out", monkeypatch)
-    (small_disk / "film.avi").write_bytes(bytes(32 << 10))
-    assert simplify(out) == 2  # figure and all do not fit
+    room = shutil.disk_usage(small_disk).free - (8 << 10)
+    (small_disk / "film.avi").write_bytes(bytes(room))
+    assert simplify(out) == 2  # numbers and meshes do not fit
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2  # the last checkpoint does not fit either: the one before stays
     assert "checkpoint.npz: cannot be written (No space left on device); the search goes on" in lines[0]

@@ -155,12 +155,12 @@ def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_pat
     folder = write_solutions(tmp_path / "out", model, solutions)
     before = files(folder)
 
-    def fail(unfinished):
-        assert (unfinished / "front.csv").exists()
+    def fail(picture):
+        assert picture.with_name("front.csv").exists()
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_solutions(folder, model, solutions, extra=fail, overwrite=True)
+        write_solutions(folder, model, solutions, drawings={"front.png": fail}, overwrite=True)
     assert files(folder) == before
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
@@ -185,12 +185,13 @@ def test_an_old_result_survives_when_the_new_one_cannot_be_put_in_place(
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
-def test_a_failure_leaves_nothing(tmp_path, model, solutions):
-    def fail(unfinished):
+def test_a_failure_leaves_nothing(tmp_path, model, solutions, monkeypatch):
+    def fail(*_, **__):
         raise RuntimeError("no ink")
 
+    monkeypatch.setattr("meshsimp_pymoo.storage.write_npz", fail)
     with pytest.raises(RuntimeError, match="no ink"):
-        write_solutions(tmp_path / "out", model, solutions, extra=fail)
+        write_solutions(tmp_path / "out", model, solutions)
     assert list(tmp_path.iterdir()) == []
 
 

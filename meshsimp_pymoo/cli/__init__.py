@@ -8,6 +8,7 @@ code    meaning
 2       bad input: one line on stderr says what, where and the way out; nothing is written
 130     interrupted (Ctrl-C): the front found so far is written, if there was one; of an experiment, all runs
         that were finished
+143     the same after SIGTERM, which schedulers and containers send
 ======  ==============================================================================================
 
 Anything unexpected keeps its traceback. Everything heavy is imported when a command runs, so that ``--help``
@@ -20,9 +21,18 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 
 from meshsimp_pymoo.cli.parser import make_parser
-from meshsimp_pymoo.cli.terminal import BAD_INPUT, INTERRUPTED, OK, interruptible, say, warnings_as_lines
+from meshsimp_pymoo.cli.terminal import (
+    BAD_INPUT,
+    INTERRUPTED,
+    OK,
+    interrupted_code,
+    interruptible,
+    say,
+    warnings_as_lines,
+)
 from meshsimp_pymoo.errors import InputError
 
 __all__ = ["main"]
@@ -45,19 +55,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         The exit code; see the module's table.
     """
+    _open_streams()
     try:
         args = make_parser().parse_args(argv)
         with warnings_as_lines(), interruptible():
             code = int(args.command(args))
             sys.stdout.flush()
-            return code
+            return interrupted_code() if code == INTERRUPTED else code
     except BrokenPipeError:  # whoever reads our output has seen enough of it: meshsimp info | head -3
         with suppress(OSError, ValueError):  # and Python shall not try again at its end
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
     except KeyboardInterrupt:
         say("interrupted; nothing is written")
-        return INTERRUPTED
+        return interrupted_code()
     except MemoryError:
         say(NO_MEMORY)
         return BAD_INPUT
@@ -69,3 +80,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         say(" ".join(str(problem).split()))
         return BAD_INPUT
+
+
+def _open_streams() -> None:
+    """Have somewhere to print to, whatever the process was started with; what an encoding lacks is escaped."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # it was closed: >&-
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")

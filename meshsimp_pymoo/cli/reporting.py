@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.terminal import OK, bar
+from meshsimp_pymoo.cli.terminal import OK, bar, tell
 from meshsimp_pymoo.comparison.report import write_report
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.indicators import knee
@@ -19,9 +19,9 @@ def report_on_front(out: Path, model: str | None, *, quiet: bool, as_json: bool)
     front = Front.load(out, model=model)
     path = write_page(read_front(out), front.problem, folder=out, knee=knee(front.F))
     if as_json:
-        print(json.dumps({"page": str(path), "solutions": len(front)}, indent=2))
+        tell(json.dumps({"page": str(path), "solutions": len(front)}, indent=2))
     elif not quiet:
-        print(f"written: {path} ({len(front)} solutions)")
+        tell(f"written: {path} ({len(front)} solutions)")
     return OK
 
 
@@ -31,9 +31,9 @@ def report_on_experiment(out: Path, facts: dict[str, Any], *, quiet: bool, as_js
         study = write_report(out, progress=lambda done, total, text: show(done / max(total, 1), text))
     if as_json:
         summary = {"folder": str(out), **facts, "runs": len(study.all_runs), "missing": len(study.missing)}
-        print(json.dumps(summary, indent=2))
+        tell(json.dumps(summary, indent=2))
     elif not quiet:
         left_out = f", {len(study.missing)} runs are missing" if study.missing else ""
         files = "report.html, findings.md, tables, figures, times.csv"
-        print(f"written: {out}: {files} ({len(study.all_runs):,} runs{left_out})")
+        tell(f"written: {out}: {files} ({len(study.all_runs):,} runs{left_out})")
     return OK

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shlex
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -29,10 +28,11 @@ from meshsimp_pymoo.cli.terminal import (
     front_in_words,
     say,
     stop_if_interrupted,
+    tell,
 )
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
-from meshsimp_pymoo.files import locked, put_back
+from meshsimp_pymoo.files import as_argument, locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, shared_frame
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
@@ -413,31 +413,31 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
         }
         if any(origin):
             summary["mesh_origin"] = origin
-        print(json.dumps(summary, indent=2))
+        tell(json.dumps(summary, indent=2))
         return
     if output.quiet:
         return
     few, many = quality[0], quality[-1]
-    print(f"{Path(model.name).name}: {model.n_vertices:,} vertices, {len(model.faces):,} triangles")
-    print(
+    tell(f"{Path(model.name).name}: {model.n_vertices:,} vertices, {len(model.faces):,} triangles")
+    tell(
         f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
         f"mean error {few.mean_error:.4g} to {many.mean_error:.4g} "
         f"({found.evaluations:,} evaluations, {found.seconds:.1f} s, seed {search.seed})"
     )
     if chosen is not None:
-        print(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
+        tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
     written = len(list(folder.glob("meshes/*")))
     raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
     page = ", report.html" if output.page else ""
-    print(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + raised)
+    tell(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + raised)
     if (compiled := keeper.before["compile_seconds"]) >= 1.0:
-        print(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
+        tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
     if any(origin):
         place = ", ".join(f"{value:.15g}" for value in origin)
-        print(f"origin of the glb meshes: ({place}); each file puts itself back there")
+        tell(f"origin of the glb meshes: ({place}); each file puts itself back there")
     if chosen is None:
         size = _round_size(front)
-        print(f"take one of them: meshsimp pick {shlex.quote(str(folder))} --triangles {size} -o small.ply")
+        tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")
 
 
 def _round_size(front: Front) -> int:

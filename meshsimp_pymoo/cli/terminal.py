@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import os
 import signal
 import sys
 import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
+from meshsimp_pymoo.errors import ResultError, printable, reason_of
 from meshsimp_pymoo.surface.measures import MEASURES
 
 if TYPE_CHECKING:
@@ -28,50 +30,62 @@ __all__ = [
     "INTERRUPTED",
     "OK",
     "TARGET_MISSED",
+    "TERMINATED",
     "Stages",
     "bar",
     "described",
     "front_in_words",
+    "interrupted_code",
     "interruptible",
     "say",
     "stop_if_interrupted",
+    "tell",
     "warnings_as_lines",
 ]
 
-OK, TARGET_MISSED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+OK, TARGET_MISSED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 # Of the name before the progress bar; the front so far is to fit beside it into 80 columns.
 LONGEST_NAME = 18
 
 
 class _Interrupt:
-    """Remembers Ctrl-C: some libraries swallow the exception while they are imported."""
+    """Remembers a signal: some libraries swallow the exception while they are imported."""
 
-    seen = False
+    seen: int | None = None
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Note each Ctrl-C besides raising KeyboardInterrupt; see :func:`stop_if_interrupted`."""
+    """Note Ctrl-C and SIGTERM besides raising KeyboardInterrupt; see :func:`stop_if_interrupted`.
+
+    Schedulers and containers end a program by SIGTERM: what is found so far is written then too.
+    """
 
     def note(signum: int, frame: Any) -> None:
-        _Interrupt.seen = True
+        _Interrupt.seen = signum
         raise KeyboardInterrupt
 
-    _Interrupt.seen = False
+    _Interrupt.seen = None
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, note)
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def interrupted_code() -> int:
+    """Return the exit code of what was interrupted: as the shell has it for the signal that came."""
+    return TERMINATED if _Interrupt.seen == signal.SIGTERM else INTERRUPTED
 
 
 def stop_if_interrupted() -> None:
-    """Raise KeyboardInterrupt if Ctrl-C was pressed, even if a library swallowed it."""
-    if _Interrupt.seen:
+    """Raise KeyboardInterrupt if Ctrl-C or SIGTERM came, even if a library swallowed it."""
+    if _Interrupt.seen is not None:
         raise KeyboardInterrupt
 
 
@@ -232,4 +246,22 @@ def described(quality: Quality) -> str:
 
 def say(line: str) -> None:
     """Print one line on stderr."""
-    print(f"meshsimp: {line}", file=sys.stderr)
+    print(f"meshsimp: {printable(line)}", file=sys.stderr)
+
+
+def tell(lines: str) -> None:
+    """Print results, without what a terminal would obey.
+
+    Raises
+    ------
+    ResultError
+        If there is no room for them, on a full disk, say; what the command has written is in place.
+    """
+    try:
+        print(printable(lines, keep="\n"), flush=True)
+    except BrokenPipeError:  # whoever reads them has seen enough
+        raise
+    except OSError as problem:
+        with suppress(OSError, ValueError):  # and Python shall not try again at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise ResultError(f"the results are in place, but cannot be printed ({reason_of(problem)})") from None

@@ -13,8 +13,8 @@ from typing import Any
 from meshsimp_pymoo.cli.arguments import numbered
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling, Wish
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say
-from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
+from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say, tell
+from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, printable, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import format_to_write
@@ -119,7 +119,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
                 chosen=chosen,
                 piece_size=tile if tiling.pieces else None,
                 run=run,
-                extra=lambda unfinished: _draw(front, chosen, unfinished / "front.png"),
+                drawings={"front.png": lambda path: _draw(front, chosen, path)},
             )
     except EngineError as problem:
         goes_on = f"; finished tiles are in {out}, the same command goes on" if _has_pieces(out) else ""
@@ -157,7 +157,7 @@ def _draw(front: TiledFront, chosen: int | None, path: Path) -> None:
     axes = figure.subplots()
     plot_front(front, axes, knee=int(knee(front.F)), chosen=chosen, n_points=grid.n_samples)
     rows, columns = grid.shape
-    axes.set_title(f"{Path(grid.name).name}: {rows:,} x {columns:,} samples", loc="left")
+    axes.set_title(f"{printable(Path(grid.name).name)}: {rows:,} x {columns:,} samples", loc="left")
     figure.savefig(path)
 
 
@@ -216,10 +216,10 @@ def pick_tiled(
         # a size between two solutions is none of the stored ones
         known = None if wish.triangles is not None else len(front) - 1 - chosen
         mesh = None if path is None else str(path)
-        print(json.dumps({"mesh": mesh, "solution": known, **asdict(quality)}, indent=2))
+        tell(json.dumps({"mesh": mesh, "solution": known, **asdict(quality)}, indent=2))
     elif not quiet:
-        print(f"of {folder}: {described(quality)}")
-        print(f"written: {path}" if path else "nothing is written; name a file with -o")
+        tell(f"of {folder}: {described(quality)}")
+        tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK
 
 
@@ -261,17 +261,17 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
             "chosen": None if chosen is None else {"mesh": path, "solution": solution, **asdict(quality[chosen])},
             "seconds": round(seconds, 3),
         }
-        print(json.dumps(summary, indent=2))
+        tell(json.dumps(summary, indent=2))
         return
     if output.quiet:
         return
     few, many = quality[-1], quality[0]
-    print(f"{grid.name}: {grid.shape[0]:,} x {grid.shape[1]:,} samples, thinned tile by tile")
-    print(
+    tell(f"{grid.name}: {grid.shape[0]:,} x {grid.shape[1]:,} samples, thinned tile by tile")
+    tell(
         f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
         f"mean error {few.mean_error:.4g} to {many.mean_error:.4g} ({seconds:.1f} s)"
     )
     if chosen is not None:
-        print(f"chosen: {path} (solution {solution}): {described(quality[chosen])}")
+        tell(f"chosen: {path} (solution {solution}): {described(quality[chosen])}")
     written = len(list(out.glob("meshes/*")))
-    print(f"written: {out}: front.csv, nested.npz, front.png" + (f", {written} in meshes" if written else ""))
+    tell(f"written: {out}: front.csv, nested.npz, front.png" + (f", {written} in meshes" if written else ""))

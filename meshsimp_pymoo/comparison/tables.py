@@ -103,7 +103,7 @@ class Table:
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(self.columns)
-        writer.writerows([["" if c is None else _full(c) for c in row] for row in self.rows])
+        writer.writerows([[_inert(cell) for cell in row] for row in self.rows])
         return text.getvalue()
 
     def markdown(self) -> str:
@@ -385,6 +385,16 @@ def _setting(budget: str, scoring: str) -> str:
 def _spread(summary: Summary) -> str:
     mean = _rounded(summary.mean)
     return mean if math.isnan(summary.std) else f"{mean} ({summary.std:.2g})"
+
+
+# What a spreadsheet takes for the beginning of a formula.
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def _inert(cell: Cell) -> str:
+    """Return a cell that no spreadsheet takes for a formula: a name that begins like one is quoted by an apostrophe."""
+    text = "" if cell is None else _full(cell)
+    return f"'{text}" if isinstance(cell, str) and text[:1] in FORMULA else text
 
 
 def _full(cell: str | int | float) -> str:

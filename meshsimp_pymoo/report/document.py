@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.errors import printable
+
 __all__ = ["embedded_array", "embedded_faces", "html_document", "magma"]
 
 ASSETS = Path(__file__).with_name("assets")
@@ -60,8 +62,9 @@ def html_document(template: str, scripts: Sequence[str], data: Any, **values: An
         "base-uri 'none'; form-action 'none'"
     )
     environment = Environment(
-        loader=FileSystemLoader(ASSETS), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True
-    )
+        loader=FileSystemLoader(ASSETS), autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True,
+        finalize=lambda value: printable(value, keep="\n\t") if type(value) is str else value,
+    )  # fmt: skip
     return environment.get_template(template).render(
         policy=policy,
         style=Markup(style),

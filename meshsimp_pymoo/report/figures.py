@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.errors import printable
 from meshsimp_pymoo.surface.measures import MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, require_rules
 
@@ -351,7 +352,7 @@ def front_figure(
     marks: dict[str, Any] = {"knee": knee, "chosen": chosen, "marked": letters}
     plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
-    front.set_title(title or f"{PurePath(model.name).name}: {size}", loc="left")
+    front.set_title(title or f"{printable(PurePath(model.name).name)}: {size}", loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
     look: dict[str, Any] = {"exaggeration": view.exaggeration, "colour": model.attributes.get("color")}

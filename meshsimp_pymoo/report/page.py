@@ -8,7 +8,6 @@ numbers stay in the chart, an even selection keeps its meshes), and above DRAWN_
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -17,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
-from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.files import put_text
+from meshsimp_pymoo.errors import ResultError, printable
+from meshsimp_pymoo.files import as_argument, put_text
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
 from meshsimp_pymoo.settings import settings_of
@@ -140,10 +139,10 @@ def simplification_page(
         columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
     paint = model.attributes.get("color")
     exaggeration = float(f"{view.exaggeration:.2g}")
-    source = str(front.run["model"]["name"])  # as it was called when the front was made
+    source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
-        "folder": shlex.quote(os.fspath(folder)),
+        "folder": printable(as_argument(folder)),
         "measure": problem.objectives[0],
         "measures": [{"name": name, **spoken(measure)} for name, measure in MEASURES.items()],
         "columns": columns,

@@ -122,7 +122,7 @@ def thinning(
     return NestedFront(
         np.flatnonzero(sites),
         removed[:n_removed][::-1].copy(),
-        error_of(surface, error[: n_removed + 1][::-1].copy()),
+        error_of(surface, _not_below_0(error[: n_removed + 1])[::-1].copy()),
         triangles[: n_removed + 1][::-1].copy(),
         n_all,
     )
@@ -182,10 +182,15 @@ def greedy_insertion(
     return NestedFront(
         sites,
         inserted[:n_inserted],
-        error_of(surface, error[: n_inserted + 1]),
+        error_of(surface, _not_below_0(error[: n_inserted + 1])),
         triangles[: n_inserted + 1],
         n_all,
     )
+
+
+def _not_below_0(error: np.ndarray) -> np.ndarray:
+    """Return running sums of costs without what rounding leaves of them below 0, where nothing costs anything."""
+    return np.maximum(error, 0.0)
 
 
 def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:

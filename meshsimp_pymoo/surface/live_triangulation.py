@@ -148,7 +148,8 @@ class LiveTriangulation:
 
     def _total(self) -> float:
         """Return the sum of the costs."""
-        return float(self.live.amount.sum()) if self.triangles else np.inf
+        # what rounding may leave below 0 is nothing
+        return max(float(self.live.amount.sum()), 0.0) if self.triangles else np.inf
 
     def _measured(self, change: float, triangles: int) -> tuple[float, int]:
         """Turn a change of the sum of costs into one of the error."""

@@ -22,6 +22,8 @@ from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
 from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
 
+# What weights may add up to: their products with squares of deviations are numbers then.
+MOST_WEIGHT = 1e100
 # Lazy attributes of a model that do not depend on its weights.
 GEOMETRY_ONLY = ("neighbours", "border", "footprint", "hull")
 
@@ -191,6 +193,11 @@ class OpenModel:
             )
         if not values.any():
             raise ModelError(f"{self.name}: all {len(values)} {label} are 0; nothing would count")
+        if not values.sum() <= MOST_WEIGHT:
+            raise ModelError(
+                f"{self.name}: the {len(values)} {label} add up to {values.sum():g}, beyond {MOST_WEIGHT:g}; "
+                "divide them all by one number"
+            )
         weighted = dataclasses.replace(self, weights=values)
         # What was found out about the geometry holds for this one too.
         weighted.__dict__.update({key: self.__dict__[key] for key in GEOMETRY_ONLY if key in self.__dict__})

@@ -31,7 +31,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError, reason_of
-from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
+from meshsimp_pymoo.files import draw_into, left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import (
@@ -70,7 +70,7 @@ def write_tiled_front(
     chosen: int | None = None,
     piece_size: int | None = None,
     run: Mapping[str, Any] | None = None,
-    extra: Callable[[Path], None] | None = None,
+    drawings: Mapping[str, Callable[[Path], object]] | None = None,
 ) -> Path:
     """Write a tiled front in place of the folder's unfinished tiles, all or nothing.
 
@@ -90,8 +90,8 @@ def write_tiled_front(
         Write the chosen mesh in pieces of about so many samples a side, as ``chosen/ROW_COLUMN`` and the suffix.
     run : mapping, optional
         What to record in run.json beside versions and grid.
-    extra : callable, optional
-        Called with the unfinished folder before it is put in place, to add files to it (a figure, say).
+    drawings : mapping of str to callable, optional
+        Pictures by name, made once all else is written; see :func:`~meshsimp_pymoo.storage.write_front`.
 
     Raises
     ------
@@ -153,8 +153,7 @@ def write_tiled_front(
         }
         text = json.dumps(record, indent=2, allow_nan=False)
         (partial / "run.json").write_text(text + "\n", encoding="utf-8")
-        if extra is not None:
-            extra(partial)
+        draw_into(partial, drawings or {})
     return Path(folder)
 
 

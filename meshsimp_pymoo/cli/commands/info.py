@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo import datasets
     from meshsimp_pymoo.cli.arguments import settings_from
     from meshsimp_pymoo.cli.preparing import said_when_compiling
-    from meshsimp_pymoo.cli.terminal import OK
+    from meshsimp_pymoo.cli.terminal import OK, tell
     from meshsimp_pymoo.formats.options import Options
 
     if args.model is not None:
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
             return _describe(args.model, settings_from(args, Options), as_json=args.json)
 
     lines = datasets.describe()
-    print(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
+    tell(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
     return OK
 
 
@@ -57,7 +57,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
 
     import numpy as np
 
-    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
+    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.opening import open_source
     from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
@@ -102,10 +102,11 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         }
     rows["verdict"] = "refused" if refusal else "usable: an open height field"
     if as_json:
-        print(json.dumps(content | {"refusal": refusal}, indent=2))
+        tell(json.dumps(content | {"refusal": refusal}, indent=2))
     else:
-        print(source.name)
-        print("\n".join(f"  {label:<16}{text}" for label, text in rows.items()))
+        tell(source.name)
+        for label, text in rows.items():
+            tell(f"  {label:<16}{text}")
     if refusal:
         say(refusal)
         return BAD_INPUT

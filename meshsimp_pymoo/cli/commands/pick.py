@@ -80,7 +80,7 @@ def _pick(
     from dataclasses import asdict
 
     from meshsimp_pymoo.cli.arguments import numbered
-    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say
+    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say, tell
     from meshsimp_pymoo.front import Front
 
     front = Front.load(folder, model=model)
@@ -96,8 +96,8 @@ def _pick(
         solution.save(path, overwrite=overwrite)
     if as_json:
         mesh = None if path is None else str(path)
-        print(json.dumps({"mesh": mesh, "solution": solution.solution, **asdict(solution.quality)}, indent=2))
+        tell(json.dumps({"mesh": mesh, "solution": solution.solution, **asdict(solution.quality)}, indent=2))
     elif not quiet:
-        print(f"solution {solution.solution} of {folder}: {described(solution.quality)}")
-        print(f"written: {path}" if path else "nothing is written; name a file with -o")
+        tell(f"solution {solution.solution} of {folder}: {described(solution.quality)}")
+        tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK

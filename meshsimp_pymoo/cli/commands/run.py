@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
     from meshsimp_pymoo.cli.preparing import compile_first
     from meshsimp_pymoo.cli.reporting import report_on_experiment
-    from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say
+    from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say, tell
     from meshsimp_pymoo.comparison.config import read_experiment_file
     from meshsimp_pymoo.comparison.runner import run_experiment
     from meshsimp_pymoo.warming import SEARCH
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
             )
         seconds = time.perf_counter() - start
         if not (args.quiet or args.json):
-            print(f"{out}: {done.finished:,} runs done in {seconds:.0f} s, {done.reused:,} were there already")
+            tell(f"{out}: {done.finished:,} runs done in {seconds:.0f} s, {done.reused:,} were there already")
         facts = {"finished": done.finished, "reused": done.reused, "seconds": round(seconds, 3)}
         return report_on_experiment(out, facts, quiet=args.quiet, as_json=args.json)
     except KeyboardInterrupt:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
     from meshsimp_pymoo.cli.arguments import settings_from
     from meshsimp_pymoo.cli.preparing import said_when_compiling
-    from meshsimp_pymoo.cli.terminal import OK
+    from meshsimp_pymoo.cli.terminal import OK, tell
     from meshsimp_pymoo.files import claim_file
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.surface.rules import Rules
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     options, rules = settings_from(args, Options), settings_from(args, Rules)
     with said_when_compiling(quiet=False):
         summary, lines = _scored(args.model, options, rules, args.outside, args.other, args.front, path)
-    print(json.dumps(summary, indent=2) if args.json else "\n".join(lines))
+    tell(json.dumps(summary, indent=2) if args.json else "\n".join(lines))
     return OK
 
 

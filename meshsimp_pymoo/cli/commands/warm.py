@@ -31,7 +31,7 @@ def run(args: argparse.Namespace) -> int:
     import time
 
     from meshsimp_pymoo.cli.preparing import compile_first
-    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say
+    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.compiling.store import place
     from meshsimp_pymoo.warming import PARTS, missing
 
@@ -48,8 +48,8 @@ def run(args: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     if args.json:
         summary = {"folder": str(found.folder), "compiled": parts, "parts": len(PARTS), "seconds": round(seconds, 3)}
-        print(json.dumps(summary, indent=2))
+        tell(json.dumps(summary, indent=2))
     elif not args.quiet:
         done = f"compiled in {seconds:.0f} s" if parts else "all compiled already"
-        print(f"{done}: {found.folder}")
+        tell(f"{done}: {found.folder}")
     return OK

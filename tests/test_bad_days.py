@@ -1,0 +1,182 @@
+"""What surrounds a search may be in any state: names, streams, signals, pictures. Its results are there even so."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import meshsimp_pymoo.report.figures
+import meshsimp_pymoo.report.page
+from meshsimp_pymoo import Front, LiveTriangulation, MeshProblem, greedy_insertion, thinning
+from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.comparison.tables import Table
+from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ModelError, PictureWarning
+from meshsimp_pymoo.formats.table import write_mesh
+from meshsimp_pymoo.storage import read_front
+
+PROGRAM = (sys.executable, "-m", "meshsimp_pymoo")
+QUICK = ("--generations", "2", "--population", "8", "--algorithm", "nsga2_v1")
+needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="file names, streams and signals are others there")
+
+
+@pytest.fixture
+def roof(tmp_path):
+    path = tmp_path / "roof.ply"
+    mesh = load("roof:5")
+    write_mesh(path, mesh.points, mesh.faces)
+    return path
+
+
+# ------------------------------------------------------------------------------------------------ pictures
+
+
+@pytest.mark.parametrize(("module", "function", "file"), [
+    (meshsimp_pymoo.report.figures, "front_figure", "front.png"),
+    (meshsimp_pymoo.report.page, "simplification_page", "report.html"),
+])  # fmt: skip
+@pytest.mark.parametrize("problem", [ValueError("no such\nfont"), MemoryError(), OSError(28, "No space left")])
+def test_a_picture_that_fails_costs_a_line_and_none_of_the_results(
+    tmp_path, monkeypatch, capsys, module, function, file, problem
+):
+    def fail(*_, **__):
+        raise problem
+
+    monkeypatch.setattr(module, function, fail)
+    assert main(["simplify", "roof:5", "-o", str(tmp_path / "out"), *QUICK]) == 0
+    err = capsys.readouterr().err
+    assert err.startswith(f"meshsimp: warning: {file} could not be made (")
+    assert err.count("\n") == 1
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"front.png", "report.html"} - names == {file}
+    assert len(Front.load(tmp_path / "out")) > 1
+    assert any((tmp_path / "out" / "meshes").iterdir())
+
+
+def test_in_python_it_is_a_warning(tmp_path, monkeypatch):
+    front = Front.from_subsets(problem := MeshProblem("roof:5"), np.ones((1, problem.n_var), bool), ends=True)
+    monkeypatch.setattr(meshsimp_pymoo.report.figures, "front_figure", None)
+    with pytest.warns(PictureWarning, match=r"front\.png could not be made"):
+        front.save(tmp_path / "out")
+    assert read_front(tmp_path / "out").F.shape == front.F.shape
+
+
+# ------------------------------------------------------------------------------------------------ names
+
+
+@needs_posix
+def test_a_name_that_is_not_unicode_costs_nothing(tmp_path, roof):
+    name = os.fsencode(tmp_path) + b"/b\xe4d.ply"
+    shutil.copy(roof, name)
+    command = [*PROGRAM, "simplify", name, "-o", str(tmp_path / "out"), *QUICK]
+    done = subprocess.run(command, capture_output=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"b\\udce4d.ply: 25 vertices" in done.stdout
+    assert {"front.csv", "front.png", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    assert b"b\\udce4d.ply" in (tmp_path / "out" / "report.html").read_bytes()
+    assert len(Front.load(tmp_path / "out")[0].faces) > 0  # the model is found again
+
+
+@needs_posix
+def test_any_name_can_be_shown_in_the_c_locale(tmp_path, roof):
+    path = roof.with_name("Gelände 中.ply")
+    roof.rename(path)
+    environment = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    command = [*PROGRAM, "simplify", os.fsencode(path), "-o", str(tmp_path / "out"), *QUICK]
+    done = subprocess.run(command, capture_output=True, env=environment, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+@needs_posix
+def test_a_terminal_obeys_no_name(tmp_path, roof, capsys):
+    path = roof.with_name("a\x1b[31m\x07.ply")
+    roof.rename(path)
+    assert main(["simplify", str(path), "-o", str(tmp_path / "out"), *QUICK]) == 0
+    assert main(["info", str(path)]) == 0
+    assert main(["simplify", str(path) + "\x1b]0;x\x07", *QUICK]) == 2
+    said = capsys.readouterr()
+    assert "\x1b" not in said.out + said.err
+    assert r"a\x1b[31m\x07.ply" in said.out
+    assert "\x1b" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_folder_that_looks_like_an_option_is_named_as_a_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["simplify", "roof:5", "--output=-o", *QUICK]) == 0
+    hint = capsys.readouterr().out.splitlines()[-1]
+    assert hint.startswith("take one of them: meshsimp pick ./-o --triangles ")
+    assert main(hint.partition("meshsimp ")[2].split()) == 0
+
+
+def test_no_cell_of_a_table_is_a_formula():
+    table = Table("t", "t", ("name", "x"), (("=1+1", -2.0), ("@SUM(1)", 1), ("-2+3", None), ("plain", -0.5), ("", 0)))
+    assert table.csv().splitlines() == ["name,x", "'=1+1,-2.0", "'@SUM(1),1", "'-2+3,", "plain,-0.5", ",0"]
+
+
+# ------------------------------------------------------------------------------------------------ streams
+
+
+@needs_posix
+@pytest.mark.parametrize(("streams", "code"), [(">&-", 0), ("2>&-", 0), (">&- 2>&-", 0), (">/dev/full", 2)])
+def test_results_do_not_depend_on_the_standard_streams(tmp_path, streams, code):
+    if "full" in streams and not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    command = f"exec '{sys.executable}' -m meshsimp_pymoo simplify roof:5 -o out {' '.join(QUICK)} {streams}"
+    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "out" / "report.html").is_file()
+    if code:
+        assert done.stderr.startswith("meshsimp: the results are in place, but cannot be printed (")
+
+
+# ------------------------------------------------------------------------------------------------ signals
+
+
+@needs_posix
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):
+    command = [*PROGRAM, "simplify", "jacksboro:20", "--time", "10min", "-o", str(tmp_path / "out"), "--json"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        time.sleep(4)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == code, err
+    assert err.startswith("meshsimp: interrupted after ")
+    assert json.loads(out)["solutions"] == len(read_front(tmp_path / "out").F) > 10
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["interrupted"]
+
+
+# ------------------------------------------------------------------------------------------------ numbers
+
+
+def test_no_error_is_negative_on_grids_of_whole_numbers_with_holes(tmp_path):
+    rng = np.random.default_rng(7)
+    for _ in range(12):
+        heights = rng.integers(0, 40, rng.integers(4, 14, 2)).astype(float)
+        heights[: rng.integers(1, 3), : rng.integers(1, 3)] = np.nan
+        np.save(tmp_path / "grid.npy", heights)
+        problem = MeshProblem(tmp_path / "grid.npy", outside=("nearest", "ignore")[int(rng.integers(2))])
+        surface = problem.surface
+        for front in (thinning(surface), greedy_insertion(surface)):
+            assert (front.error >= 0).all()
+        live = LiveTriangulation(surface, np.ones(problem.n_var, bool))
+        for vertex in rng.permutation(np.flatnonzero(~problem.pinned))[:10]:
+            live.remove(int(vertex))
+            live.insert(int(vertex))
+            assert live.error >= 0
+
+
+def test_weights_whose_total_is_no_number_are_refused_before_the_search():
+    with pytest.raises(ModelError, match=r"weights add up to 9e\+307, beyond 1e\+100; divide them all by one number"):
+        MeshProblem("roof:3", weights=np.full(9, 1e307))
