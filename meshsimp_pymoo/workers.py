@@ -158,7 +158,12 @@ class Processes:
                         item = again.pop(0) if again else next(source, None)
                         if item is None:
                             break
-                        running[self._ready(shared).submit(_do, work, item[1])] = item
+                        try:
+                            future = self._ready(shared).submit(_do, work, item[1])
+                        except BrokenProcessPool:  # a death is met here too: the task is not lost with it
+                            again.insert(0, item)
+                            raise
+                        running[future] = item
                     if not running:
                         complete = True
                         return

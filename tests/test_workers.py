@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 
@@ -77,6 +79,22 @@ def test_the_tasks_of_a_worker_that_dies_are_done_again(name, request, tmp_path)
     marker = str(tmp_path / "died")
     assert dict(request.getfixturevalue(name).each(die_once, range(8), (marker, 2))) == {k: k for k in range(8)}
     assert (tmp_path / "died").exists()
+
+
+@pytest.mark.parametrize("nth", [3, 5, 8])
+def test_a_death_that_is_met_when_a_task_is_handed_over_loses_no_task(monkeypatch, nth):
+    handed = []
+
+    def submit(pool, work, *arguments):
+        handed.append(work)
+        if len(handed) == nth:
+            raise BrokenProcessPool("a worker has died meanwhile")
+        return whole(pool, work, *arguments)
+
+    whole = ProcessPoolExecutor.submit
+    monkeypatch.setattr(ProcessPoolExecutor, "submit", submit)
+    with Processes(2) as engine:
+        assert sorted(engine.each(square, range(9), 0)) == [(k, k**2) for k in range(9)]
 
 
 def test_a_task_that_kills_every_worker_is_named(processes):
