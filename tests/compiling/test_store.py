@@ -127,7 +127,9 @@ def run_where_nothing_can_be_written(tmp_path, n, *command):
 
 def assert_said(done, n):
     assert done.returncode == 0, done.stderr
-    assert done.stderr.count("\n") == 2  # that it is compiling, and where that is kept
+    # that it is compiling, and where that is kept; matplotlib, which has no place either, says so and may draw nothing
+    own = [line for line in done.stderr.splitlines() if line.startswith("meshsimp: ")]
+    assert len([line for line in own if "could not be made" not in line]) == 2
     assert ("compiled code can be kept nowhere" if n == 3 else "compiled code is kept in ") in done.stderr
     assert ("NUMBA_CACHE_DIR" in done.stderr) == (n == 3)
 
