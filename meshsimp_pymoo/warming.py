@@ -50,29 +50,15 @@ def _square() -> Any:
     import numpy as np
 
     from meshsimp_pymoo.surface.height import HeightSurface
-    from meshsimp_pymoo.surface.model import OpenModel
+    from meshsimp_pymoo.surface.model import placed_model
     from meshsimp_pymoo.surface.rules import Rules
 
     x, y = np.meshgrid([0.0, 0.5, 1.0], [0.0, 0.5, 1.0])
     points = np.column_stack([x.ravel(), y.ravel(), [0.0, 0.1, 0.3, 0.2, 0.9, 0.1, 0.4, 0.2, 0.0]])
     a = np.array([0, 1, 3, 4])
-    faces = np.concatenate([np.column_stack([a, a + 1, a + 4]), np.column_stack([a, a + 4, a + 3])]).astype(np.int32)
-    model = OpenModel(
-        name="square",
-        points=points,
-        faces=faces,
-        corners=np.array([0, 2, 6, 8]),
-        source_index=np.arange(9),
-        file_points=points,
-        attributes={},
-        up=np.array([0.0, 0.0, 1.0]),
-        rotation=np.eye(3),
-        pivot=np.zeros(3),
-        offset=np.zeros(3),
-        xy=np.ascontiguousarray(points[:, :2]),
-        unit=1.0,
-        weights=None,
-    )
+    faces = np.concatenate([np.column_stack([a, a + 1, a + 4]), np.column_stack([a, a + 4, a + 3])])
+    corners, rows = np.array([0, 2, 6, 8]), np.arange(9)
+    model = placed_model("square", points, faces, corners, xy=points[:, :2], unit=1.0, source_index=rows)
     return HeightSurface(model, Rules(footprint="hull", outside="nearest"))
 
 
@@ -115,13 +101,13 @@ def _thinning() -> None:
 def _moves() -> None:
     import numpy as np
 
-    from meshsimp_pymoo.search.local_search import USUAL_MOVES, _anneal, _fit
+    from meshsimp_pymoo.search.local_search import USUAL_MOVES, anneal, fit_size
 
     surface = _square()
     records, n, rows, state = _records(surface), surface.n_vertices, np.zeros(9, np.int64), np.zeros(1, np.uint64)
     graph, shares, stop = (surface.border, *surface.neighbours), tuple(map(float, USUAL_MOVES)), np.zeros(1, np.bool_)
-    _compile_for(_anneal, *records, n, rows, n, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows)
-    _compile_for(_fit, *records, n, surface.pinned, True, 8, state)
+    _compile_for(anneal, *records, n, rows, n, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows)
+    _compile_for(fit_size, *records, n, surface.pinned, True, 8, state)
 
 
 def _insertion() -> None:
@@ -158,7 +144,7 @@ def _folds() -> None:
     import numpy as np
 
     from meshsimp_pymoo.formats.source import build_source
-    from meshsimp_pymoo.surface.orient import _hidden_faces, front_patch
+    from meshsimp_pymoo.surface.orient import front_patch, hidden_faces
 
     # a sheet that turns back over itself: it has a front and a back, and hides a part
     x, z = np.array([0.0, 2.0, 3.0, 2.0, 0.5]), np.array([0.0, 0.0, 0.5, 1.0, 1.0])
@@ -167,7 +153,7 @@ def _folds() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # says what is left out
         front_patch(build_source(points, faces, name="sheet"), up="z")
-    _hidden_faces(points, np.concatenate([faces[:4], faces[4:, ::-1]]))
+    hidden_faces(points, np.concatenate([faces[:4], faces[4:, ::-1]]))
 
 
 def _files() -> None:
@@ -195,7 +181,7 @@ PARTS = (
     Part("evaluation", ("surface.evaluate:_evaluate",), _evaluation, 5.2, False),
     Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 4.6, False),
     Part("thinning", ("search.greedy:thin",), _thinning, 9.0, True),
-    Part("moves", ("search.local_search:_anneal", "search.local_search:_fit"), _moves, 3.4, True),
+    Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 3.4, True),
     Part("insertion", ("search.greedy:_grow",), _insertion, 1.5, True),
     Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 2.0, True),
     Part(

@@ -32,6 +32,8 @@ from meshsimp_pymoo.errors import CodeWarning, reason_of
 
 PACKAGE = __name__.partition(".")[0]
 HERE = Path(__file__).resolve().parent.parent
+# Files that decide what any function is made into: their functions make code, which none of its callers shows.
+HOW = ("compiling.functions", "compiling.linking", "plane.borrow", "plane.predicates")
 
 
 # ------------------------------------------------------------------------------------------------------------ the place
@@ -143,7 +145,17 @@ def made_from(function: Any) -> str:
         elif isinstance(item, (bool, int, float, str, tuple)):
             found.append(repr(item))
     # the order in which they are found follows from the names in the code
-    return hashlib.sha256("\n".join([llvmlite.__version__, *found]).encode()).hexdigest()
+    how = [llvmlite.__version__, *map(_text, HOW)]
+    return hashlib.sha256("\n".join([*how, *found]).encode()).hexdigest()
+
+
+@cache
+def _text(module: str) -> str:
+    """Return the source of a file of the package; nothing where there is none to read."""
+    try:
+        return Path(__file__).resolve().parents[1].joinpath(*module.split(".")).with_suffix(".py").read_text("utf-8")
+    except OSError:
+        return ""
 
 
 # ------------------------------------------------------------------------------------------------------------ the cache
@@ -191,6 +203,11 @@ class _Files(FunctionCache):
     def __init__(self, function: Any, folder: Path) -> None:
         self._impl_class = type("_Impl", (CompileResultCacheImpl,), {"_locator_classes": (_Locators(folder),)})
         super().__init__(function)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """Return what code is found by: types and machine, and which member of a record is which."""
+        records = (getattr(kind, "instance_class", None) for kind in getattr(sig, "args", sig))
+        return (*super()._index_key(sig, codegen), tuple(getattr(record, "_fields", ()) for record in records))
 
     def keys(self) -> Any:
         """Return for what types and machines there is code."""

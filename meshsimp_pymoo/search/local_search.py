@@ -104,7 +104,7 @@ def _copy(to: np.ndarray, values: np.ndarray, n: int) -> None:
 
 
 @entry
-def _anneal(
+def anneal(
     ground: Any,
     books: Any,
     n: int,
@@ -197,7 +197,7 @@ def _anneal(
 
 
 @entry
-def _fit(
+def fit_size(
     ground: Any, books: Any, n: int, fixed: np.ndarray, by_triangles: bool, wanted: int, state: np.ndarray
 ) -> None:
     """Drop or add vertices, each the best of a few drawn, to ``wanted`` triangles or sites, or just below."""
@@ -304,11 +304,11 @@ def relocate(
     state = np.array([seed], np.uint64)
     with surface.books(kept | pinned) as books:
         if size is not None:
-            _fit(ground, books, n, pinned, False, size, state)
+            fit_size(ground, books, n, pinned, False, size, state)
         if triangles is not None:
             if snapshot(ground, books, n)[2] > triangles:
                 _thin_to(ground, books, pinned, triangles)
-            _fit(ground, books, n, pinned, True, triangles, state)
+            fit_size(ground, books, n, pinned, True, triangles, state)
         result: BoolArray
         result, total, n_now = snapshot(ground, books, n)
         rows = np.flatnonzero(result & ~pinned)
@@ -316,7 +316,7 @@ def relocate(
             movable = np.empty(n, np.int64)
             movable[: len(rows)] = rows
             best = np.empty(n, np.int64)
-            n_best = _anneal(
+            n_best = anneal(
                 ground,
                 books,
                 n,

@@ -218,6 +218,56 @@ class OpenModel:
         return {name: value for name, value in self.__dict__.items() if name not in lazy}
 
 
+def placed_model(
+    name: str,
+    points: FloatArray,
+    faces: IntArray,
+    corners: IntArray,
+    *,
+    xy: FloatArray,
+    unit: float,
+    source_index: IntArray,
+    weights: FloatArray | None = None,
+) -> OpenModel:
+    """Return a model of arrays that are upright and in vector order already, without a look at them.
+
+    Parameters
+    ----------
+    name : str
+        For messages.
+    points : (N, 3) float array
+        The vertices [model units].
+    faces : (T, 3) int array
+        The triangles, counter-clockwise.
+    corners : (C,) int array
+        Rows of the corners.
+    xy : (N, 2) float array
+        The vertices in the unit square.
+    unit : float
+        Side of the unit square [model units].
+    source_index : (N,) int array
+        Row of each vertex in whatever they come from.
+    weights : (N,) float array, optional
+        See :class:`OpenModel`.
+    """
+    return OpenModel(
+        name=name,
+        points=points,
+        faces=faces.astype(np.int32),
+        corners=np.sort(corners).astype(np.int64),
+        source_index=source_index,
+        file_points=points,
+        attributes={},
+        up=np.array([0.0, 0.0, 1.0]),
+        rotation=np.eye(3),
+        pivot=np.zeros(3),
+        offset=np.zeros(3),
+        xy=np.ascontiguousarray(xy),
+        unit=unit,
+        weights=weights,
+    )
+
+
 def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
     """Turn a source mesh upright, check that it is an open height field and put it in vector order."""
     used = np.zeros(len(source.points), bool)

@@ -75,7 +75,7 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
 
 
 def _unanswered() -> Any:
-    raise NotImplementedError("a question of a surface is answered in compiled loops only")
+    raise TypeError("a surface answers this inside compiled functions only; ask in a function compiled with numba.njit")
 
 
 def total_cost(ground: Any, books: Any) -> float:

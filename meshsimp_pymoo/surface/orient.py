@@ -326,7 +326,7 @@ def surface_facts(source: SourceMesh, upright: FloatArray) -> SurfaceFacts:
     folded = ~vertical & (normals[:, 2] < 0)
     facing = np.flatnonzero(~vertical & ~folded)
     hidden = np.zeros(len(faces), bool)
-    hidden[facing[_hidden_faces(upright, faces[facing])]] = True
+    hidden[facing[hidden_faces(upright, faces[facing])]] = True
 
     edges = _Edges.of(faces)
     nonmanifold = np.flatnonzero(edges.counts > 2)
@@ -445,7 +445,7 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
             f"another viewing side with --up"
         )
     patch = _largest_part(faces, facing, height)
-    hidden = _hidden_faces(points, faces[patch])
+    hidden = hidden_faces(points, faces[patch])
     if len(hidden):
         patch = _largest_part(faces, np.delete(patch, hidden), height)
     used, renumbered = np.unique(faces[patch], return_inverse=True)
@@ -621,7 +621,7 @@ def _largest_part(faces: IntArray, chosen: IntArray, weight: FloatArray) -> IntA
 # ------------------------------------------------------------ what lies above what
 
 
-def _hidden_faces(points: FloatArray, faces: IntArray) -> IntArray:
+def hidden_faces(points: FloatArray, faces: IntArray) -> IntArray:
     """Return the faces below others, of faces that all show their front (rows of `faces`, ascending)."""
     if len(faces) == 0:
         return np.empty(0, np.int64)

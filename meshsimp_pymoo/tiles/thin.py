@@ -27,7 +27,7 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.greedy import thin
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.live import END
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.model import OpenModel, placed_model
 from meshsimp_pymoo.surface.rules import Rules
 
 # Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
@@ -215,21 +215,9 @@ def _model(
     """Return the tile as a model: the arrays that triangulating needs, and two faces for its extent."""
     points = np.column_stack([xy * tile.unit, z])
     a, b, c, d = corners[np.lexsort((xy[corners, 0], xy[corners, 1]))]
-    return OpenModel(
-        name=tile.name,
-        points=points,
-        faces=np.array([[a, b, d], [a, d, c]], np.int32),
-        corners=np.sort(corners).astype(np.int64),
-        source_index=number,
-        file_points=points,
-        attributes={},
-        up=np.array([0.0, 0.0, 1.0]),
-        rotation=np.eye(3),
-        pivot=np.zeros(3),
-        offset=np.zeros(3),
-        xy=np.ascontiguousarray(xy),
-        unit=tile.unit,
-        weights=weight,
+    faces = np.array([[a, b, d], [a, d, c]])
+    return placed_model(
+        tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight
     )
 
 

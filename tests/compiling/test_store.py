@@ -6,7 +6,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from numba.core.caching import IndexDataCacheFile
@@ -180,6 +182,33 @@ def test_code_of_a_loop_is_made_from_the_answers_of_the_surfaces(monkeypatch):
     known = made_from(thin.py_func)
     monkeypatch.setattr(live, "MOST", live.MOST + 1)
     assert made_from(thin.py_func) != known
+
+
+def test_code_is_made_from_how_it_is_made(monkeypatch):
+    known, texts = made_from(thin.py_func), {module: store._text(module) for module in store.HOW}
+    for module, text in texts.items():
+        assert "numba" in text
+        with monkeypatch.context() as patched:
+            patched.setattr(store, "_text", (texts | {module: "another"}).__getitem__)
+            assert made_from(thin.py_func) != known
+
+
+def test_code_for_a_record_is_found_by_the_order_of_its_members(kept):
+    """Compiled code knows them by their places; their types may be the same in another order."""
+
+    class One(NamedTuple):
+        x: float
+        y: float
+
+    class Other(NamedTuple):
+        y: float
+        x: float
+
+    function = kept()
+    loaded(function)
+    files, codegen = function._cache.files[-1], function.targetctx.codegen()
+    one, other = (files._index_key((numba.typeof(record(1.0, 2.0)),), codegen)[-1] for record in (One, Other))
+    assert (one, other) == ((("x", "y"),), (("y", "x"),))
 
 
 # ------------------------------------------------------------------------------------------------------- bad days
