@@ -53,9 +53,12 @@ def test_a_picture_that_fails_costs_a_line_and_none_of_the_results(
 
     monkeypatch.setattr(module, function, fail)
     assert main(["simplify", "roof:5", "-o", str(tmp_path / "out"), *QUICK]) == 0
-    err = capsys.readouterr().err
-    assert err.startswith(f"meshsimp: warning: {file} could not be made (")
-    assert err.count("\n") == 1
+    said = capsys.readouterr()
+    assert said.err.startswith(f"meshsimp: warning: {file} could not be made (")
+    assert said.err.count("\n") == 1
+    (written,) = (line for line in said.out.splitlines() if line.startswith("written: "))
+    assert file not in written
+    assert "front.csv" in written
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"front.png", "report.html"} - names == {file}
     assert len(Front.load(tmp_path / "out")) > 1

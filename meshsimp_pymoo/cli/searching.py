@@ -29,6 +29,7 @@ from meshsimp_pymoo.cli.terminal import (
     say,
     stop_if_interrupted,
     tell,
+    there,
 )
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
@@ -211,16 +212,16 @@ class Keeper:
         What is searched.
     request : Request
         How, where the results go, and whether old ones give way.
-    before : mapping, optional
+    before : mapping
         What was done before, and how long it took [s].
     """
 
-    def __init__(self, problem: MeshProblem, request: Request, before: Mapping[str, float] | None = None) -> None:
+    def __init__(self, problem: MeshProblem, request: Request, before: Mapping[str, float]) -> None:
         self.problem = problem
         self.request = request
         self.search = request.search
         self.output = request.output
-        self.before = dict(before or {})
+        self.before = before
         self.path = self.output.folder / CHECKPOINT
         self.is_held = False
         self._checkpoints: Checkpoints | None = None
@@ -244,7 +245,7 @@ class Keeper:
             "population": search.population,
             "seed": search.seed,
             **budget(search),
-            **({"refit": True} if self.output.refit else {}),  # takes a share of the time
+            **({"refit": True} if self.output.refit and search.time is not None else {}),  # takes a share of the time
             **{name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")},
         }
 
@@ -365,7 +366,9 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
     order = [rows[k] for k in spread(len(rows))]
     if chosen is not None:
         order = [chosen.solution, *(row for row in order if row != chosen.solution)]
-    until = None if limit is None or found.interrupted else time.perf_counter() + limit - found.seconds
+    until = None
+    if limit is not None:  # who interrupts a search does not want to wait for what it has not used
+        until = time.perf_counter() + (REFIT_SHARE * limit if found.interrupted else limit - found.seconds)
     fitted: dict[int, Refitted] = {}
     longest = 0.0
     with shown.stage("refitting", "refitting") as show:
@@ -428,8 +431,8 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
         tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
     written = len(list(folder.glob("meshes/*")))
     raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
-    page = ", report.html" if output.page else ""
-    tell(f"written: {folder}: front.csv, front.png{page}" + (f", {written} in meshes" if written else "") + raised)
+    files = there(folder, "front.csv", "front.png", "report.html")
+    tell(f"written: {folder}: {files}" + (f", {written} in meshes" if written else "") + raised)
     if (compiled := keeper.before["compile_seconds"]) >= 1.0:
         tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
     if any(origin):

@@ -17,6 +17,8 @@ from meshsimp_pymoo.errors import ResultError, printable, reason_of
 from meshsimp_pymoo.surface.measures import MEASURES
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import numpy as np
     import numpy.typing as npt
 
@@ -40,6 +42,7 @@ __all__ = [
     "say",
     "stop_if_interrupted",
     "tell",
+    "there",
     "warnings_as_lines",
 ]
 
@@ -247,6 +250,11 @@ def described(quality: Quality) -> str:
 def say(line: str) -> None:
     """Print one line on stderr."""
     print(f"meshsimp: {printable(line)}", file=sys.stderr)
+
+
+def there(folder: Path, *names: str) -> str:
+    """Return those names that are files of a folder, in a row: a picture may have failed."""
+    return ", ".join(name for name in names if (folder / name).is_file())
 
 
 def tell(lines: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 from meshsimp_pymoo.cli.arguments import numbered
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling, Wish
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say, tell
+from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say, tell, there
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, printable, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.options import Options
@@ -274,4 +274,5 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
     if chosen is not None:
         tell(f"chosen: {path} (solution {solution}): {described(quality[chosen])}")
     written = len(list(out.glob("meshes/*")))
-    tell(f"written: {out}: front.csv, nested.npz, front.png" + (f", {written} in meshes" if written else ""))
+    files = there(out, "front.csv", "nested.npz", "front.png")
+    tell(f"written: {out}: {files}" + (f", {written} in meshes" if written else ""))

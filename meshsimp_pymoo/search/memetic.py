@@ -323,14 +323,15 @@ def between_the_rungs(
         end = time.perf_counter() + seconds / 2.0
         measured = threads * seconds / 2.0 / (SECONDS_A_VERTEX * X.shape[1])
         most_rows = min(most_rows, max(int(measured / len(X)), 1))
-    longest = [0.0]
+    longest = 0.0
 
     def one(k: int) -> list[NDArray[np.bool_]]:
+        nonlocal longest
         begun = time.perf_counter()
-        if begun + longest[0] > end:
+        if begun + longest > end:
             return []
         rows = fill(k)
-        longest[0] = max(longest[0], time.perf_counter() - begun)
+        longest = max(longest, time.perf_counter() - begun)
         return rows
 
     def fill(k: int) -> list[NDArray[np.bool_]]:
