@@ -48,7 +48,7 @@ def test_moves_stop_after_their_time_without_that_of_compiling():
         while not stop[0]:
             assert time.perf_counter() - begun < 5
             time.sleep(0.005)
-    assert 0.25 < time.perf_counter() - begun < 1.0
+    assert 0.25 < time.perf_counter() - begun < 2.0
 
 
 def test_without_a_limit_nothing_stops():
@@ -65,7 +65,7 @@ def test_annealing_of_any_number_of_moves_ends_in_time():
     relocate_all(surface, X, np.ones(4, int), np.random.default_rng(1))  # compiles
     begun = time.perf_counter()
     found = relocate_all(surface, X, moves, np.random.default_rng(1), seconds=0.2)
-    assert time.perf_counter() - begun < 1.0
+    assert time.perf_counter() - begun < 3.0
     assert found.shape == X.shape
 
 
@@ -88,7 +88,7 @@ def test_searches_keep_their_time(algorithm):
     limit = ("time", 0.6) if algorithm is memetic else WholeGenerations(0.6)
     begun = time.perf_counter()
     result = minimize(problem, algorithm(20), limit, seed=1)
-    assert 0.3 < time.perf_counter() - begun < 0.9
+    assert 0.3 < time.perf_counter() - begun < 2.0
     assert len(result.F) > 5
 
 
