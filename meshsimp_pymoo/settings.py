@@ -232,8 +232,8 @@ class Setting(NamedTuple):
         What it means, for the shell.
     metavar : str
         What the shell's help calls its value; empty: the choices.
-    describes : str
-        The sort of model that it is for: "grid" or "cloud"; empty: any.
+    describes : tuple of str
+        The sorts of models that it is for, of "mesh", "grid" and "cloud"; empty: any.
     derived : bool
         Whether it follows from something else that the user says, and is only stored and read back.
     """
@@ -243,7 +243,7 @@ class Setting(NamedTuple):
     doc: str
     help: str
     metavar: str = ""
-    describes: str = ""
+    describes: tuple[str, ...] = ()
     derived: bool = False
 
 

@@ -43,7 +43,7 @@ class Options:
         doc="Sample distances of a height grid; by default what the file says, else 1 [units].",
         help="of the samples of a height grid",
         metavar="D|DX,DY",
-        describes="grid",
+        describes=("grid",),
     )
     nodata: float | None = setting(
         None,
@@ -52,7 +52,7 @@ class Options:
         doc="Height that means 'no sample' in a height grid, beside NaN; by default what the file says, else none.",
         help="height that means no sample in a height grid",
         metavar="Z",
-        describes="grid",
+        describes=("grid",),
     )
     window: Window | None = setting(
         None,
@@ -61,7 +61,7 @@ class Options:
         doc="The part of a height grid to take, from 0, as ``gdal_translate -srcwin`` has it.",
         help="the part of a height grid to take, from 0",
         metavar="COLUMN,ROW,COLUMNS,ROWS",
-        describes="grid",
+        describes=("grid",),
     )
     max_edge: float | None = setting(
         None,
@@ -72,7 +72,7 @@ class Options:
         help="longest edge of a triangle of a point cloud, in the plane: keeps bays of its outline and holes open "
         "(default: its convex hull is covered)",
         metavar="L",
-        describes="cloud",
+        describes=("cloud",),
     )
 
     def __post_init__(self) -> None:

@@ -263,9 +263,9 @@ def listed(words: Iterable[str]) -> str:
 
 
 def described(sort: str | None = None) -> list[str]:
-    """Return the settings of `Options` that describe this sort of model; None: that describe one sort alone."""
+    """Return the settings of `Options` that describe this sort of model; None: that describe some sorts alone."""
     known = settings_of(Options).items()
-    return [name for name, setting in known if setting.describes and sort in (None, setting.describes)]
+    return [name for name, setting in known if setting.describes and (sort is None or sort in setting.describes)]
 
 
 def are_given(names: Iterable[str], options: Options) -> bool:
@@ -283,8 +283,8 @@ def refuse_foreign(name: str, sort: str, options: Options) -> None:
         With the settings of that sort, and the suffixes of its files.
     """
     for other, title in SORTS.items():
-        names = described(other)
-        if other == sort or not are_given(names, options):
+        names = [known for known in described(other) if known not in described(sort)]
+        if not are_given(names, options):
             continue
         describe, leave = ("describe", "them") if len(names) > 1 else ("describes", "it")
         suffixes = " ".join(read_suffixes(other, further=False))
