@@ -866,11 +866,20 @@ def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
 def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
     before = _total(live)
     n = live.tally[N_EMITTED]
+    amount = live.amount
+    covered, bare, peak = amount[COVERED_ERROR], amount[BARE_ERROR], amount[PEAK]
+    amount[PEAK] = 0.0  # nothing is added up anew for a mere trial
     if not exchange(g, live, v, w):
+        amount[PEAK] = peak
         return np.inf, 0
     change = _total(live) - before
     n = live.tally[N_EMITTED] - n
+    amount[PEAK] = 0.0
     exchange(g, live, w, v)
+    # the sums are what they were, without the rounding of having come and gone
+    amount[COVERED_ERROR] = covered
+    amount[BARE_ERROR] = bare
+    amount[PEAK] = peak
     return change, n
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from samples import holey_grid, surface
+from samples import holey_grid, stepped_model, surface
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -40,9 +40,8 @@ SOURCES = {
     "turned": turned_grid,
     "face": lambda: load("face:150"),
     "horseshoe": lambda: load("horseshoe:120"),
-    "cliff": cliff,
 }
-MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()}
+MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()} | {"cliff": stepped_model(cliff())}
 
 
 def assert_as_from_scratch(live, footprint, outside, measure="error"):

@@ -14,11 +14,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
+
+# Fewer vertices leave nothing to simplify.
+LEAST_VERTICES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,9 @@ class SourceMesh:
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``transform``,
         ``window`` ...; plain data for run.json.
+    repeats : (R, 2) int64 array, optional
+        Rows of the file whose vertex repeats another one exactly, and the rows of those that they were merged into:
+        whoever names the former means the latter. Default none.
     """
 
     points: FloatArray
@@ -52,6 +58,7 @@ class SourceMesh:
     rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     up: str | tuple[float, float, float] | None = None
     georeference: dict[str, Any] = field(default_factory=dict)
+    repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
@@ -69,8 +76,17 @@ def build_source(
     rows: IntArray | None = None,
     up: str | tuple[float, float, float] | None = None,
     georeference: dict[str, Any] | None = None,
+    repeats: str = "said",
 ) -> SourceMesh:
     """Check arrays and make a :class:`SourceMesh` of them, whose fields the parameters are.
+
+    Vertices at exactly the same position are one: the first stays, with its attributes.
+
+    Parameters
+    ----------
+    repeats : {"said", "usual", "none"}
+        Whether a warning says how many vertices repeat another one, or that is usual (a format that lists the corners
+        of each face), or there are none and they are not looked for.
 
     Raises
     ------
@@ -81,7 +97,7 @@ def build_source(
     Warns
     -----
     ModelWarning
-        If faces that name a vertex twice were dropped; they have no area.
+        If vertices were merged, and if faces that then name a vertex twice, which have no area, were dropped.
     """
     xyz = check_points(points, name, rows)
     count = len(xyz)
@@ -101,6 +117,26 @@ def build_source(
             f"{tuple(triangles[first].tolist())}, of {count} vertices); the file is damaged, export it again"
         )
     triangles = triangles.astype(np.int64)
+    kept_attributes = {}
+    for key, values in (attributes or {}).items():
+        array = np.array(values)
+        if array.ndim == 0 or len(array) != count:
+            raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
+        kept_attributes[key] = array
+    merged = np.empty((0, 2), np.int64)
+    if repeats != "none":
+        leader = _leaders(xyz)
+        again = np.flatnonzero(leader != np.arange(count))
+        if len(again):
+            if repeats == "said":
+                _say_repeats(name, leader, again, kept_attributes)
+            own = np.flatnonzero(leader == np.arange(count))
+            place = np.empty(count, np.int64)
+            place[own] = np.arange(len(own))
+            merged = np.column_stack([rows[again], rows[leader[again]]])
+            triangles = place[leader[triangles]]
+            xyz, rows = xyz[own], rows[own]
+            kept_attributes = {key: array[own] for key, array in kept_attributes.items()}
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     if flat.all():
         raise ModelError(
@@ -109,13 +145,38 @@ def build_source(
     if flat.any():
         warn_of(f"{name}: {flat.sum()} of {len(triangles)} faces name a vertex twice and were dropped")
         triangles = triangles[~flat]
-    kept_attributes = {}
-    for key, values in (attributes or {}).items():
-        array = np.array(values)
-        if array.ndim == 0 or len(array) != count:
-            raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
-        kept_attributes[key] = array
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}))
+    if len(xyz) < LEAST_VERTICES:
+        raise ModelError(
+            f"{name}: has only {len(xyz)} different positions among {count} vertices; at least {LEAST_VERTICES} are "
+            "needed"
+        )
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), merged)
+
+
+def _leaders(points: FloatArray) -> IntArray:
+    """Return, for each point (V, 3), the first row at exactly its position."""
+    tidy = points + 0.0  # -0.0 and 0.0 are one position
+    order = np.lexsort(tidy.T)  # stable: within a group the rows ascend
+    ordered = tidy[order]
+    starts = np.ones(len(points), bool)
+    starts[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    leader = np.empty(len(points), np.int64)
+    leader[order] = order[starts][np.cumsum(starts) - 1]
+    return leader
+
+
+def _say_repeats(name: str, leader: IntArray, again: IntArray, attributes: Mapping[str, AnyArray]) -> None:
+    others = {key: int(_differ(array[again], array[leader[again]]).sum()) for key, array in attributes.items()}
+    lost = [f"{key} of {n}" for key, n in sorted(others.items()) if n]
+    rest = f"; where they differ in attributes ({', '.join(lost)}) the first one's stay" if lost else ""
+    repeat = f"{len(again)} of {len(leader)} vertices repeat the position of another one"
+    warn_of(f"{name}: {repeat} and were merged with it{rest}")
+
+
+def _differ(a: AnyArray, b: AnyArray) -> BoolArray:
+    """Tell which rows of two arrays differ; no number (NaN) is like no number."""
+    same = ((a == b) | ((a != a) & (b != b))).reshape(len(a), -1)
+    return np.logical_not(same.all(axis=1))
 
 
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:
@@ -124,8 +185,8 @@ def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise ModelError(f"{name}: vertices have the shape {xyz.shape}; give (V, 3)")
     count = len(xyz)
-    if count < 4:
-        raise ModelError(f"{name}: has {count} vertices; at least 4 are needed")
+    if count < LEAST_VERTICES:
+        raise ModelError(f"{name}: has {count} vertices; at least {LEAST_VERTICES} are needed")
     finite = np.isfinite(xyz).all(axis=1)
     if not finite.all():
         first = int(np.argmin(finite))

@@ -169,7 +169,8 @@ def grid_mesh(
         raise ModelError(
             f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
-    return build_source(points, faces, {}, name, rows=i * file_columns + j, up="z", georeference=georeference)
+    numbers = i * file_columns + j
+    return build_source(points, faces, {}, name, rows=numbers, up="z", georeference=georeference, repeats="none")
 
 
 def _warn_of_nodata(z: FloatArray, name: str) -> None:

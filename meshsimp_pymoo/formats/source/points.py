@@ -109,7 +109,7 @@ def cloud_source(
     place[rows] = np.arange(len(rows))
     values = {key: np.asarray(value)[rows] for key, value in (attributes or {}).items()}
     facts = dict(georeference or {}) | {"points": len(xyz), "same_place": n_twins, "max_edge": max_edge}
-    return build_source(xyz[rows], place[faces], values, name, rows=rows, up="z", georeference=facts)
+    return build_source(xyz[rows], place[faces], values, name, rows=rows, up="z", georeference=facts, repeats="none")
 
 
 def _delaunay(xy: FloatArray) -> IntArray:
