@@ -20,7 +20,7 @@ from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
-from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
+from meshsimp_pymoo.surface.orient import Up, open_faces, seen_upright, upright_rotation
 
 # What weights may add up to: their products with squares of deviations are numbers then.
 MOST_WEIGHT = 1e100
@@ -279,11 +279,11 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
             ModelWarning,
             stacklevel=3,
         )
-    direction = up_direction(source, up)
+    direction, facts = seen_upright(source, up)
     rotation = upright_rotation(direction)
     pivot = source.points[used].min(axis=0)
     upright = (source.points - pivot) @ rotation.T
-    faces, facts = check_open_surface(source, upright)
+    faces = open_faces(source, facts)
     rows = np.flatnonzero(used)
     upright = upright[rows]
     offset = upright.min(axis=0)
