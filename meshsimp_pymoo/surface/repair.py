@@ -18,9 +18,6 @@ from meshsimp_pymoo.surface.edges import Edges, components, next_corner, seams, 
 # Faces at edges of more than two are dropped up to this share of all: as many as may be folded over.
 DROPPED_SHARE = 0.01
 
-# Faces at one edge of which the flattest pair is sought; where more meet, among the largest.
-MOST_AT_EDGE = 16
-
 
 @dataclass(frozen=True)
 class Mended:
@@ -135,17 +132,19 @@ def _extra(points: FloatArray, edges: Edges) -> BoolArray:
 def _flattest(points: FloatArray, faces: IntArray, half: IntArray) -> IntArray:
     """Return the two half-edges, of those at one edge, whose faces continue each other best."""
     flat = faces.ravel()
-    start, end, tip = (points[flat[at]] for at in (half, next_corner(half), next_corner(next_corner(half))))
-    along = end[0] - start[0]
-    along = along / max(float(np.linalg.norm(along)), 1e-300)
-    away = tip - start
-    away = away - (away @ along)[:, None] * along
-    length = np.linalg.norm(away, axis=1)
-    some = np.argsort(-length, kind="stable")[:MOST_AT_EDGE]
-    away = away[some] / np.maximum(length[some], 1e-300)[:, None]
-    angle = np.triu(away @ away.T - 2, 1)  # of two of them; 0 for what is no pair
-    i, j = np.unravel_index(int(np.argmin(angle)), angle.shape)
-    return half[some[[i, j]]]
+    start, end = points[flat[half[0]]], points[flat[next_corner(half[:1])[0]]]
+    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-300)
+    across = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    across /= max(float(np.linalg.norm(across)), 1e-300)
+    away = points[flat[next_corner(next_corner(half))]] - start
+    angle = np.arctan2(away @ np.cross(along, across), away @ across)
+    by_angle = np.argsort(angle, kind="stable")
+    turn = np.concatenate([angle[by_angle], angle[by_angle] + 2 * np.pi])
+    # opposite each face: the one before and the one behind half a turn
+    behind = np.searchsorted(turn, turn[: len(half)] + np.pi)
+    pairs = [(abs(turn[k] - turn[i] - np.pi), i, k % len(half)) for i, n in enumerate(behind) for k in (n - 1, n)]
+    _, first, second = min(pair for pair in pairs if pair[1] != pair[2])
+    return half[by_angle[[first, second]]]
 
 
 def _turned(points: FloatArray, edges: Edges) -> BoolArray:
