@@ -46,6 +46,11 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
     TypeError
         If it is nothing of that kind.
 
+    Warns
+    -----
+    ModelWarning
+        Of what was mended, of what a patch leaves out and of what is doubtful, with the numbers.
+
     Examples
     --------
     >>> open_model("roof:3").n_vertices, len(open_model("roof:3").faces)
@@ -58,7 +63,11 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
                 f"{_given(options)} out, or give the file"
             )
         return model
-    return build_model(open_source(model, options), up=options.up)
+    source, mended = mended_source(model, options)
+    built = build_model(source, up=options.up)
+    if mended != Mended():
+        warn_of(f"{source.name}: {mended} (repair='none' leaves them)")
+    return built
 
 
 def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
@@ -77,7 +86,7 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
     Warns
     -----
     ModelWarning
-        Of what was mended, and of what a patch leaves out, with the numbers.
+        Of what a patch leaves out.
     """
     return mended_source(model, options)[0]
 
@@ -88,8 +97,6 @@ def mended_source(model: Source, options: Options = DEFAULT) -> tuple[SourceMesh
     mended = Mended()
     if options.repair == "mend":
         source, mended = mend(source)
-    if mended != Mended():
-        warn_of(f"{source.name}: {mended} (repair='none' leaves them)")
     return (front_patch(source, options.up) if options.patch == "front" else source), mended
 
 

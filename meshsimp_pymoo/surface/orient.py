@@ -11,7 +11,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -130,7 +130,7 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
 
     def seen_from(direction: FloatArray) -> SurfaceFacts:
         rotation = upright_rotation(direction)
-        return sheet.seen(points @ rotation.T, FOLD_SHARE, _blur(source, rotation))
+        return sheet.seen(points @ rotation.T, FOLD_SHARE, _blur(source, source.points @ rotation.T))
 
     given = source.up if _is_auto(up) else up
     if given is not None:
@@ -146,26 +146,36 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
             "area; give a mesh that spans a surface"
         )
     faces_a_way = length > NET_AREA_SHARE * area
-    net = (total / length, seen_from(total / length)) if faces_a_way else None
+
+    @cache
+    def net() -> tuple[FloatArray, SurfaceFacts] | None:
+        return (total / length, seen_from(total / length)) if faces_a_way else None
+
+    def is_as_good(facts: SurfaceFacts, k: int) -> bool:
+        if (faces_a_way and abs(total[k]) >= AXIS_AGREEMENT * length) or facts.n_folded == 0:
+            return True
+        best = net()
+        return best is None or best[1].refusal_from_there is not None or facts.n_folded <= best[1].n_folded
+
     tried = []
     if faces_a_way or not sheet.is_closed:
         for k in (2, 1, 0):
             axis = np.zeros(3)
             axis[k] = -1.0 if total[k] < 0 else 1.0
             facts = seen_from(axis)
-            as_good = net is None or abs(net[0][k]) >= AXIS_AGREEMENT or facts.n_folded <= net[1].n_folded
-            if facts.refusal_from_there is None and (as_good or net[1].refusal_from_there is not None):
+            if facts.refusal_from_there is None and is_as_good(facts, k):
                 return axis, facts
             tried.append((axis, facts))
-    if net is None:
+    best = net()
+    if best is None:
         raise ModelError(
             f"{source.name}: faces all ways alike (net projected area {length / max(area, 1e-300):.2g} of the area), "
             "like a closed surface; name the viewing side with --up (up='z') and cut the patch that faces it with "
             "--patch front (patch='front')"
         )
-    if net[1].refusal_from_there is None:
-        return net
-    direction, facts = min([*tried, net], key=lambda seen: seen[1].n_folded or seen[1].n_faces)
+    if best[1].refusal_from_there is None:
+        return best
+    direction, facts = min([*tried, best], key=lambda seen: seen[1].n_folded or seen[1].n_faces)
     found = ",".join(f"{value:.6g}" for value in direction)
     return direction, replace(facts, seen_from=f"{found} (the best direction that --up auto found)")
 
@@ -351,7 +361,7 @@ def surface_facts(source: SourceMesh, upright: FloatArray, *, until: float = 1.0
     -------
     SurfaceFacts
     """
-    return _Sheet(source).seen(upright, until, _blur(source, upright=upright))
+    return _Sheet(source).seen(upright, until, _blur(source, upright))
 
 
 def check_open_surface(source: SourceMesh, upright: FloatArray) -> tuple[IntArray, SurfaceFacts]:
@@ -433,7 +443,7 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
     """
     direction = up_direction(source, up)
     rotation = upright_rotation(direction)
-    blur = _blur(source, rotation)
+    blur = _blur(source, source.points @ rotation.T)
     points = _local_points(source) @ rotation.T
     faces = source.faces
     normals = _area_vectors(points, faces)
@@ -615,12 +625,10 @@ class _Sheet:
         )
 
 
-def _blur(source: SourceMesh, rotation: FloatArray | None = None, upright: FloatArray | None = None) -> float:
+def _blur(source: SourceMesh, upright: FloatArray) -> float:
     """Return how far rounding may have moved vertices across the line of sight, and neighbours overlap [units]."""
     used = used_vertices(source.faces)
-    points = source.points[used]
-    seen = upright[used] if rotation is None else points @ rotation.T
-    return single_precision(points, seen[:, :2])
+    return single_precision(source.points[used], upright[used, :2])
 
 
 def _vertical(upright: FloatArray, faces: IntArray, normals: FloatArray, areas: FloatArray, blur: float) -> BoolArray:
