@@ -423,9 +423,7 @@ def checked_objectives(F: ArrayLike, name: str = "F") -> FloatArray:
     if points.size == 0:
         raise ValueError(f"{name} is empty: it has no solution to score; was its run finished?")
     if points.ndim != 2:
-        raise ValueError(
-            f"{name} has the shape {points.shape}: give one row per solution and one column per objective"
-        )
+        raise ValueError(f"{name} has the shape {points.shape}: give one row per solution and one column per objective")
     wrong = ~np.isfinite(points).all(axis=1)
     if wrong.any():
         row = int(wrong.argmax())
@@ -446,9 +444,7 @@ def _comparable(A: ArrayLike, B: ArrayLike, a: str, b: str) -> tuple[FloatArray,
     return front_a, front_b
 
 
-def _bounds(
-    optimal: FloatArray, ideal: ArrayLike | None, nadir: ArrayLike | None
-) -> tuple[FloatArray, FloatArray]:
+def _bounds(optimal: FloatArray, ideal: ArrayLike | None, nadir: ArrayLike | None) -> tuple[FloatArray, FloatArray]:
     """Return the ideal point and the scale of every objective (both (m,))."""
     low = optimal.min(axis=0) if ideal is None else np.asarray(ideal, dtype=float)
     high = optimal.max(axis=0) if nadir is None else np.asarray(nadir, dtype=float)

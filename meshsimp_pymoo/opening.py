@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -16,6 +16,7 @@ from meshsimp_pymoo.formats.source.scenes import from_trimesh
 from meshsimp_pymoo.formats.table import described, listed, read_source
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.orient import front_patch
+from meshsimp_pymoo.surface.repair import Mended, mend
 
 if TYPE_CHECKING:
     import trimesh
@@ -45,6 +46,11 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
     TypeError
         If it is nothing of that kind.
 
+    Warns
+    -----
+    ModelWarning
+        Of what was mended, of what a patch leaves out and of what is doubtful, with the numbers.
+
     Examples
     --------
     >>> open_model("roof:3").n_vertices, len(open_model("roof:3").faces)
@@ -57,11 +63,16 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
                 f"{_given(options)} out, or give the file"
             )
         return model
-    return build_model(open_source(model, options), up=options.up)
+    source, mended = mended_source(model, options)
+    built = build_model(source, up=options.up)
+    if mended != Mended():
+        warn_of(f"{source.name}: {mended} (repair='none' leaves them)")
+        built = replace(built, found=built.found | {f"faces_{what}": n for what, n in vars(mended).items() if n})
+    return built
 
 
 def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
-    """Read a mesh as it lies, unchecked but for its numbers; with ``patch``, only that patch of it.
+    """Read a mesh as it lies, small defects mended, but not judged; with ``patch``, only that patch of it.
 
     Parameters
     ----------
@@ -72,16 +83,29 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
     ------
     ModelError
         If there is neither a file nor a built-in model of this name, or it cannot be used.
+
+    Warns
+    -----
+    ModelWarning
+        Of what a patch leaves out.
     """
+    return mended_source(model, options)[0]
+
+
+def mended_source(model: Source, options: Options = DEFAULT) -> tuple[SourceMesh, Mended]:
+    """Read a mesh as :func:`open_source` does, and return what was mended in it, too."""
     source = _source_of(model, options)
-    return front_patch(source, options.up) if options.patch == "front" else source
+    mended = Mended()
+    if options.repair == "mend":
+        source, mended = mend(source)
+    return (front_patch(source, options.up) if options.patch == "front" else source), mended
 
 
 def applicable(model: Any, options: Options) -> Options:
     """Return how a model is read as far as that applies to what it is given as, the other settings by default.
 
-    All of it applies to a file; ``up`` and ``patch`` to a mesh that is in memory or built in; nothing to an OpenModel,
-    which was read already.
+    All of it applies to a file; ``up``, ``patch`` and ``repair`` to a mesh that is in memory or built in; nothing to an
+    OpenModel, which was read already.
     """
     if isinstance(model, OpenModel):
         return DEFAULT

@@ -144,7 +144,8 @@ def _folds() -> None:
     import numpy as np
 
     from meshsimp_pymoo.formats.source import build_source
-    from meshsimp_pymoo.surface.orient import front_patch, hidden_faces
+    from meshsimp_pymoo.surface.orient import front_patch
+    from meshsimp_pymoo.surface.overlap import hidden_faces
 
     # a sheet that turns back over itself: it has a front and a back, and hides a part
     x, z = np.array([0.0, 2.0, 3.0, 2.0, 0.5]), np.array([0.0, 0.0, 0.5, 1.0, 1.0])
@@ -174,7 +175,6 @@ PARTS = (
         "reading",
         (
             "plane.hilbert:hilbert_keys", "plane.footprint:_mark_outline", "plane.footprint:_face_cells",
-            "surface.orient:_overlapping_pairs",
         ),
         _reading, 2.2, False,
     ),
@@ -193,7 +193,7 @@ PARTS = (
         _tiles, 2.5, False,
     ),
     Part("scores", ("surface.score:_cover", "surface.score:_measure_outside"), _scores, 1.5, False),
-    Part("folded scans", ("surface.orient:_lower_ones", "surface.orient:_seen_sides"), _folds, 2.0, False),
+    Part("folded scans", ("surface.overlap:_mark_hidden", "surface.orient:_seen_sides"), _folds, 2.0, False),
     Part("files", ("formats.source.rows:_scan_bytes", "formats.source.rows:_scan_numbers"), _files, 1.0, False),
 )  # fmt: skip
 

@@ -33,13 +33,9 @@ def opposite_pairs(problem: GridProblem, n_matings: int, seed: int) -> Populatio
     return Evaluator().eval(problem, pop).reshape(n_matings, 2)
 
 
-def call(
-    crossover: Any, problem: GridProblem, pairs: Any, seed: int, **algorithm: Any
-) -> tuple[np.ndarray, int]:
+def call(crossover: Any, problem: GridProblem, pairs: Any, seed: int, **algorithm: Any) -> tuple[np.ndarray, int]:
     """Children (n_offsprings, n_matings, N) and the number of evaluations that were counted."""
-    caller = SimpleNamespace(
-        **({"evaluator": Evaluator(), "data": {}, "n_iter": 2, "archive": None} | algorithm)
-    )
+    caller = SimpleNamespace(**({"evaluator": Evaluator(), "data": {}, "n_iter": 2, "archive": None} | algorithm))
     before, calls = caller.evaluator.n_eval, problem.calls
     children = crossover(problem, pairs, random_state=np.random.default_rng(seed), algorithm=caller).get("X")
     assert caller.evaluator.n_eval - before == problem.calls - calls

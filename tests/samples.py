@@ -78,6 +78,8 @@ def coloured(source: SourceMesh) -> SourceMesh:
         "seen": rng.random(n) < 0.5,
     }
     return dataclasses.replace(source, attributes=attributes)
+
+
 # Models so small that every triangle can look at every vertex: known ridges, holes, bays, and a scan's outline.
 SMALL = {
     "roof": lambda: load("roof:5"),

@@ -909,6 +909,21 @@ def test_info_in_json_can_be_read_by_programs(roof_ply, capsys):
     assert (content["vertices"], content["triangles"], content["folds"], content["refusal"]) == (25, 32, 0, None)
 
 
+def test_info_says_what_was_mended(tmp_path, capsys):
+    faces = [*ROOF.faces.tolist(), ROOF.faces[0].tolist()]
+    faces[3] = faces[3][::-1]
+    (tmp_path / "scan.ply").write_bytes(text_ply(ROOF.points, faces))
+    assert run("info", tmp_path / "scan.ply") == 0
+    out, err = capsys.readouterr()
+    told = "1 face listed twice and dropped, 1 face wound against the others turned"
+    assert re.search(rf"^  mended +{told}$", out, re.MULTILINE)
+    assert err == ""
+    assert run("info", tmp_path / "scan.ply", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["mended"] == {"repeated": 1, "extra": 0, "turned": 1}
+    assert run("info", tmp_path / "scan.ply", "--repair", "none") == 2
+    assert "2 edges belong to more than two faces" in capsys.readouterr().err
+
+
 def test_info_describes_even_what_would_be_refused(tmp_path, capsys):
     (tmp_path / "box.ply").write_bytes(BAD_FILES["closed"][0])
     assert run("info", tmp_path / "box.ply") == 2

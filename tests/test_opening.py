@@ -72,6 +72,7 @@ def test_what_is_no_mesh_is_refused_by_type():
         open_model(7)
 
 
+@pytest.mark.filterwarnings("ignore:.* left out of the front patch")
 def test_a_patch_is_cut_out_on_the_way():
     ball = trimesh.creation.icosphere(3)
     lid = open_source(ball, Options(up="z", patch="front"))

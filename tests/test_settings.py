@@ -174,6 +174,7 @@ names = st.text(min_size=1).filter(str.strip)
 SETTINGS = {
     "up": st.one_of(st.sampled_from(["auto", "z", "-x"]), directions),
     "patch": st.none() | st.just("front"),
+    "repair": st.sampled_from(["mend", "none"]),
     "spacing": st.none() | st.tuples(positive, positive),
     "nodata": st.none() | st.floats(allow_nan=False, allow_infinity=False),
     "window": st.none() | st.tuples(wholes, wholes, *2 * [wholes.map(lambda count: count + 2)]),

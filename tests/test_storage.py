@@ -36,9 +36,7 @@ def solutions(model):
 
 
 def files(folder):
-    return {
-        str(p.relative_to(folder)): p.read_bytes() for p in sorted(Path(folder).rglob("*")) if p.is_file()
-    }
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(Path(folder).rglob("*")) if p.is_file()}
 
 
 def test_a_front_reads_back_as_it_was_written(tmp_path, model, solutions):
@@ -121,9 +119,7 @@ def test_a_tilted_model_is_written_back_in_its_own_frame(tmp_path):
     model = build_model(turned, up="x")
     vertices, faces, _ = mesh_arrays(model, model.faces)
     assert np.array_equal(np.unique(vertices, axis=0), np.unique(turned.points, axis=0))
-    normal = np.cross(
-        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
-    )
+    normal = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
     assert (normal[:, 0] > 0).all()
 
 
@@ -165,9 +161,7 @@ def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_pat
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
 
-def test_an_old_result_survives_when_the_new_one_cannot_be_put_in_place(
-    tmp_path, model, solutions, monkeypatch
-):
+def test_an_old_result_survives_when_the_new_one_cannot_be_put_in_place(tmp_path, model, solutions, monkeypatch):
     folder = write_solutions(tmp_path / "out", model, solutions)
     before = files(folder)
     rename = Path.rename
@@ -213,9 +207,7 @@ def test_an_unwritable_parent_is_named(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "mkdir", refuse)  # root, who often runs tests, is refused nothing
-    with pytest.raises(
-        ResultError, match=r"out: cannot be written in .* \(Permission denied\); name another folder"
-    ):
+    with pytest.raises(ResultError, match=r"out: cannot be written in .* \(Permission denied\); name another folder"):
         claim_output(tmp_path / "out")
 
 

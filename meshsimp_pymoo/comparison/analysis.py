@@ -522,9 +522,7 @@ def dominance_rates(
     """
     there, reverse = np.asarray(forth, dtype=float), np.asarray(back, dtype=float).T
     if there.shape != reverse.shape or there.ndim != 2:
-        raise ValueError(
-            f"the tables of A over B {there.shape} and of B over A {reverse.T.shape} do not match"
-        )
+        raise ValueError(f"the tables of A over B {there.shape} and of B over A {reverse.T.shape} do not match")
     if indicator == "epsilon":
         dominates = (there <= 1) & (reverse > 1)
     elif indicator == "coverage":
@@ -688,9 +686,7 @@ def selected_solutions(
         rows = [("least_error", len(front) - 1), ("fewest_triangles", 0), ("trade_off", middle)]
         rows += [("knee", int(row)) for row in knees(front)]
         chosen[method] = tuple(
-            Solution(
-                kind, float(front[row, 0]), int(front[row, 1]), tuple(seed for _, seed in found.found_by[row])
-            )
+            Solution(kind, float(front[row, 0]), int(front[row, 1]), tuple(seed for _, seed in found.found_by[row]))
             for kind, row in rows
         )
     return chosen
@@ -757,9 +753,7 @@ def _fronts(runs: Runs) -> dict[str, dict[int, FloatArray]]:
             name = f"the front of the method {method!r} with seed {seed}"
             fronts[method][seed] = non_dominated(seeds[seed], name)
             if fronts[method][seed].shape[1] != 2:
-                raise ValueError(
-                    f"{name} has {fronts[method][seed].shape[1]} columns: give (error, triangles)"
-                )
+                raise ValueError(f"{name} has {fronts[method][seed].shape[1]} columns: give (error, triangles)")
     return fronts
 
 
@@ -794,9 +788,7 @@ def _sample(values: ArrayLike, name: str) -> FloatArray:
     """Return a sample as an array, or say what is wrong with it."""
     sample = np.asarray(values, dtype=float)
     if sample.ndim != 1 or not len(sample):
-        raise ValueError(
-            f"{name} must be a list of at least one number, not an array of shape {sample.shape}"
-        )
+        raise ValueError(f"{name} must be a list of at least one number, not an array of shape {sample.shape}")
     if np.isnan(sample).any():
         raise ValueError(f"{name} has {int(np.isnan(sample).sum())} NaN among {len(sample)} values")
     return sample

@@ -621,9 +621,7 @@ def _option(key: str, entry: Entry) -> Any:
         names = [item.text() for item in entry.items()]
         if len(names) != 2 or names[0] not in OBJECTIVES or names[1] != "triangles":
             several = "; an experiment compares fronts of two objectives, more are for nsga3() in Python"
-            entry.fail(
-                f"expected [one of {', '.join(OBJECTIVES)}, triangles]" + (several if len(names) > 2 else "")
-            )
+            entry.fail(f"expected [one of {', '.join(OBJECTIVES)}, triangles]" + (several if len(names) > 2 else ""))
         return names
     known = settings_of(Options) | settings_of(Rules)
     return entry.of(known[key].kind if key in known else LIMITS[key])

@@ -36,6 +36,15 @@ class Options:
         doc="Cut out the largest connected patch of the mesh that faces up and does not overlap itself.",
         help="take only the largest connected patch that faces up and does not overlap itself",
     )
+    repair: str = setting(
+        "mend",
+        kind=Choice(("mend", "none")),
+        accepts='"mend" or "none"',
+        doc="Whether small defects of a mesh are mended: faces listed twice, wound the other way, or at edges of more "
+        "than two (of these at most 1 %).",
+        help="none: take a mesh with faces listed twice, wound the other way or at edges of more than two as it is "
+        "(default: mend, and say how many)",
+    )
     spacing: float | tuple[float, float] | None = setting(
         None,
         kind=Steps(),

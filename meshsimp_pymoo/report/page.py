@@ -150,9 +150,7 @@ def simplification_page(
         "refitted_meshes": front.refitted_meshes,
         "knee": knee,
         "chosen": chosen,
-        "series": [
-            {"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()} for name, F in front.series.items()
-        ],
+        "series": [{"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()} for name, F in front.series.items()],
         "model": {
             "vertices": model.n_vertices,
             "triangles": len(model.faces),

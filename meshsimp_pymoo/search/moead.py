@@ -130,8 +130,7 @@ class TchebycheffMOEAD(MOEAD):
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         if problem.has_constraints():
             raise ValueError(
-                "MOEA/D takes no constraints; drop max_triangles= and max_error= from the problem, "
-                "or use NSGA-II"
+                "MOEA/D takes no constraints; drop max_triangles= and max_error= from the problem, or use NSGA-II"
             )
         if problem.n_obj != 2:
             raise ValueError(f"MOEA/D here decomposes two objectives, the problem has {problem.n_obj}; use nsga3()")
@@ -139,9 +138,7 @@ class TchebycheffMOEAD(MOEAD):
         # By index, not by distance between weight vectors, where rounding decides between the two sides.
         n = len(self.ref_dirs)
         index = np.arange(n)
-        self.neighbors = np.argsort(np.abs(index[:, None] - index), axis=1, kind="stable")[
-            :, : self.n_neighbors
-        ]
+        self.neighbors = np.argsort(np.abs(index[:, None] - index), axis=1, kind="stable")[:, : self.n_neighbors]
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
         if len(infills) != self.pop_size:

@@ -20,7 +20,7 @@ from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
-from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
+from meshsimp_pymoo.surface.orient import Up, open_faces, seen_upright, upright_rotation
 from meshsimp_pymoo.surface.places import below_others, feet, highest, warn_of_places
 
 # What weights may add up to: their products with squares of deviations are numbers then.
@@ -77,7 +77,8 @@ class OpenModel:
     repeats : (R, 2) int array
         Rows of the file that repeat another one, and the rows that they were merged into.
     found : dict of str to int
-        How many vertices were merged, lie below others, and are feet, as far as there are any; for run.json.
+        How many vertices were merged, lie below others, and are feet, and how many faces were mended, as far as there
+        are any; for run.json.
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says (see
         :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
@@ -301,11 +302,11 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
             ModelWarning,
             stacklevel=3,
         )
-    direction = up_direction(source, up)
+    direction, facts = seen_upright(source, up)
     rotation = upright_rotation(direction)
     pivot = source.points[used].min(axis=0)
     upright = (source.points - pivot) @ rotation.T
-    faces, facts = check_open_surface(source, upright)
+    faces = open_faces(source, facts)
     rows = np.flatnonzero(used)
     upright = upright[rows]
     offset = upright.min(axis=0)

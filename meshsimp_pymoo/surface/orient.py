@@ -10,40 +10,34 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.compiling.functions import entry, inner
-from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.errors import ModelError, ModelWarning, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.surface.edges import Edges, border_loops, components, seams, single_precision, used_vertices
+from meshsimp_pymoo.surface.overlap import height_at, hidden_faces
 
 Up = str | Sequence[float] | FloatArray
 
-# up="auto" prefers an axis that sees at least this share of the area the best direction sees (within 21.6
-# degrees).
-# Scans and terrain come axis-aligned, but their outline rarely lies level, and the best direction of an open
-# surface
+# up="auto" takes an axis that sees at least this share of the area the best direction sees (within 21.6 degrees) as
+# soon as the model passes along it; one further off only if it folds the model no more than that direction does.
+# Scans and terrain come axis-aligned, but their outline rarely lies level, and the net normal of an open surface
 # depends on its outline alone: on aligned range maps it strays by up to 18.3 degrees (a share of 0.949).
 AXIS_AGREEMENT = 0.93
-
-# ... or, where the best direction folds the surface beyond FOLD_SHARE, an axis within 45 degrees that folds
-# it less:
-# busts whose outline follows neck and shoulders stray by 30 degrees.
-AXIS_REACH = 0.7071
 
 # Below this share of its area, a surface faces no way: closed, or closed but for pinholes. Open scans: 0.4 to
 # 1.
 NET_AREA_SHARE = 0.01
 
-# A face that projects to less than this share of its area (steeper than 89.99994 degrees) counts as vertical:
-# after a
-# tilted model is turned, rounding of single-precision files decides the sign of anything steeper.
+# A face that projects to less than this share of its area (steeper than 89.99994 degrees), and to no more width than
+# single precision tells, counts as vertical: rounding decides on which side it is seen. Heights may be large against
+# the extent (metres over degrees), so steepness alone says nothing.
 VERTICAL_SHARE = 1e-6
 
 # Folded faces are tolerated with a warning up to this share of all faces: stray flips that scanners and hole
@@ -53,12 +47,11 @@ VERTICAL_SHARE = 1e-6
 # A real overhang (a nose from below, an ear) takes more.
 FOLD_SHARE = 0.01
 
-# Two faces overlap when no line separates them within this share of the extent; so far may rounding push
-# neighbours.
-OVERLAP_TOLERANCE = 1e-9
-
 # Vertices within a strip this narrow, relative to its length, span no surface; the same bound as for slivers.
 WIDTH_SHARE = 1e-9
+
+# The way out that is always there.
+CUT = "cut out the patch that faces the viewer with --patch front (patch='front')"
 
 # Vertical rays, per side of a square lattice, that tell whether a front or a back is seen from above.
 RAYS = 128
@@ -75,12 +68,40 @@ _AXES: dict[str, list[list[int]]] = {
 
 
 def up_direction(source: SourceMesh, up: Up = "auto") -> FloatArray:
-    """Return the unit vector that points from the surface to its viewer.
+    """Return the unit vector that points from the surface to its viewer, height field from there or not.
 
-    ``"auto"`` is the direction along which the net projected area is largest: the area-weighted sum of the
-    face normals. An exact axis is preferred where it sees at least 93 % of that area without folding the
-    surface, and within 45 degrees where the best direction folds the surface and the axis folds it less.
-    Grids are always seen from +z.
+    Parameters
+    ----------
+    source, up
+        As in :func:`seen_upright`, which says what "auto" is.
+
+    Returns
+    -------
+    (3,) float64 array
+        Of length 1; exact for axes.
+
+    Raises
+    ------
+    ModelError
+        If `up` is no direction, or "auto" finds that no direction is preferred (a closed surface).
+
+    Examples
+    --------
+    >>> from meshsimp_pymoo.formats.source.heights import grid_source
+    >>> up_direction(grid_source([[0.0, 1.0], [2.0, 5.0]]))
+    array([0., 0., 1.])
+    """
+    given = source.up if _is_auto(up) else up
+    return seen_upright(source)[0] if given is None else _given_direction(given)
+
+
+def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, SurfaceFacts]:
+    """Return the direction to look from, and what the surface is from there as far as that takes to judge it.
+
+    ``"auto"`` tries the file's z, y and x axis and then the net normal (the area-weighted sum of the face normals),
+    and takes the first along which the surface passes as a height field: by the test that would refuse it. An axis
+    that sees less than 93 % of the area that the net normal sees must also fold the surface no more than that does.
+    If none passes, it is the one that folds it least. Grids are always seen from +z.
 
     The sign follows the winding in the file (counter-clockwise as seen by the viewer), for nothing else is
     known. A file whose faces are all clockwise is so seen from behind, heights reversed; vertical errors stay
@@ -94,57 +115,69 @@ def up_direction(source: SourceMesh, up: Up = "auto") -> FloatArray:
 
     Returns
     -------
-    (3,) float64 array
+    direction : (3,) float64 array
         Of length 1; exact for axes.
+    facts : SurfaceFacts
+        Its `refusal` says whether the surface can be used. Folds are counted until it is known.
 
     Raises
     ------
     ModelError
-        If `up` is none of these, or "auto" finds that no direction is preferred (a closed surface).
-
-    Examples
-    --------
-    >>> from meshsimp_pymoo.formats.source.heights import grid_source
-    >>> up_direction(grid_source([[0.0, 1.0], [2.0, 5.0]]))
-    array([0., 0., 1.])
+        If `up` is no direction, or "auto" finds that no direction is preferred (a closed surface).
     """
-    if not (isinstance(up, str) and up.strip().lower() == "auto"):
-        return _given_direction(up)
-    if source.up is not None:
-        return _given_direction(source.up)
-    normals = _area_vectors(source.points, source.faces)
-    areas = np.linalg.norm(normals, axis=1)
+    sheet = _Sheet(source)
+    points = _local_points(source)
+
+    def seen_from(direction: FloatArray) -> SurfaceFacts:
+        rotation = upright_rotation(direction)
+        return sheet.seen(points @ rotation.T, FOLD_SHARE, _blur(source, source.points @ rotation.T))
+
+    given = source.up if _is_auto(up) else up
+    if given is not None:
+        direction = _given_direction(given)
+        return direction, seen_from(direction)
+    normals = _area_vectors(points, source.faces)
+    area = float(np.linalg.norm(normals, axis=1).sum())
     total = normals.sum(axis=0)
     length = float(np.linalg.norm(total))
-    extent = float(np.ptp(source.points, axis=0).max())
-    if areas.sum() <= WIDTH_SHARE * extent**2:
+    if area <= WIDTH_SHARE * float(np.ptp(source.points, axis=0).max()) ** 2:
         raise ModelError(
             f"{source.name}: all {len(source.points)} vertices lie on one line: the {len(source.faces)} faces have no "
             "area; give a mesh that spans a surface"
         )
-    if length <= NET_AREA_SHARE * areas.sum():
+    faces_a_way = length > NET_AREA_SHARE * area
+
+    @cache
+    def net() -> tuple[FloatArray, SurfaceFacts] | None:
+        return (total / length, seen_from(total / length)) if faces_a_way else None
+
+    def is_as_good(facts: SurfaceFacts, k: int) -> bool:
+        if (faces_a_way and abs(total[k]) >= AXIS_AGREEMENT * length) or facts.n_folded == 0:
+            return True
+        best = net()
+        return best is None or best[1].refusal_from_there is not None or facts.n_folded <= best[1].n_folded
+
+    tried = []
+    if faces_a_way or not sheet.is_closed:
+        for k in (2, 1, 0):
+            axis = np.zeros(3)
+            axis[k] = -1.0 if total[k] < 0 else 1.0
+            facts = seen_from(axis)
+            if facts.refusal_from_there is None and is_as_good(facts, k):
+                return axis, facts
+            tried.append((axis, facts))
+    best = net()
+    if best is None:
         raise ModelError(
-            f"{source.name}: faces all ways alike (net projected area "
-            f"{length / max(areas.sum(), 1e-300):.2g} of the "
-            "area), like a closed surface; "
-            "name the viewing side with --up (up='z') and cut the patch that faces "
-            f"it with --patch front (patch='front')"
+            f"{source.name}: faces all ways alike (net projected area {length / max(area, 1e-300):.2g} of the area), "
+            "like a closed surface; name the viewing side with --up (up='z') and cut the patch that faces it with "
+            "--patch front (patch='front')"
         )
-    best = total / length
-    axis = np.zeros(3)
-    k = int(np.argmax(np.abs(best)))
-    axis[k] = np.sign(best[k])
-    agreement = abs(best[k])
-    if agreement < AXIS_REACH:
+    if best[1].refusal_from_there is None:
         return best
-    folds_along_axis, folds_along_best = (
-        float(np.mean(normals @ direction < -VERTICAL_SHARE * areas)) for direction in (axis, best)
-    )
-    if agreement >= AXIS_AGREEMENT and folds_along_axis <= max(FOLD_SHARE, folds_along_best):
-        return axis
-    if folds_along_best > FOLD_SHARE and folds_along_axis < folds_along_best:
-        return axis
-    return best
+    direction, facts = min([*tried, best], key=lambda seen: seen[1].n_folded or seen[1].n_faces)
+    found = ",".join(f"{value:.6g}" for value in direction)
+    return direction, replace(facts, seen_from=f"{found} (the best direction that --up auto found)")
 
 
 def upright_rotation(up: Up) -> FloatArray:
@@ -209,6 +242,8 @@ class SurfaceFacts:
         Faces that show their back.
     hidden : int
         Faces seen from the front that lie below another such face.
+    complete : bool
+        Whether all of `hidden` were counted, or only until it was clear that they are too many.
     fold_example : (int, int, int) or None
         Vertices (file rows) of one face counted in `folds` or `hidden`.
     vertical_faces : int
@@ -219,6 +254,8 @@ class SurfaceFacts:
         Net projected area over the surface's area, 0 to 1: 1 is flat, about 0 is closed.
     width_share : float
         Width of the projected vertices over their length.
+    seen_from : str
+        How messages call the direction.
     """
 
     name: str
@@ -234,39 +271,49 @@ class SurfaceFacts:
     inconsistent_edges: int
     folds: int
     hidden: int
+    complete: bool
     fold_example: tuple[int, int, int] | None
     vertical_faces: int
     flipped: bool
     net_share: float
     width_share: float
+    seen_from: str = "up"
+
+    @property
+    def n_folded(self) -> int:
+        """Number of faces that are folded over or hidden, as far as they were counted."""
+        return self.folds + self.hidden
 
     @property
     def fold_share(self) -> float:
-        """Share of the faces that are folded over or hidden."""
-        return (self.folds + self.hidden) / self.n_faces
+        """Share of the faces that are folded over or hidden, as far as they were counted."""
+        return self.n_folded / self.n_faces
 
     @property
     def refusal(self) -> str | None:
         """Why this cannot be used as an open model, with the way out; None if it can."""
-        cut = "cut out the patch that faces the viewer with --patch front (patch='front')"
         if self.border_edges == 0 and self.nonmanifold_edges == 0:
-            return f"{self.name}: the surface is closed (no border edge among {self.n_faces} faces); {cut}"
+            return f"{self.name}: the surface is closed (no border edge among {self.n_faces} faces); {CUT}"
+        if self.nonmanifold_example is not None and self.width_share > WIDTH_SHARE:
+            a, b, count = self.nonmanifold_example
+            return (
+                f"{self.name}: {self.nonmanifold_edges} edges belong to more than two faces (first: vertices "
+                f"{a} and {b}, {count} faces); repair them in a mesh editor or {CUT}"
+            )
+        return self.refusal_from_there
+
+    @property
+    def refusal_from_there(self) -> str | None:
+        """Why this is no height field as seen from there; None if it is."""
         if self.width_share <= WIDTH_SHARE:
             return (
-                f"{self.name}: all {self.n_vertices} vertices lie on one line as seen from up (width "
+                f"{self.name}: all {self.n_vertices} vertices lie on one line as seen from {self.seen_from} (width "
                 f"{self.width_share:.2g} of the length); choose another viewing side with --up"
             )
         if self.vertical_faces == self.n_faces:
             return (
-                f"{self.name}: all {self.n_faces} faces are seen edge-on from up, so there is no height field; "
-                "choose another viewing side with --up"
-            )
-        if self.nonmanifold_example is not None:
-            a, b, count = self.nonmanifold_example
-            return (
-                f"{self.name}: {self.nonmanifold_edges} edges belong to more than two faces (first: vertices "
-                f"{a} and "
-                f"{b}, {count} faces); repair them in a mesh editor or {cut}"
+                f"{self.name}: all {self.n_faces} faces are seen edge-on from {self.seen_from}, so there is no height "
+                "field; choose another viewing side with --up"
             )
         if self.fold_share > FOLD_SHARE:
             rewind = (
@@ -274,90 +321,47 @@ class SurfaceFacts:
                 if self.inconsistent_edges
                 else "choose another viewing side with --up, or "
             )
-            return f"{self.name}: {self._folded}, more than {FOLD_SHARE:.0%}, so it is no height field; {rewind}{cut}"
+            return f"{self.name}: {self._folded}, more than {FOLD_SHARE:.0%}, so it is no height field; {rewind}{CUT}"
         return None
 
     @property
     def remark(self) -> str | None:
         """What a user of this model should know although it can be used; None if nothing."""
-        if self.folds + self.hidden == 0:
+        if self.n_folded == 0:
             return None
         return f"{self.name}: {self._folded}; heights there are ambiguous"
 
     @property
     def _folded(self) -> str:
         example = "" if self.fold_example is None else f"; first: vertices {self.fold_example}"
+        at_least = "" if self.complete else "at least "
+        hidden = "" if self.hidden == 0 and not self.complete else f", {at_least}{self.hidden} lie below others"
         return (
-            f"seen from up, {self.folds + self.hidden} of {self.n_faces} faces "
-            f"({self.fold_share:.2%}) "
-            f"are folded over ({self.folds} show their back, {self.hidden} lie below others{example})"
+            f"seen from {self.seen_from}, {at_least}{self.n_folded} of {self.n_faces} faces ({self.fold_share:.2%}) "
+            f"are folded over ({self.folds} show their back{hidden}{example})"
         )
 
 
-def surface_facts(source: SourceMesh, upright: FloatArray) -> SurfaceFacts:
+def surface_facts(source: SourceMesh, upright: FloatArray, *, until: float = 1.0) -> SurfaceFacts:
     """Describe a surface as seen from above, without judging it.
 
     Fold-overs show in two ways. A face whose projected area is negative shows its back. Sheets that cross the
-    line of sight twice without turning round (a spiral ramp) overlap with all signs positive; then the number
-    of faces over a point is the winding number of the border around it, so where two faces overlap, some face
-    at the border overlaps another. Those few are tested against all, and only if one is found, all against
-    all.
+    line of sight twice without turning round (a spiral ramp) overlap with all signs positive, which
+    :func:`~meshsimp_pymoo.surface.overlap.hidden_faces` finds.
 
     Parameters
     ----------
     source : SourceMesh
     upright : (V, 3) float array
         Its points turned so that the viewer is at +z, ``source.points @ upright_rotation(up).T``.
+    until : float
+        Stop counting folds when they are known to be more than this share of the faces.
 
     Returns
     -------
     SurfaceFacts
     """
-    used = np.unique(source.faces)
-    faces = source.faces
-    normals = _area_vectors(upright, faces)
-    areas = np.linalg.norm(normals, axis=1)
-    net = float(normals[:, 2].sum())
-    flipped = net < 0
-    if flipped:
-        faces = faces[:, ::-1]
-        normals = -normals
-    vertical = np.abs(normals[:, 2]) <= VERTICAL_SHARE * areas
-    folded = ~vertical & (normals[:, 2] < 0)
-    facing = np.flatnonzero(~vertical & ~folded)
-    hidden = np.zeros(len(faces), bool)
-    hidden[facing[hidden_faces(upright, faces[facing])]] = True
-
-    edges = _Edges.of(faces)
-    nonmanifold = np.flatnonzero(edges.counts > 2)
-    example = None
-    if len(nonmanifold):
-        a, b = edges.ends(faces, nonmanifold[:1])[0]
-        example = (int(source.rows[a]), int(source.rows[b]), int(edges.counts[nonmanifold[0]]))
-    first, second = edges.pairs()
-    inconsistent = faces.ravel()[first] == faces.ravel()[second]
-    doubtful = np.flatnonzero(folded | hidden)
-    loops, pinches = _border_loops(faces, edges)
-    return SurfaceFacts(
-        name=source.name,
-        n_vertices=len(used),
-        n_faces=len(faces),
-        unused_vertices=len(source.points) - len(used),
-        components=int(_face_components(len(faces), first // 3, second // 3).max()) + 1,
-        border_edges=int((edges.counts == 1).sum()),
-        border_loops=loops,
-        pinch_vertices=pinches,
-        nonmanifold_edges=len(nonmanifold),
-        nonmanifold_example=example,
-        inconsistent_edges=int(inconsistent.sum()),
-        folds=int(folded.sum()),
-        hidden=int(hidden.sum()),
-        fold_example=_file_rows(source, doubtful),
-        vertical_faces=int(vertical.sum()),
-        flipped=flipped,
-        net_share=abs(net) / max(float(areas.sum()), 1e-300),
-        width_share=_width_share(upright[used, :2]),
-    )
+    return _Sheet(source).seen(upright, until, _blur(source, upright))
 
 
 def check_open_surface(source: SourceMesh, upright: FloatArray) -> tuple[IntArray, SurfaceFacts]:
@@ -388,12 +392,17 @@ def check_open_surface(source: SourceMesh, upright: FloatArray) -> tuple[IntArra
     ModelWarning
         If at most 1 % of the faces are folded over, with their number.
     """
-    facts = surface_facts(source, upright)
+    facts = surface_facts(source, upright, until=FOLD_SHARE)
+    return open_faces(source, facts), facts
+
+
+def open_faces(source: SourceMesh, facts: SurfaceFacts) -> IntArray:
+    """Return the faces counter-clockwise as seen from above, or refuse them, as :func:`check_open_surface` does."""
     if facts.refusal is not None:
         raise ModelError(facts.refusal)
     if facts.remark is not None:
-        warnings.warn(facts.remark, ModelWarning, stacklevel=2)
-    return source.faces[:, ::-1] if facts.flipped else source.faces, facts
+        warnings.warn(facts.remark, ModelWarning, stacklevel=3)
+    return source.faces[:, ::-1] if facts.flipped else source.faces
 
 
 def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
@@ -401,8 +410,9 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
 
     Of the faces that show their front, the largest edge-connected part by projected area stays; where it
     overlaps itself, faces below others go, and again the largest connected part stays. Faces seen edge-on
-    face nobody and go too. Edges of more than two such faces do not connect, so the result is manifold;
-    vertices in which two of its fans touch may remain.
+    face nobody and go too. Borders that touch within single precision connect, so that two tiles of a survey
+    are one part. Edges of more than two such faces do not connect, so the result is manifold; vertices in which two
+    of its fans touch may remain.
 
     Which side of a face is its front is seen from above: if a lattice of rays meets more backs than fronts,
     the file's winding is taken as inverted.
@@ -425,35 +435,49 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
     ------
     ModelError
         If nothing faces the viewer, or as :func:`up_direction`.
+
+    Warns
+    -----
+    ModelWarning
+        How many faces are left out, with their share of the area and the number of connected pieces they are.
     """
     direction = up_direction(source, up)
-    points = _local_points(source) @ upright_rotation(direction).T
+    rotation = upright_rotation(direction)
+    blur = _blur(source, source.points @ rotation.T)
+    points = _local_points(source) @ rotation.T
     faces = source.faces
     normals = _area_vectors(points, faces)
     areas = np.linalg.norm(normals, axis=1)
-    solid = np.flatnonzero(np.abs(normals[:, 2]) > VERTICAL_SHARE * areas)
+    vertical = _vertical(points, faces, normals, areas, blur)
+    solid = np.flatnonzero(~vertical)
     fronts, backs = _seen_sides(points[faces[solid]], normals[solid, 2] > 0, RAYS) if len(solid) else (0, 0)
     if backs > fronts or (backs == fronts and normals[:, 2].sum() < 0):
         faces = faces[:, ::-1]
         normals = -normals
     height = normals[:, 2]
-    facing = np.flatnonzero(height > VERTICAL_SHARE * areas)
+    facing = np.flatnonzero(~vertical & (height > 0))
     if len(facing) == 0:
         raise ModelError(
-            f"{source.name}: none of {len(faces)} faces looks towards {tuple(direction.round(3).tolist())}; "
-            "choose "
-            f"another viewing side with --up"
+            f"{source.name}: none of {len(faces)} faces looks towards {tuple(direction.round(3).tolist())}; choose "
+            "another viewing side with --up"
         )
-    patch = _largest_part(faces, facing, height)
-    hidden = hidden_faces(points, faces[patch])
+    patch = _largest_part(points[:, :2], faces, facing, height, blur)
+    hidden = hidden_faces(points, faces[patch], tolerance=blur, name=source.name)
     if len(hidden):
-        patch = _largest_part(faces, np.delete(patch, hidden), height)
+        patch = _largest_part(points[:, :2], faces, np.delete(patch, hidden), height, blur)
     used, renumbered = np.unique(faces[patch], return_inverse=True)
     if len(used) < 4:
         raise ModelError(
-            f"{source.name}: the patch that faces {tuple(direction.round(3).tolist())} has only {len(used)} "
-            "vertices; "
-            f"choose another viewing side with --up"
+            f"{source.name}: the patch that faces {tuple(direction.round(3).tolist())} has only {len(used)} vertices; "
+            "choose another viewing side with --up"
+        )
+    left_out = np.delete(np.arange(len(faces)), patch)
+    if len(left_out):
+        first, second = Edges.of(faces[left_out]).pairs
+        pieces = int(components(len(left_out), first // 3, second // 3).max()) + 1
+        warn_of(
+            f"{source.name}: {len(left_out)} of {len(faces)} faces ({areas[left_out].sum() / areas.sum():.2%} of the "
+            f"area) are left out of the front patch, in {pieces} {'piece' if pieces == 1 else 'pieces'}"
         )
     return SourceMesh(
         points=source.points[used],
@@ -495,9 +519,13 @@ def _given_direction(up: Up) -> FloatArray:
     return vector / np.linalg.norm(vector)
 
 
+def _is_auto(up: Up) -> bool:
+    return isinstance(up, str) and up.strip().lower() == "auto"
+
+
 def _local_points(source: SourceMesh) -> FloatArray:
     """Shift to the middle of the used vertices: rotations round relative to the coordinates."""
-    used = source.points[np.unique(source.faces)]
+    used = source.points[used_vertices(source.faces)]
     low, high = used.min(axis=0), used.max(axis=0)
     return source.points - (low + (high - low) / 2)
 
@@ -525,96 +553,119 @@ def _width_share(xy: FloatArray) -> float:
     return float(width / length)
 
 
-def _file_rows(source: SourceMesh, faces: npt.NDArray[np.intp]) -> tuple[int, int, int] | None:
-    if len(faces) == 0:
-        return None
-    a, b, c = source.rows[source.faces[faces[0]]].tolist()
-    return a, b, c
-
-
-# ------------------------------------------------------------ edges and parts
-
-
 @dataclass(frozen=True)
-class _Edges:
-    """Half-edges ``3 * face + i`` (corner i to i + 1), sorted so that those of one edge stand together."""
+class _Sheet:
+    """A surface, with what is known of it from whatever side it is seen."""
 
-    order: IntArray
-    starts: IntArray
-    counts: IntArray
+    source: SourceMesh
 
-    @classmethod
-    def of(cls, faces: IntArray) -> _Edges:
-        a = faces.ravel()
-        b = np.roll(faces, -1, axis=1).ravel()
-        key = np.minimum(a, b) * (int(faces.max()) + 1) + np.maximum(a, b)
-        order = np.argsort(key, kind="stable")
-        ordered = key[order]
-        starts = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
-        return cls(order, starts, np.diff(np.append(starts, len(key))))
+    @cached_property
+    def edges(self) -> Edges:
+        return Edges.of(self.source.faces)
 
-    def pairs(self) -> tuple[IntArray, IntArray]:
-        """Return the two half-edges of every edge that has exactly two."""
-        starts = self.starts[self.counts == 2]
-        return self.order[starts], self.order[starts + 1]
+    @cached_property
+    def used(self) -> IntArray:
+        return used_vertices(self.source.faces)
 
-    def border(self) -> IntArray:
-        """Return the half-edges of the edges that have one face."""
-        return self.order[self.starts[self.counts == 1]]
+    @property
+    def is_closed(self) -> bool:
+        return len(self.edges.border) == len(self.edges.crowded) == 0
 
-    def ends(self, faces: IntArray, edges: npt.NDArray[np.intp]) -> IntArray:
-        """Return the two vertices of each edge."""
-        half = self.order[self.starts[edges]]
-        return np.column_stack([faces.ravel()[half], faces.ravel()[_next(half)]])
+    @cached_property
+    def facts(self) -> dict[str, Any]:
+        """Return what :class:`SurfaceFacts` says that does not depend on the side."""
+        source, edges = self.source, self.edges
+        first, second = edges.pairs
+        flat = source.faces.ravel()
+        example = None
+        if len(edges.crowded):
+            a, b = source.rows[edges.ends(edges.of_edges(edges.crowded[:1])[0][:1])[0]]
+            example = (int(a), int(b), int(edges.counts[edges.crowded[0]]))
+        loops, pinches = border_loops(edges)
+        return {
+            "name": source.name,
+            "n_vertices": len(self.used),
+            "n_faces": len(source.faces),
+            "unused_vertices": len(source.points) - len(self.used),
+            "components": int(components(len(source.faces), first // 3, second // 3).max()) + 1,
+            "border_edges": len(edges.border),
+            "border_loops": loops,
+            "pinch_vertices": pinches,
+            "nonmanifold_edges": len(edges.crowded),
+            "nonmanifold_example": example,
+            "inconsistent_edges": int((flat[first] == flat[second]).sum()),
+        }
+
+    def seen(self, upright: FloatArray, until: float, blur: float) -> SurfaceFacts:
+        """Describe it as seen from above; see :func:`surface_facts` and :func:`_blur`."""
+        faces = self.source.faces
+        normals = _area_vectors(upright, faces)
+        areas = np.linalg.norm(normals, axis=1)
+        net = float(normals[:, 2].sum())
+        flipped = net < 0
+        if flipped:
+            faces = faces[:, ::-1]
+            normals = -normals
+        vertical = _vertical(upright, faces, normals, areas, blur)
+        folded = ~vertical & (normals[:, 2] < 0)
+        folds = int(folded.sum())
+        most = int(until * len(faces)) - folds  # hidden faces that do not matter
+        hidden = np.zeros(len(faces), bool)
+        if most >= 0:
+            facing = np.flatnonzero(~vertical & ~folded)
+            edges = None if flipped or folds else self.edges
+            below = hidden_faces(upright, faces[facing], tolerance=blur, most=most, edges=edges, name=self.source.name)
+            hidden[facing[below]] = True
+        n_hidden = int(hidden.sum())
+        doubtful = np.flatnonzero(folded | hidden)
+        example = tuple(self.source.rows[self.source.faces[doubtful[0]]].tolist()) if len(doubtful) else None
+        return SurfaceFacts(
+            **self.facts,
+            folds=folds,
+            hidden=n_hidden,
+            complete=n_hidden <= most,
+            fold_example=example,
+            vertical_faces=int(vertical.sum()),
+            flipped=flipped,
+            net_share=abs(net) / max(float(areas.sum()), 1e-300),
+            width_share=_width_share(upright[self.used, :2]),
+        )
 
 
-def _next(half: IntArray) -> IntArray:
-    """Return the following half-edge, or corner, within the same face."""
-    return half - half % 3 + (half + 1) % 3
+def _blur(source: SourceMesh, upright: FloatArray) -> float:
+    """Return how far rounding may have moved vertices across the line of sight, and neighbours overlap [units]."""
+    used = used_vertices(source.faces)
+    return single_precision(source.points[used], upright[used, :2])
 
 
-def _face_components(n: int, first: IntArray, second: IntArray) -> IntArray:
-    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+def _vertical(upright: FloatArray, faces: IntArray, normals: FloatArray, areas: FloatArray, blur: float) -> BoolArray:
+    """Tell which faces are seen edge-on."""
+    vertical = np.abs(normals[:, 2]) <= VERTICAL_SHARE * areas
+    steep = np.flatnonzero(vertical)
+    corners = upright[faces[steep], :2]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    vertical[steep] = 2 * np.abs(normals[steep, 2]) <= blur * longest
+    return vertical
 
 
-def _border_loops(faces: IntArray, edges: _Edges) -> tuple[int, int]:
-    """Count the border's closed loops, and its vertices in which several fans of faces meet."""
-    border = edges.border()
-    if len(border) == 0:
-        return 0, 0
-    flat = faces.ravel()
-    at_border = np.zeros(int(faces.max()) + 1, bool)
-    at_border[flat[border]] = True
-    at_border[flat[_next(border)]] = True
-    corners = np.flatnonzero(at_border[flat])
-    number = np.full(faces.size, -1, np.int64)
-    number[corners] = np.arange(len(corners))
-    # two faces on one edge share the fans at both its ends
-    first, second = edges.pairs()
-    same = flat[first] == flat[second]
-    links = [
-        (first, np.where(same, second, _next(second))),
-        (_next(first), np.where(same, _next(second), second)),
-    ]
-    left = np.concatenate([number[a] for a, _ in links])
-    right = np.concatenate([number[b] for _, b in links])
-    fan = _face_components(len(corners), left[left >= 0], right[left >= 0])
-    fans_per_vertex = np.bincount(np.unique(np.column_stack([flat[corners], fan]), axis=0)[:, 0])
-    start, end = fan[number[border]], fan[number[_next(border)]]
-    loop = _face_components(int(fan.max()) + 1, start, end)
-    return len(np.unique(loop[start])), int((fans_per_vertex > 1).sum())
+# ------------------------------------------------------------ the front
 
 
-def _largest_part(faces: IntArray, chosen: IntArray, weight: FloatArray) -> IntArray:
-    """Return the edge-connected part of the chosen faces with the largest weight, manifold and wound alike.
+def _largest_part(xy: FloatArray, faces: IntArray, chosen: IntArray, weight: FloatArray, blur: float) -> IntArray:
+    """Return the connected part of the chosen faces with the largest weight, manifold and wound alike.
+
+    Borders closer than `blur` in the plane connect, whatever the step between them.
 
     Where two of its faces lie on the same side of an edge (slivers that the overlap test let pass), the
     heavier stays.
     """
     while True:
-        first, second = _Edges.of(faces[chosen]).pairs()
-        label = _face_components(len(chosen), first // 3, second // 3)
+        edges = Edges.of(faces[chosen])
+        first, second = edges.pairs
+        label = components(len(chosen), first // 3, second // 3)
+        if label.any():
+            touching = seams(xy, edges, blur)
+            label = components(int(label.max()) + 1, label[touching[0] // 3], label[touching[1] // 3])[label]
         best = int(np.argmax(np.bincount(label, weights=weight[chosen])))
         part = chosen[label == best]
         directed = faces[part].ravel() * (int(faces.max()) + 1) + np.roll(faces[part], -1, axis=1).ravel()
@@ -623,174 +674,6 @@ def _largest_part(faces: IntArray, chosen: IntArray, weight: FloatArray) -> IntA
         if not repeated.any():
             return part
         chosen = np.delete(part, np.unique(order[1:][repeated] // 3))
-
-
-# ------------------------------------------------------------ what lies above what
-
-
-def hidden_faces(points: FloatArray, faces: IntArray) -> IntArray:
-    """Return the faces below others, of faces that all show their front (rows of `faces`, ascending)."""
-    if len(faces) == 0:
-        return np.empty(0, np.int64)
-    edges = _Edges.of(faces)
-    first, second = edges.pairs()
-    inner = faces.ravel()[first] != faces.ravel()[second]
-    at_border = np.ones(faces.size, bool)
-    at_border[first[inner]] = False
-    at_border[second[inner]] = False
-    triangles = points[faces]
-    some = np.flatnonzero(at_border.reshape(-1, 3).any(axis=1))
-    if len(_overlaps(triangles, some)) == 0:
-        return np.empty(0, np.int64)
-    pairs = _overlaps(triangles, np.arange(len(faces)))
-    return np.unique(_lower_ones(triangles, pairs))
-
-
-def _overlaps(triangles: FloatArray, members: IntArray) -> IntArray:
-    """Return the pairs (member, other) of triangles (F, 3, 3) that overlap in the plane."""
-    xy = np.ascontiguousarray(triangles[:, :, :2])
-    low, high = xy.min(axis=1), xy.max(axis=1)
-    origin = low.min(axis=0)
-    size = high.max(axis=0) - origin
-    extent = float(size.max())
-    # cells about as large as the members, so that each lies in a few
-    typical = float(np.sqrt(np.mean(np.prod(high[members] - low[members], axis=1))))
-    cell = max(typical, extent / max(2.0 * np.sqrt(len(members)), 1.0), 1e-300)
-    shape = np.maximum(np.ceil(size / cell).astype(np.int64), 1)
-    cells_low = np.clip(((low - origin) / cell).astype(np.int64), 0, shape - 1)
-    cells_high = np.clip(((high - origin) / cell).astype(np.int64), 0, shape - 1)
-    return _overlapping_pairs(xy, members, cells_low, cells_high, shape, OVERLAP_TOLERANCE * extent)
-
-
-@entry
-def _overlapping_pairs(
-    xy: np.ndarray,
-    members: np.ndarray,
-    cells_low: np.ndarray,
-    cells_high: np.ndarray,
-    shape: np.ndarray,
-    tolerance: float,
-) -> np.ndarray:
-    columns, rows = shape[0], shape[1]
-    start = np.zeros(columns * rows + 1, np.int64)
-    for m in members:
-        for i in range(cells_low[m, 0], cells_high[m, 0] + 1):
-            for j in range(cells_low[m, 1], cells_high[m, 1] + 1):
-                start[i * rows + j + 1] += 1
-    # plain loops: NumPy's sums and slices take Numba two seconds to compile
-    fill = np.empty(columns * rows, np.int64)
-    for cell in range(columns * rows):
-        fill[cell] = start[cell]
-        start[cell + 1] += start[cell]
-    content = np.empty(start[columns * rows], np.int64)
-    is_member = np.zeros(len(xy), np.bool_)
-    for m in members:
-        is_member[m] = True
-        for i in range(cells_low[m, 0], cells_high[m, 0] + 1):
-            for j in range(cells_low[m, 1], cells_high[m, 1] + 1):
-                content[fill[i * rows + j]] = m
-                fill[i * rows + j] += 1
-    found = np.empty((64, 2), np.int64)
-    n = 0
-    for f in range(len(xy)):
-        for i in range(cells_low[f, 0], cells_high[f, 0] + 1):
-            for j in range(cells_low[f, 1], cells_high[f, 1] + 1):
-                for k in range(start[i * rows + j], start[i * rows + j + 1]):
-                    m = content[k]
-                    if m == f or (is_member[f] and m < f):
-                        continue
-                    # each pair once: in the lowest cell that both reach
-                    if i != max(cells_low[f, 0], cells_low[m, 0]):
-                        continue
-                    if j != max(cells_low[f, 1], cells_low[m, 1]):
-                        continue
-                    if _separated(xy[f], xy[m], tolerance) or _separated(xy[m], xy[f], tolerance):
-                        continue
-                    if n == len(found):
-                        longer = np.empty((2 * n, 2), np.int64)
-                        for q in range(n):
-                            longer[q, 0] = found[q, 0]
-                            longer[q, 1] = found[q, 1]
-                        found = longer
-                    found[n, 0] = m
-                    found[n, 1] = f
-                    n += 1
-    return found[:n]
-
-
-@inner(inline=True)
-def _separated(a: np.ndarray, b: np.ndarray, tolerance: float) -> bool:
-    """Tell whether an edge of the counter-clockwise triangle `a` has all of `b` on its outer side."""
-    for i in range(3):
-        px, py = a[i, 0], a[i, 1]
-        dx, dy = a[(i + 1) % 3, 0] - px, a[(i + 1) % 3, 1] - py
-        slack = tolerance * np.sqrt(dx * dx + dy * dy)
-        outside = True
-        for j in range(3):
-            if dx * (b[j, 1] - py) - dy * (b[j, 0] - px) > slack:
-                outside = False
-                break
-        if outside:
-            return True
-    return False
-
-
-@entry
-def _lower_ones(triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return, of each pair, the triangle lower at the centre of the overlap (in a tie the later)."""
-    lower = np.empty(len(pairs), np.int64)
-    polygon = np.empty((16, 2))
-    clipped = np.empty((16, 2))
-    for k in range(len(pairs)):
-        a, b = triangles[pairs[k, 0]], triangles[pairs[k, 1]]
-        n = 3
-        for j in range(3):
-            polygon[j, 0], polygon[j, 1] = b[j, 0], b[j, 1]
-        for i in range(3):  # Sutherland and Hodgman: cut b by each edge of a
-            px, py = a[i, 0], a[i, 1]
-            dx, dy = a[(i + 1) % 3, 0] - px, a[(i + 1) % 3, 1] - py
-            m = 0
-            for j in range(n):
-                qx, qy = polygon[j, 0], polygon[j, 1]
-                rx, ry = polygon[(j + 1) % n, 0], polygon[(j + 1) % n, 1]
-                side_q = dx * (qy - py) - dy * (qx - px)
-                side_r = dx * (ry - py) - dy * (rx - px)
-                if side_q >= 0:
-                    clipped[m, 0], clipped[m, 1] = qx, qy
-                    m += 1
-                if (side_q > 0 and side_r < 0) or (side_q < 0 and side_r > 0):
-                    t = side_q / (side_q - side_r)
-                    clipped[m, 0], clipped[m, 1] = qx + t * (rx - qx), qy + t * (ry - qy)
-                    m += 1
-            polygon, clipped = clipped, polygon
-            n = m
-            if n == 0:
-                break
-        x = y = 0.0
-        if n > 0:
-            for j in range(n):
-                x += polygon[j, 0] / n
-                y += polygon[j, 1] / n
-        else:  # a rounding case: they hardly touch
-            for j in range(3):
-                x += (a[j, 0] + b[j, 0]) / 6
-                y += (a[j, 1] + b[j, 1]) / 6
-        above = _height(a, x, y) - _height(b, x, y)
-        if above == 0:
-            lower[k] = max(pairs[k, 0], pairs[k, 1])
-        else:
-            lower[k] = pairs[k, 1] if above > 0 else pairs[k, 0]
-    return lower
-
-
-@inner
-def _height(t: np.ndarray, x: float, y: float) -> float:
-    """Return the height of a triangle's plane over (x, y)."""
-    bx, by, bz = t[1, 0] - t[0, 0], t[1, 1] - t[0, 1], t[1, 2] - t[0, 2]
-    cx, cy, cz = t[2, 0] - t[0, 0], t[2, 1] - t[0, 1], t[2, 2] - t[0, 2]
-    x, y = x - t[0, 0], y - t[0, 1]
-    area = bx * cy - by * cx
-    return t[0, 2] + ((x * cy - y * cx) * bz + (bx * y - by * x) * cz) / area
 
 
 @entry
@@ -821,7 +704,7 @@ def _seen_sides(triangles: np.ndarray, is_front: np.ndarray, rays: int) -> tuple
                         inside = False
                         break
                 if inside:
-                    z = _height(t, x, y)
+                    z = height_at(triangles, f, x, y)
                     if z > top[i, j]:
                         top[i, j] = z
                         seen[i, j] = 1 if is_front[f] else -1

@@ -216,9 +216,7 @@ def _model(
     points = np.column_stack([xy * tile.unit, z])
     a, b, c, d = corners[np.lexsort((xy[corners, 0], xy[corners, 1]))]
     faces = np.array([[a, b, d], [a, d, c]])
-    return placed_model(
-        tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight
-    )
+    return placed_model(tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight)
 
 
 @entry

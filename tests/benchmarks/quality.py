@@ -79,7 +79,6 @@ CLASSES = (
 )
 
 
-
 class RandomOfAllSizes(Sampling):
     """Random subsets with sizes spread over the logarithm as those of the seeds are."""
 

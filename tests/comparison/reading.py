@@ -1,7 +1,7 @@
 """What README.md beside this file says in numbers and the report's own tables do not: made from stored runs.
 
-    meshsimp run configs/scans.yaml --models FOLDER -o results --jobs 2
-    python tests/comparison/reading.py results
+meshsimp run configs/scans.yaml --models FOLDER -o results --jobs 2
+python tests/comparison/reading.py results
 """
 
 from __future__ import annotations
@@ -59,14 +59,16 @@ def papers_tables(cases: list[Case]) -> Iterator[str]:
     rows = []
     for case, of_coverage, of_epsilon in zip(cases, PAPER_COVERAGE, PAPER_EPSILON, strict=True):
         cover, literal = case.coverage.values, case.literal_epsilon.values
-        rows.append([
-            case.problem.name,
-            pair(*of_coverage),
-            pair(cover[a, b].mean(), cover[b, a].mean()),
-            " / ".join(f"{value:.3f}" for value in of_epsilon),
-            pair(np.median(literal[a, b]), np.median(literal[b, a])),
-            pair(between(case, a, b, within_reach), between(case, b, a, within_reach)),
-        ])
+        rows.append(
+            [
+                case.problem.name,
+                pair(*of_coverage),
+                pair(cover[a, b].mean(), cover[b, a].mean()),
+                " / ".join(f"{value:.3f}" for value in of_epsilon),
+                pair(np.median(literal[a, b]), np.median(literal[b, a])),
+                pair(between(case, a, b, within_reach), between(case, b, a, within_reach)),
+            ]
+        )
     yield from table("model | C, paper | C, here | epsilon, paper | epsilon, here | epsilon within reach, here", *rows)
 
 

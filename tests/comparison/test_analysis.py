@@ -283,10 +283,7 @@ class TestComparisons:
 
     def test_the_larger_front_wins_by_cardinality(self):
         rng = np.random.default_rng(5)
-        runs = {
-            name: {seed: front_of(rng, 1, size) for seed in range(6)}
-            for name, size in (("few", 4), ("many", 90))
-        }
+        runs = {name: {seed: front_of(rng, 1, size) for seed in range(6)} for name, size in (("few", 4), ("many", 90))}
         comparison = compared(runs, "few", "many", "cardinality")
         assert comparison.winner == "many"
         assert comparison.sample_a.max() < comparison.sample_b.min()
@@ -345,9 +342,7 @@ class TestSelection:
             assert triangles.triangles <= middle.triangles <= error.triangles
             for solution in selected[method]:
                 found_in = tuple(
-                    seed
-                    for seed, F in seeds.items()
-                    if (F == [solution.error, solution.triangles]).all(axis=1).any()
+                    seed for seed, F in seeds.items() if (F == [solution.error, solution.triangles]).all(axis=1).any()
                 )
                 assert solution.seeds == found_in
                 assert found_in
@@ -375,9 +370,7 @@ class TestSelection:
 
     def test_trade_off_does_not_depend_on_units(self):
         front = elbow()
-        choices = {
-            trade_off(front * [unit, 1], random_state=np.random.default_rng(1)) for unit in (1, 1e-6, 1e6)
-        }
+        choices = {trade_off(front * [unit, 1], random_state=np.random.default_rng(1)) for unit in (1, 1e-6, 1e6)}
         assert len(choices) == 1
         assert 0 < choices.pop() < len(front) - 1
 
@@ -440,9 +433,7 @@ class TestAttainment:
         rng = np.random.default_rng(n_runs)
         runs = {seed: rng.integers(0, 9, (4, 2)).astype(float) for seed in range(n_runs)}
         grid = np.array(list(itertools.product(np.arange(10.0), repeat=2)))
-        attained = np.mean(
-            [(F[None] <= grid[:, None]).all(axis=2).any(axis=1) for F in runs.values()], axis=0
-        )
+        attained = np.mean([(F[None] <= grid[:, None]).all(axis=2).any(axis=1) for F in runs.values()], axis=0)
         for percentage, surface in attainment_surfaces(runs, (20, 40, 50, 70, 100)).items():
             beyond = (surface[None] <= grid[:, None]).all(axis=2).any(axis=1)
             assert_array_equal(beyond, attained >= percentage / 100 - 1e-12)

@@ -178,9 +178,7 @@ def test_the_border_stays_only_if_it_is_preserved():
 def test_scaled_to_a_unit_diagonal_the_unit_of_the_file_does_not_matter():
     vertices, faces = quadric_collapse(VERTICES, FACES, 200, preserve_boundary=False, unit_diagonal=True)
     for unit in (2.0**-20, 2.0**10):
-        scaled, same = quadric_collapse(
-            VERTICES * unit, FACES, 200, preserve_boundary=False, unit_diagonal=True
-        )
+        scaled, same = quadric_collapse(VERTICES * unit, FACES, 200, preserve_boundary=False, unit_diagonal=True)
         assert_array_equal(same, faces)
         assert_allclose(scaled, vertices * unit, rtol=1e-12, atol=1e-12 * unit)
 
@@ -203,9 +201,7 @@ def test_one_mesh_has_one_listing():
         position = np.argsort(order)
         turned = np.array([np.roll(face, rng.integers(3)) for face in position[FACES]])
         padded = np.vstack([turned, turned[:9], [[4, 4, 5]]])  # a few twice, one degenerate
-        same, same_faces = meshlab._canonical(
-            np.vstack([VERTICES[order], [[9, 9, 9]]]), rng.permutation(padded)
-        )
+        same, same_faces = meshlab._canonical(np.vstack([VERTICES[order], [[9, 9, 9]]]), rng.permutation(padded))
         assert_array_equal(same, vertices)
         assert_array_equal(same_faces, faces)
 

@@ -78,7 +78,6 @@ def refusal(path: Path, **kwargs: Any) -> str:
     return message
 
 
-
 def hill(rows=9, columns=12):
     y, x = np.mgrid[:rows, :columns]
     return (50 * np.exp(-((x - 4.2) ** 2 + (y - 3.1) ** 2) / 9)).astype(np.float32)

@@ -83,8 +83,6 @@ def test_a_window_is_a_part_of_the_whole_with_the_same_places_and_rows(tiff, opt
     assert part.georeference["window"] == [17, 5, 20, 30]
 
 
-
-
 @pytest.mark.parametrize("window", [(0, 0, 13, 9), (3, 8, 4, 2), (10**12, 0, 4, 4)])
 def test_a_window_beyond_the_raster_is_refused(tiff, tmp_path, window):
     np.save(tmp_path / "a.npy", hill())

@@ -649,9 +649,7 @@ def test_simplify_writes_the_page_unless_told_not_to(tmp_path, capsys):
 
 
 def test_data_cannot_end_their_element():
-    page = html_document(
-        "base.html", (), {"name": "</script><!-- & \u2028"}, title="<b>", libraries="none"
-    )
+    page = html_document("base.html", (), {"name": "</script><!-- & \u2028"}, title="<b>", libraries="none")
     inside = page.partition('id="data">')[2].partition("</script>")[0]
     assert not set("<>&\u2028") & set(inside)
     assert json.loads(inside) == {"name": "</script><!-- & \u2028"}

@@ -68,10 +68,7 @@ class TestMOEAD:
             k = algorithm.order[position]
             for j in range(20):
                 g = [
-                    max(
-                        w * abs(f - z)
-                        for w, f, z in zip(algorithm.ref_dirs[j], x.F, algorithm.ideal, strict=True)
-                    )
+                    max(w * abs(f - z) for w, f, z in zip(algorithm.ref_dirs[j], x.F, algorithm.ideal, strict=True))
                     for x in (before[j], child)
                 ]
                 replaced = j in algorithm.neighbors[k] and g[1] <= g[0]

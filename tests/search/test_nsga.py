@@ -35,9 +35,7 @@ class TestNSGA2:
         v1, v2 = (minimize(GridProblem(10), make(), ("n_gen", 11), seed=1) for make in (nsga2_v1, nsga2_v2))
         assert v1.algorithm.evaluator.n_eval == 1100
         extra = v2.algorithm.evaluator.n_eval - 1100
-        assert (
-            0.9 * 1200 < extra < 1.05 * 1200
-        )  # 10 generations of 50 pairs, 0.8 of them crossing; some are twins
+        assert 0.9 * 1200 < extra < 1.05 * 1200  # 10 generations of 50 pairs, 0.8 of them crossing; some are twins
 
     def test_refilling_duplicates_does_not_exceed_a_budget_by_more_than_one_generation(self) -> None:
         problem = GridProblem(3)  # 32 solutions in all

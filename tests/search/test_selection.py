@@ -22,9 +22,7 @@ def test_the_tournament_decides_as_pymoo_does(max_triangles: int | None) -> None
         algorithm.next()
     P = np.random.default_rng(1).integers(40, size=(400, 2))
     sides = [P, P[:, ::-1]]
-    ours = [
-        crowded_tournament(algorithm.pop, p, random_state=np.random.default_rng(2))[:, 0] for p in sides
-    ]
+    ours = [crowded_tournament(algorithm.pop, p, random_state=np.random.default_rng(2))[:, 0] for p in sides]
     theirs = [binary_tournament(algorithm.pop, p, algorithm)[:, 0] for p in sides]
     decided = (ours[0] == ours[1]) & (theirs[0] == theirs[1])
     assert decided.sum() > 300
@@ -33,9 +31,7 @@ def test_the_tournament_decides_as_pymoo_does(max_triangles: int | None) -> None
 
 
 def test_undecided_tournaments_are_drawn_by_lot() -> None:
-    pop = Population.new(
-        "X", np.ones((2, 4), dtype=bool), "F", np.ones((2, 2)), "crowding", [np.inf, np.inf]
-    )
+    pop = Population.new("X", np.ones((2, 4), dtype=bool), "F", np.ones((2, 2)), "crowding", [np.inf, np.inf])
     P = np.repeat([[0, 1]], 2000, axis=0)
     winners = crowded_tournament(pop, P, random_state=np.random.default_rng(1))
     assert abs(winners.mean() - 0.5) < 4 * 0.5 / np.sqrt(2000)

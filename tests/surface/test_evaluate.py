@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 from delaunay import faces_of
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from samples import SMALL, stepped_model, subset, surface
 
@@ -199,6 +199,7 @@ def test_the_listing_of_the_vertices_does_not_matter(seed, share, name):
     np.testing.assert_array_equal(one.source_index, source.rows[order[other.source_index]])
     np.testing.assert_array_equal(one.corners, other.corners)
     kept = subset(one, share, seed)
+    assume(np.isfinite(surface(one).evaluate(kept)[0, 0]))  # so few that they span nothing
     first, second = surface(one).simplify(kept), surface(other).simplify(kept)
     np.testing.assert_array_equal(first.faces, second.faces)
     assert first.quality == second.quality

@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -22,10 +22,15 @@ from meshsimp_pymoo.surface.orient import (
     SurfaceFacts,
     check_open_surface,
     front_patch,
+    seen_upright,
     surface_facts,
     up_direction,
     upright_rotation,
 )
+from meshsimp_pymoo.surface.overlap import hidden_faces
+
+# what a front leaves out is said each time; here only where that is the question
+pytestmark = pytest.mark.filterwarnings("ignore:.* left out of the front patch")
 
 AXES = ["x", "y", "z", "-x", "-y", "-z"]
 
@@ -69,7 +74,7 @@ def refusal(source: SourceMesh, up: object = "z") -> str:
     assert "\n" not in message
     assert message.startswith(source.name)
     assert "--patch front" in message or "--up" in message
-    assert message == facts_of(source, up).refusal
+    assert message == surface_facts(source, upright(source, up), until=FOLD_SHARE).refusal
     return message
 
 
@@ -164,12 +169,26 @@ def test_auto_finds_the_axis_that_a_relief_faces(axis):
     assert_array_equal(up_direction(source), up_direction(source, axis))
 
 
-def test_auto_ignores_a_slight_tilt_and_follows_a_strong_one():
-    for degrees, axis in ((10, True), (20, True), (25, False), (40, False), (54, False)):
-        rotation = trimesh.transformations.rotation_matrix(np.radians(degrees), [1, 2, 0])[:3, :3]
-        flat = turned(relief(height=0.02), rotation)
-        expected = np.array([0, 0, 1.0]) if axis else rotation @ [0, 0, 1]
-        assert_allclose(up_direction(flat), expected, atol=0.02)
+def tilted(source: SourceMesh, degrees: float, *axis: float) -> SourceMesh:
+    return turned(source, trimesh.transformations.rotation_matrix(np.radians(degrees), axis)[:3, :3])
+
+
+def test_auto_keeps_the_axis_of_the_file_while_the_surface_passes_along_it():
+    for degrees in (10, 20, 40, 54):
+        assert_array_equal(up_direction(tilted(relief(height=0.02), degrees, 1, 2, 0)), [0, 0, 1])
+
+
+def test_an_axis_far_off_that_folds_the_surface_more_gives_way_to_the_net_normal():
+    # ripples of 50 degrees tilted by 41: along z a few in a thousand faces turn away, from the net normal none
+    x = np.linspace(0, 40, 81)
+    height = np.where((np.arange(81) == 40)[:, None] & (np.arange(60) % 6 == 3), 0.6, 0.0)
+    grid = grid_source(height, x[1], x[1])
+    spikes = tilted(build_source(grid.points, grid.faces), 41, 0, 1, 0)
+    assert 0 < facts_of(spikes).folds < FOLD_SHARE * len(grid.faces)
+    assert facts_of(spikes).refusal is None
+    up, facts = seen_upright(spikes)
+    assert up @ [np.sin(np.radians(41)), 0, np.cos(np.radians(41))] > 0.999
+    assert facts.n_folded == 0
 
 
 @given(vector=vectors, shift=st.sampled_from([0.0, 1e7]))
@@ -177,11 +196,9 @@ def test_auto_ignores_a_slight_tilt_and_follows_a_strong_one():
 def test_a_relief_turned_anyhow_comes_out_upright_and_without_folds(vector, shift):
     source = turned(relief(6, 0.1), upright_rotation(vector).T)
     source = build_source(source.points + shift, source.faces)
-    up = up_direction(source)
-    assert up @ vector >= 0.9 * np.linalg.norm(vector)
-    local = source.points - source.points[0]
-    faces, facts = check_open_surface(source, local @ upright_rotation(up).T)
-    assert_array_equal(faces, source.faces)
+    up, facts = seen_upright(source)
+    assert up @ vector > 0.2 * np.linalg.norm(vector)
+    assert facts.refusal is None
     assert facts.folds == facts.hidden == facts.vertical_faces == 0
 
 
@@ -204,10 +221,51 @@ def test_a_steep_height_field_on_a_tilted_outline_is_seen_along_its_axis():
     assert_array_equal(up_direction(build_source(grid.points, grid.faces)), [0, 0, 1])
 
 
-def test_a_grid_is_seen_from_above_whatever_its_slope():
-    steep = grid_source(np.arange(20.0)[:, None] * 30 * np.ones(5), 1.0, 1.0)
-    assert_array_equal(up_direction(steep), [0, 0, 1])
-    assert abs(up_direction(build_source(steep.points, steep.faces))[2]) < 0.1
+@pytest.mark.parametrize("degrees", [False, True])
+def test_heights_large_against_the_extent_are_seen_along_the_axis_of_the_file(degrees):
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(50, 50)).cumsum(axis=0).cumsum(axis=1)
+    grid = grid_source(380 + 600 * (z - z.min()) / np.ptp(z), 1.0, 1.0)
+    scale = [1 / 12000, 1 / 12000, 1] if degrees else [1, 1, 1]
+    source = build_source(grid.points * scale + [7, 46, 0] * np.array(scale), grid.faces)
+    up, facts = seen_upright(source)
+    assert_array_equal(up, [0, 0, 1])
+    assert (facts.folds, facts.hidden, facts.vertical_faces, facts.refusal) == (0, 0, 0, None)
+    patch = front_patch(source)
+    assert len(patch.faces) == len(source.faces)
+    slope = grid_source(np.arange(20.0)[:, None] * 30 * np.ones(5), 1.0, 1.0)
+    assert_array_equal(up_direction(build_source(slope.points, slope.faces)), [0, 0, 1])
+
+
+def test_a_steep_step_turned_by_ten_degrees_is_seen_along_its_normal():
+    # 85 degrees over two columns; along z, turned about the step, it folds over; along y and x it does, too
+    x, y = np.meshgrid(np.arange(60) - 29.5, np.arange(60.0), indexing="ij")
+    points = np.stack([x, y, np.clip(x * np.tan(np.radians(85)), -6, 6)], axis=-1).reshape(-1, 3)
+    for about in ([1, 0, 0], [0, 1, 0], [0, -1, 0]):
+        step = tilted(build_source(points, grid_source(x, 1.0, 1.0).faces[:, ::-1]), 10, *about)
+        up, facts = seen_upright(step)
+        assert facts.refusal is None
+        assert_array_equal(up, up_direction(step))
+        check_open_surface(step, upright(step, up))
+
+
+def test_a_refusal_names_the_best_direction_and_its_folds():
+    # a sheet rolled up by two turns and a half, the axis along y: from everywhere it hides itself
+    roll = ramp(2.5)
+    angle = np.linspace(0, 5 * np.pi, 240)
+    shell = np.stack(
+        np.broadcast_arrays((2 + angle / 9) * np.cos(angle), np.arange(6)[:, None], (2 + angle / 9) * np.sin(angle)), -1
+    )
+    source = build_source(shell.swapaxes(0, 1).reshape(-1, 3), roll.faces, name="roll.ply")
+    up, facts = seen_upright(source)
+    found = re.escape(",".join(f"{value:.6g}" for value in up))
+    assert re.match(
+        rf"roll.ply: seen from {found} \(the best direction that --up auto found\), at least {facts.folds} of 2390 "
+        rf"faces \({facts.folds / 2390:.2%}\) are folded over",
+        facts.refusal,
+    )
+    assert facts.folds <= min(facts_of(source, axis).folds for axis in "xz")
+    assert facts_of(source, "y").vertical_faces == 2390, "not the best: it is seen edge-on from there"
 
 
 @pytest.mark.parametrize("shape", ["icosphere", "torus", "box", "capsule"])
@@ -396,43 +454,42 @@ def test_a_delaunay_triangulation_never_overlaps_itself(seed, scale, shift):
     assert (facts.folds, facts.hidden) == (0, 0)
 
 
-def hidden_by_brute_force(points: np.ndarray, faces: np.ndarray) -> set[int]:
-    """Return the faces that lie below another at one of many sample points (all show their front)."""
-    rng = np.random.default_rng(0)
-    weight = rng.dirichlet([1, 1, 1], 400)
-    below = set()
-    corners = points[faces]
-    for k in range(len(faces)):
-        sample = weight @ corners[k]
-        for other in range(len(faces)):
-            if other == k:
-                continue
-            a, b, c = corners[other]
-            matrix = np.array([b[:2] - a[:2], c[:2] - a[:2]]).T
-            u, v = np.linalg.solve(matrix, (sample[:, :2] - a[:2]).T)
-            inside = (u > 1e-6) & (v > 1e-6) & (u + v < 1 - 1e-6)
-            z = a[2] + u * (b[2] - a[2]) + v * (c[2] - a[2])
-            if (z[inside] > sample[inside, 2]).any():
-                below.add(k)
-    return below
+def common_area(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the area that two counter-clockwise triangles (3, 2) share: b, cut by each edge of a."""
+    polygon = list(b)
+    for p, q in zip(a, np.roll(a, -1, axis=0), strict=True):
+        side = [(q - p)[0] * (r - p)[1] - (q - p)[1] * (r - p)[0] for r in polygon]
+        cut = []
+        for k in range(len(polygon)):
+            n = (k + 1) % len(polygon)
+            if side[k] >= 0:
+                cut.append(polygon[k])
+            if side[k] * side[n] < 0:
+                cut.append(polygon[k] + (polygon[n] - polygon[k]) * side[k] / (side[k] - side[n]))
+        polygon = cut
+    x, y = np.array(polygon).reshape(-1, 2).T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
 
 
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=25, deadline=None)
-def test_hidden_faces_are_those_that_brute_force_finds(seed):
+@example(938165)  # three of the overlaps are 2e-5, 4e-4 and 6e-4 of a face: samples may miss them
+def test_hidden_faces_are_those_that_share_an_area_with_a_higher_one(seed):
     rng = np.random.default_rng(seed)
     # flat triangles at different heights: which of two is lower does not depend on where they overlap
     corners = rng.random((12, 3, 2)) * 0.4 + rng.random((12, 1, 2))
     (ax, ay), (bx, by), (cx, cy) = np.moveaxis(corners, 0, 2)
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     corners[area < 0] = corners[area < 0, ::-1]
-    heights = np.repeat(rng.permutation(12), 3)
-    points = np.column_stack([corners.reshape(-1, 2), heights])
-    faces = np.arange(36).reshape(-1, 3)
-    expected = hidden_by_brute_force(points, faces)
-    found = facts_of(build_source(points, faces)).hidden
-    assert found >= len(expected)
-    assert found - len(expected) <= 2, "overlaps too small for the samples are few"
+    height = rng.permutation(12)
+    points = np.column_stack([corners.reshape(-1, 2), np.repeat(height, 3)])
+    shared = [[common_area(a, b) if i != j else 0.0 for j, b in enumerate(corners)] for i, a in enumerate(corners)]
+    below = height[:, None] < height
+    sure = (np.where(below, shared, 0) > 1e-9).any(axis=1)
+    doubtful = (np.where(below, shared, 0) > 0).any(axis=1) & ~sure
+    found = np.zeros(12, bool)
+    found[hidden_faces(points, np.arange(36).reshape(-1, 3))] = True
+    assert_array_equal(found | doubtful, sure | doubtful)
 
 
 # ------------------------------------------------------------ the front patch

@@ -38,7 +38,7 @@ def skirted(*, order=None):
     points = np.vstack([GRID.points, GRID.points[RIM] * [1, 1, 0]])
     k = np.arange(m)
     after = (k + 1) % m
-    walls = np.vstack([np.c_[RIM, n + k, n + after], np.c_[RIM, n + after, RIM[after]]])
+    walls = np.vstack([np.c_[RIM, n + after, n + k], np.c_[RIM, RIM[after], n + after]])
     faces = np.vstack([GRID.faces, walls])
     if order is not None:
         points, faces = points[order], np.argsort(order)[faces]

@@ -59,10 +59,10 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
 
     from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.errors import ModelError
-    from meshsimp_pymoo.opening import open_source
-    from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
+    from meshsimp_pymoo.opening import mended_source
+    from meshsimp_pymoo.surface.orient import seen_upright
 
-    source = open_source(model, options)
+    source, mended = mended_source(model, options)
     used = source.points[np.unique(source.faces)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     content: dict[str, Any] = {
@@ -73,6 +73,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         "low": low.tolist(),
         "extent": extent.tolist(),
         "attributes": sorted(source.attributes),
+        "mended": asdict(mended),
     }
     rows = {
         "vertices": f"{len(used):,}",
@@ -80,15 +81,15 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         "extent": " x ".join(f"{value:.6g}" for value in extent) + " [file units]",
         "from": ", ".join(f"{value:.10g}" for value in low),
         "attributes": ", ".join(sorted(source.attributes)) or "none",
+        "mended": str(mended) or "nothing",
     }
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
     try:
-        up = up_direction(source, options.up)
+        up, facts = seen_upright(source, options.up)
     except ModelError as problem:
         refusal: str | None = str(problem)
     else:
-        facts = surface_facts(source, source.points @ upright_rotation(up).T)
         refusal = facts.refusal
         content |= {"up": up.tolist(), "fold_share": facts.fold_share} | asdict(facts)
         flipped = " (its faces are wound the other way)" if facts.flipped else ""
@@ -98,7 +99,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
             "parts": f"{facts.components}",
             "border": f"{facts.border_edges:,} edges, {facts.border_loops} closed loop(s)",
             "vertical": f"{facts.vertical_faces:,} faces",
-            "folded over": f"{facts.folds + facts.hidden:,} faces ({facts.fold_share:.2%})",
+            "folded over": f"{'' if facts.complete else 'at least '}{facts.n_folded:,} faces ({facts.fold_share:.2%})",
         }
     rows["verdict"] = "refused" if refusal else "usable: an open height field"
     if as_json:

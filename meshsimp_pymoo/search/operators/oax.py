@@ -151,9 +151,7 @@ class OAX(PairCrossover):
             )
 
         # Rows that are the same mesh, because the parents agree on some segments, are evaluated once.
-        differs = np.array(
-            [np.logical_or.reduceat(a ^ b, c[:-1]) for a, b, c in zip(first, second, cuts, strict=True)]
-        )
+        differs = np.array([np.logical_or.reduceat(a ^ b, c[:-1]) for a, b, c in zip(first, second, cuts, strict=True)])
         y = np.empty((n_matings, len(array)))
         slots = np.full(y.shape, -1)
         candidates: list[NDArray[np.bool_]] = []
@@ -248,9 +246,7 @@ def orthogonal_array(n_factors: int) -> NDArray[np.bool_]:
     return np.column_stack(columns)
 
 
-def child_levels(
-    y: NDArray[np.float64], array: NDArray[np.bool_], differs: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
+def child_levels(y: NDArray[np.float64], array: NDArray[np.bool_], differs: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Choose from which parent the two children take each segment.
 
     Parameters

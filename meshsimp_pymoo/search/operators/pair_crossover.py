@@ -73,7 +73,5 @@ class PairCrossover(Crossover):
         if crosses.any():
             mates = [pairs[k] for k in np.flatnonzero(crosses).tolist()]
             parental = X if crosses.all() else X[:, crosses]
-            children[:, crosses] = self._do(
-                problem, parental, *args, random_state=random_state, mates=mates, **kwargs
-            )
+            children[:, crosses] = self._do(problem, parental, *args, random_state=random_state, mates=mates, **kwargs)
         return Population.new("X", children.reshape(-1, X.shape[2]))

@@ -97,9 +97,7 @@ def test_a_problem_without_a_mesh_is_refused_by_name(kind: str, name: str) -> No
 def test_float_chromosomes_are_refused_with_the_way_out(kind: str, name: str) -> None:
     pop = Population.new("X", genomes(0, 4).astype(float))
     with pytest.raises(TypeError, match=r"not float64; pass sampling=RandomSubset\(\)"):
-        OPERATORS[kind][name]()(
-            PROBLEM, pop.reshape(2, 2) if kind == "crossover" else pop, random_state=rng(1)
-        )
+        OPERATORS[kind][name]()(PROBLEM, pop.reshape(2, 2) if kind == "crossover" else pop, random_state=rng(1))
 
 
 @pytest.mark.parametrize("name", CROSSOVERS)
@@ -183,9 +181,7 @@ def test_pairs_that_do_not_cross_have_copies_of_themselves(name: str) -> None:
 
 @pytest.mark.parametrize("name", CROSSOVERS)
 @pytest.mark.parametrize(("argument", "value"), [("prob", 1.2), ("prob", -0.1), ("n_offsprings", 3)])
-def test_impossible_crossover_arguments_are_refused_with_their_value(
-    name: str, argument: str, value: Any
-) -> None:
+def test_impossible_crossover_arguments_are_refused_with_their_value(name: str, argument: str, value: Any) -> None:
     with pytest.raises(ValueError, match=f"{argument} = {value}"):
         OPERATORS["crossover"][name](**{argument: value})
 

@@ -38,9 +38,7 @@ def test_arrays_are_those_of_the_public_code(rows: list[str]) -> None:
     assert ["".join(str(int(b)) for b in row) for row in orthogonal_array(len(rows[0]))] == rows
 
 
-def slow_twin(
-    problem: GridProblem, first: list[bool], second: list[bool], cuts: list[int], rows: list[str]
-) -> list:
+def slow_twin(problem: GridProblem, first: list[bool], second: list[bool], cuts: list[int], rows: list[str]) -> list:
     """Return both children, following the published procedure one step at a time, in plain Python."""
     n_segments = len(cuts) - 1
 
@@ -58,14 +56,10 @@ def slow_twin(
     y = [error(mix(row)) for row in rows]
     best, difference = "", []
     for j in range(n_segments):
-        sums = {
-            level: sum(y_t for y_t, row in zip(y, rows, strict=True) if row[j] == level) for level in "01"
-        }
+        sums = {level: sum(y_t for y_t, row in zip(y, rows, strict=True) if row[j] == level) for level in "01"}
         best += "0" if sums["0"] < sums["1"] else "1"
         difference.append(abs(sums["0"] - sums["1"]))
-    differing = [
-        j for j in range(n_segments) if first[cuts[j] : cuts[j + 1]] != second[cuts[j] : cuts[j + 1]]
-    ]
+    differing = [j for j in range(n_segments) if first[cuts[j] : cuts[j + 1]] != second[cuts[j] : cuts[j + 1]]]
 
     def flipped(positions: list[int]) -> list[bool]:
         return mix("".join(str(int(b) ^ (j in positions)) for j, b in enumerate(best)))
@@ -105,9 +99,7 @@ def test_on_an_additive_error_the_first_child_is_the_best_of_all_combinations(na
         cuts = random_cuts(25, ORTHOGONAL_ARRAYS[name], rng)
         lost = [np.add.reduceat(problem.weights * ~parent.X, cuts[:-1]) for parent in (first, second)]
         least = np.minimum(*lost).sum()
-        if least < min(
-            first.F[0], second.F[0]
-        ):  # otherwise a parent is the best, and children are no parents
+        if least < min(first.F[0], second.F[0]):  # otherwise a parent is the best, and children are no parents
             assert problem.evaluate(children[0, k])[0] == least
             gains = np.sort(np.abs(lost[0] - lost[1]))
             to_parents = [parent.F[0] - least for parent in (first, second)]
@@ -245,9 +237,7 @@ def test_refilling_the_same_generation_evaluates_nothing_but_still_mixes() -> No
 
 def test_without_any_evaluator_the_error_tells_what_to_do() -> None:
     problem = GridProblem(8)
-    with pytest.raises(
-        RuntimeError, match=r"no evaluator .*moead\(crossover=OAX\(n_offsprings=1\)\).*Evaluator\(\)"
-    ):
+    with pytest.raises(RuntimeError, match=r"no evaluator .*moead\(crossover=OAX\(n_offsprings=1\)\).*Evaluator\(\)"):
         OAX(prob=1.0)(problem, evaluated_pairs(problem, 2, seed=1), random_state=np.random.default_rng(1))
 
 

@@ -23,9 +23,7 @@ def random_population(rng: np.random.Generator, n: int, n_var: int) -> Populatio
     n_var=st.integers(1, 17),
 )
 @settings(max_examples=200, deadline=None)
-def test_the_same_individuals_stay_as_with_the_default(
-    seed: int, sizes: tuple[int, int, int], n_var: int
-) -> None:
+def test_the_same_individuals_stay_as_with_the_default(seed: int, sizes: tuple[int, int, int], n_var: int) -> None:
     rng = np.random.default_rng(seed)
     n_var = min(n_var, 17)
     populations = [random_population(rng, n, n_var) for n in sizes]

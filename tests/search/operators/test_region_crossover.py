@@ -79,7 +79,7 @@ def test_region_crossover_evaluates_nothing() -> None:
 
 
 def test_without_known_errors_the_message_says_how_to_get_them() -> None:
-    X = (np.random.default_rng(2).random((1, 2, 144)) < 0.5)
+    X = np.random.default_rng(2).random((1, 2, 144)) < 0.5
     without = MeshProblem("peaks:12")
     with pytest.raises(ValueError, match=r"make it with MeshProblem\(\.\.\., regions=256\)"):
         RegionCrossover(prob=1.0)(without, region_pairs(without, X), random_state=np.random.default_rng(0))

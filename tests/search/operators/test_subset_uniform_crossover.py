@@ -21,7 +21,5 @@ def test_uniform_crossover_exchanges_half_of_the_genes_and_loses_none() -> None:
     differ = first ^ second
     exchanged = (children[0] != first)[differ].mean()
     assert abs(exchanged - 0.5) < 4 * np.sqrt(0.25 / differ.sum())
-    per_gene = ((children[0] != first) & differ).sum(axis=0)[~problem.pinned] / differ.sum(axis=0)[
-        ~problem.pinned
-    ]
+    per_gene = ((children[0] != first) & differ).sum(axis=0)[~problem.pinned] / differ.sum(axis=0)[~problem.pinned]
     assert abs(per_gene - 0.5).max() < 4.5 * np.sqrt(0.25 / 35)
