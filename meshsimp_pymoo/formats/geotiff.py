@@ -270,12 +270,12 @@ def _checked_band(raster: Any, band: int | None, name: str) -> tuple[int, np.dty
 
     if band is None:
         found = [number for number, meant in enumerate(raster.colorinterp, start=1) if meant != ColorInterp.alpha]
-        if len(found) != 1:
+        if raster.count > 1 and len(found) != 1:
             raise ModelError(
                 f"{name}: has {raster.count} bands, and heights are one; say which, such as --band 1"
                 f"{_band_titles(raster)}"
             )
-        (band,) = found
+        band = found[0] if found else 1
     if band > raster.count:
         raise ModelError(f"{name}: has {raster.count} bands, and no band {band}; leave the band out, or name another")
     kind = np.dtype(raster.dtypes[band - 1])

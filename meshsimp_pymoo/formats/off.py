@@ -59,7 +59,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     attributes: dict[str, npt.ArrayLike] = {}
     named = 3 + 3 * bool(keyword["normals"]) + 4 * bool(keyword["colors"]) + 2 * bool(keyword["texture"])
     if width > named:
-        warn_of(f"{name}: its vertices have {width} numbers, of which its keyword names {named}; the others stay behind")
+        warn_of(f"{name}: its vertices have {width} numbers, its keyword names {named} of them; the others stay behind")
     if keyword["texture"]:
         warn_of(f"{name}: its texture coordinates stay behind")
     first_color = 6 if keyword["normals"] else 3
