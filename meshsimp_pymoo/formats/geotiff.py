@@ -266,10 +266,9 @@ def _opened(path: Path, name: str, *, keep: bool = False) -> Iterator[Any]:
 def _checked_band(raster: Any, band: int | None, name: str) -> tuple[int, np.dtype[Any], tuple[int, int]]:
     """Return the number of the band of heights, its type, and its rows and columns."""
     import numpy as np
-    from rasterio.enums import ColorInterp
 
     if band is None:
-        found = [number for number, meant in enumerate(raster.colorinterp, start=1) if meant != ColorInterp.alpha]
+        found = sorted({*range(1, raster.count + 1)} - {*_alpha_bands(raster)})
         if raster.count > 1 and len(found) != 1:
             raise ModelError(
                 f"{name}: has {raster.count} bands, and heights are one; say which, such as --band 1"
@@ -282,6 +281,13 @@ def _checked_band(raster: Any, band: int | None, name: str) -> tuple[int, np.dty
     if kind.kind not in "iuf":
         raise ModelError(f"{name}: heights have the type {kind}; give real numbers")
     return band, kind, (raster.height, raster.width)
+
+
+def _alpha_bands(raster: Any) -> list[int]:
+    """Return the numbers of the bands that say where there is something, if there are any."""
+    from rasterio.enums import ColorInterp
+
+    return [number for number, meant in enumerate(raster.colorinterp, start=1) if meant == ColorInterp.alpha]
 
 
 def _band_titles(raster: Any) -> str:
@@ -305,6 +311,8 @@ def _read_part(
     hidden = np.zeros(height.shape, bool)
     if MaskFlags.all_valid not in flags and MaskFlags.nodata not in flags:
         hidden = raster.read_masks(band, window=window) == 0
+    for alpha in set(_alpha_bands(raster)) - {band}:  # which GDAL makes a mask of only if it is of bytes
+        hidden |= raster.read(alpha, window=window) == 0
     missing = raster.nodatavals[band - 1] if nodata is None else nodata
     if missing is not None and math.isnan(missing):
         missing = None  # NaN is missing anyway

@@ -43,7 +43,7 @@ def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) 
     if options.steps is not None:
         return even_grid(heights, *options.steps, nodata=nodata, name=name)
     corner = NAME.match(path.name)
-    if corner is None:
+    if corner is None or int(corner[2]) > 90 or int(corner[4]) > 180:
         raise ModelError(
             f"{name}: its name does not say where it lies; name it after its corner in the south-west, such as "
             "N47E011.hgt, or give the distance of its samples (--spacing 30)"

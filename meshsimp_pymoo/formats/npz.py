@@ -57,14 +57,18 @@ def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) 
         shape, _, kind = headers[key]
         check_heights(shape, kind, name)
         check_room(shape, kind.itemsize, options, name, by_windows=by_windows)
+        for along, axis in zip((1, 0), pair, strict=False):
+            _check_axis(headers[axis], axis, shape, along, name)
+        for axis in {"dx", "dy"} & headers.keys():
+            _check_scalar(headers[axis], axis, name)
         stream.seek(0)
         arrays = read_npz(stream, name, wanted={key, *pair, "dx", "dy"})
     heights = arrays[key]
     if not pair:
-        dx = _scalar(arrays, "dx", 1.0, name)
-        steps = options.steps or (dx, _scalar(arrays, "dy", dx, name))
-        return even_grid(heights, *steps, nodata=options.nodata, name=name)
-    x, y = (_axis(arrays[axis], axis, heights, along, name) for along, axis in zip((1, 0), pair, strict=True))
+        dx = float(arrays["dx"].item()) if "dx" in arrays else 1.0
+        dy = float(arrays["dy"].item()) if "dy" in arrays else dx
+        return even_grid(heights, *(options.steps or (dx, dy)), nodata=options.nodata, name=name)
+    x, y = (_axis(arrays[axis], axis, along, name) for along, axis in zip((1, 0), pair, strict=True))
     in_degrees = tuple(axis.lower() for axis in pair) in DEGREES
     if options.steps is not None:
         # metres, say, do not count from a place in degrees
@@ -111,37 +115,37 @@ def _heights(headers: dict[str, NpyHeader], pair: tuple[str, ...], name: str) ->
     return key
 
 
-def _axis(values: AnyArray, axis: str, heights: AnyArray, along: int, name: str) -> FloatArray:
-    """Return where columns (``along`` 1) or rows (0) lie, from one number for each of them, or for each sample."""
+def _check_axis(header: NpyHeader, axis: str, shape: tuple[int, ...], along: int, name: str) -> None:
+    """Refuse what cannot say where columns (``along`` 1) or rows (0) of heights of this shape lie."""
+    if header.dtype.kind not in "iuf" or header.shape not in ((shape[along],), shape):
+        raise ModelError(
+            f"{name}: {axis!r} is {header.dtype} of the shape {header.shape} beside heights of the shape {shape}; give "
+            f"{shape[along]} numbers, one for each {'column' if along else 'row'}"
+        )
+
+
+def _check_scalar(header: NpyHeader, key: str, name: str) -> None:
+    if any(count != 1 for count in header.shape) or header.dtype.kind not in "iuf":
+        raise ModelError(f"{name}: {key!r} is {header.dtype} of the shape {header.shape}; give one number")
+
+
+def _axis(values: AnyArray, axis: str, along: int, name: str) -> FloatArray:
+    """Return where columns or rows lie, from one number for each of them, or for each sample."""
     import numpy as np
 
-    count = heights.shape[along]
-    if values.shape == heights.shape and values.ndim == 2:
-        line = values[0] if along else values[:, 0]
-        if not (values == (line[None, :] if along else line[:, None])).all():
+    places: FloatArray = values.astype(np.float64)
+    if places.ndim == 2:
+        lines = places if along else places.T
+        if not (lines == lines[0]).all():
             raise ModelError(
                 f"{name}: {axis!r} is not the same in all {'rows' if along else 'columns'}, so the samples are no grid "
                 "along its axes; save its transpose, or x y z as text (.xyz)"
             )
-        values = line
-    if values.dtype.kind not in "iuf" or values.shape != (count,):
-        raise ModelError(
-            f"{name}: {axis!r} is {values.dtype} of the shape {values.shape} beside heights of the shape "
-            f"{heights.shape}; give {count} numbers, one for each {'column' if along else 'row'}"
-        )
-    places: FloatArray = values.astype(np.float64)
+        places = lines[0]
     steps = np.diff(places)
     if not (np.isfinite(places).all() and ((steps > 0).all() or (steps < 0).all())):
         raise ModelError(f"{name}: {axis!r} neither rises nor falls all along; sort rows and columns by their axes")
     return places
-
-
-def _scalar(arrays: dict[str, AnyArray], key: str, default: float, name: str) -> float:
-    if key not in arrays:
-        return default
-    if arrays[key].size != 1 or arrays[key].dtype.kind not in "iuf":
-        raise ModelError(f"{name}: {key!r} is {arrays[key].dtype} of the shape {arrays[key].shape}; give one number")
-    return float(arrays[key].reshape(()))
 
 
 register(Format("npz", (".npz",), ".npz", "grid", read=_read, open_heights=_open_heights))

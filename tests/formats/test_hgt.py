@@ -47,8 +47,9 @@ def test_voids_are_no_samples(tmp_path):
 
 
 def test_with_a_spacing_a_tile_needs_no_place(tmp_path):
-    path = tile(tmp_path, "tile.hgt")
-    assert "name it after its corner in the south-west, such as N47E011.hgt, or give" in refusal(path)
+    for name in ("tile.hgt", "N91E011.hgt", "N47E181.hgt", "N47E0110.hgt"):
+        message = refusal(tile(tmp_path, name))
+        assert "name it after its corner in the south-west, such as N47E011.hgt, or give" in message
     for name in ("tile.hgt", "N47E011.hgt"):
         source = read_source(tile(tmp_path, name), Options(spacing=(20, 30)))
         assert_array_equal(source.points[24], [80, -120, 2370])

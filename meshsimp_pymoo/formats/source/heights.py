@@ -68,14 +68,15 @@ class Grid:
         Raises
         ------
         NoFullGrid
-            If samples are masked, or its rows do not run from north to south and its columns from west to east.
+            If samples are masked, or its rows do not run from north to south and its columns from west to east, each
+            at a place of its own.
         """
         if np.ma.getmask(self.heights).any():
             raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
-        if self.x[1] < self.x[0] or self.y[1] > self.y[0]:
+        if not ((np.diff(self.x) > 0).all() and (np.diff(self.y) < 0).all()):
             raise NoFullGrid(
-                f"{name}: its rows run to the north or its columns to the west, and tiles want the north-west first; "
-                "turn it (numpy.flipud, numpy.fliplr), with its axes, or leave the tiles out (--tile none)"
+                f"{name}: its rows do not run to the south and its columns to the east, as tiles want them; turn it, "
+                "with its axes (numpy.flipud, numpy.fliplr), or leave the tiles out (--tile none)"
             )
         column, row, columns, rows = check_window(window, self.shape, name)
         return PlacedHeights(
