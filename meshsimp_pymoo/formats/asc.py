@@ -8,23 +8,14 @@ from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.table import Format, register, ways_to_read
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import FloatArray
-    from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
+    from meshsimp_pymoo.formats.source.heights import Grid
 
 # The lines that say what it is are the first few hundred bytes.
 HEADER_BYTES = 2000
-
-
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    return _load(path, name, options).mesh(name, options.window)
-
-
-def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
-    return _load(path, name, options, by_windows=True).placed(name, options.window)
 
 
 def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
@@ -92,8 +83,7 @@ register(
         (".asc",),
         ".asc",
         "grid",
-        read=_read,
-        open_heights=_open_heights,
+        **ways_to_read(_load),
         count_samples=_count_samples,
     )
 )

@@ -7,22 +7,13 @@ from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.table import Format, register, ways_to_read
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.formats.source.esri import EsriHeader
-    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
+    from meshsimp_pymoo.formats.source.heights import Grid
 
 ORDERS = {"": "<f4", "lsbfirst": "<f4", "i": "<f4", "msbfirst": ">f4", "m": ">f4"}
-
-
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    return _load(path, name, options).mesh(name, options.window)
-
-
-def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
-    return _load(path, name, options, by_windows=True).placed(name, options.window)
 
 
 def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
@@ -65,8 +56,4 @@ def _count_samples(path: Path, name: str) -> int:
     return path.stat().st_size // 4
 
 
-register(
-    Format(
-        "flt", (".flt",), ".flt with .hdr", "grid", read=_read, open_heights=_open_heights, count_samples=_count_samples
-    )
-)
+register(Format("flt", (".flt",), ".flt with .hdr", "grid", **ways_to_read(_load), count_samples=_count_samples))

@@ -9,25 +9,16 @@ from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.table import Format, register, ways_to_read
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
+    from meshsimp_pymoo.formats.source.heights import Grid
 
 # The height where there is none.
 VOID = -32768
 # Steps in a degree of a tile that is no square: north of 50 degrees some have every other column.
 HALF = 3600
 NAME = re.compile(r"([NS])(\d\d)([EW])(\d{3})(?!\d)", re.IGNORECASE)
-
-
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    return _load(path, name, options).mesh(name, options.window)
-
-
-def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
-    return _load(path, name, options, by_windows=True).placed(name, options.window)
 
 
 def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
@@ -80,6 +71,4 @@ def _count_samples(path: Path, name: str) -> int:
     return path.stat().st_size // 2
 
 
-register(
-    Format("hgt", (".hgt",), "SRTM tile", "grid", read=_read, open_heights=_open_heights, count_samples=_count_samples)
-)
+register(Format("hgt", (".hgt",), "SRTM tile", "grid", **ways_to_read(_load), count_samples=_count_samples))

@@ -6,20 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.table import Format, register, ways_to_read
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.files import NpyHeader
-    from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
-
-
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    return _load(path, name, options).mesh(name, options.window)
-
-
-def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
-    return _load(path, name, options, by_windows=True).placed(name, options.window)
+    from meshsimp_pymoo.formats.source.heights import Grid
 
 
 def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
@@ -49,4 +40,4 @@ def _count_samples(path: Path, name: str) -> int:
     return math.prod(_header(path, name)[0].shape)
 
 
-register(Format("npy", (".npy",), ".npy", "grid", read=_read, open_heights=_open_heights, count_samples=_count_samples))
+register(Format("npy", (".npy",), ".npy", "grid", **ways_to_read(_load), count_samples=_count_samples))

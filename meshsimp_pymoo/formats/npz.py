@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, listed, register
+from meshsimp_pymoo.formats.table import Format, listed, register, ways_to_read
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray, FloatArray
     from meshsimp_pymoo.files import NpyHeader
-    from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
+    from meshsimp_pymoo.formats.source.heights import Grid
 
 # What heights are called where an archive holds several arrays that might be them; all names in lower case.
 HEIGHTS = (
@@ -33,14 +32,6 @@ HEIGHTS = (
 # What the axes to the east and to the north are called, in pairs; those of the first two are degrees.
 AXES = (("lon", "lat"), ("longitude", "latitude"), ("x", "y"), ("xs", "ys"), ("easting", "northing"))
 DEGREES = AXES[:2]
-
-
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    return _load(path, name, options).mesh(name, options.window)
-
-
-def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
-    return _load(path, name, options, by_windows=True).placed(name, options.window)
 
 
 def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
@@ -148,4 +139,4 @@ def _axis(values: AnyArray, axis: str, along: int, name: str) -> FloatArray:
     return places
 
 
-register(Format("npz", (".npz",), ".npz", "grid", read=_read, open_heights=_open_heights))
+register(Format("npz", (".npz",), ".npz", "grid", **ways_to_read(_load)))

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from meshsimp_pymoo.errors import ModelError, raise_if_memory, reason_of, warn_of
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.table import Format, register, ways_to_read
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray, FloatArray
-    from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
+    from meshsimp_pymoo.formats.source.heights import Grid
 
 BEGIN = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR"
 # Names and channels of the kinds of pictures, by their number in the header.
@@ -37,14 +36,6 @@ class Look(NamedTuple):
     rows: int
     bits: int
     kind: int
-
-
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    return _load(path, name, options).mesh(name, options.window)
-
-
-def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
-    return _load(path, name, options, by_windows=True).placed(name, options.window)
 
 
 def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
@@ -134,8 +125,4 @@ def _count_samples(path: Path, name: str) -> int:
     return look.columns * look.rows
 
 
-register(
-    Format(
-        "png", (".png",), "PNG heightmap", "grid", read=_read, open_heights=_open_heights, count_samples=_count_samples
-    )
-)
+register(Format("png", (".png",), "PNG heightmap", "grid", **ways_to_read(_load), count_samples=_count_samples))

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
     from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.formats.source.heights import PlacedHeights
+    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
 
 # The sorts of models, as messages call them; a setting may describe some of them alone, or a format.
 SORTS = {"mesh": "meshes", "grid": "height grids", "cloud": "point clouds"}
@@ -160,6 +160,25 @@ def register(kind: Format) -> None:
     if kind.sort not in SORTS:
         raise ValueError(f"the format {kind.name!r} is of the sort {kind.sort!r}; it must be one of {', '.join(SORTS)}")
     _TABLE[kind.name] = kind
+
+
+def ways_to_read(load: Callable[..., Grid]) -> dict[str, Any]:
+    """Return how a format of grids reads a mesh, and heights for tiles.
+
+    Parameters
+    ----------
+    load : callable
+        ``load(path, name, options, by_windows=False)`` returns the whole grid, in memory or mapped into it, once it has
+        been seen that there is room for it and, without ``by_windows``, for its mesh.
+    """
+
+    def read(path: Path, name: str, options: Options) -> SourceMesh:
+        return load(path, name, options).mesh(name, options.window)
+
+    def open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
+        return load(path, name, options, by_windows=True).placed(name, options.window)
+
+    return {"read": read, "open_heights": open_heights}
 
 
 def all_formats() -> tuple[Format, ...]:

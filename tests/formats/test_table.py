@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from pyramid import COLORS, FACES, POINTS, ascii_ply, binary_ply, refusal, write
 from samples import coloured, write_solutions
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, way_to_install
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import (
     SORTS,
@@ -337,6 +338,14 @@ def test_a_grid_is_compared_with_the_memory_before_it_is_unpacked(tmp_path, name
     assert re.search(
         r"4000 x 4000 samples need about 4\.5 GiB, and 1\.0 GiB are free; take a part .*--tile", ran.stdout
     )
+
+
+def test_from_a_clone_that_is_not_installed_the_extra_is_named(monkeypatch):
+    def unknown(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.requires", unknown)
+    assert way_to_install("las") == "pip install '.[las]' in the folder of its pyproject.toml"
 
 
 @pytest.mark.parametrize(
