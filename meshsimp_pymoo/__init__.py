@@ -4,6 +4,7 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
 
     errors, arrays                 words that all share: one-line errors, types of arrays
     settings, workers, indicators  what a user may set; threads, processes, Dask; dominance, knee, hypervolume
+    memory         how much is free
     compiling/     functions that Python calls and functions inside them, their machine code on disk
     files          files and folders whole or not at all, locks, arrays without pickles
     plane/         predicates, triangulation, footprint, faces: arrays in, arrays out

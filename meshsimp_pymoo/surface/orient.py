@@ -535,7 +535,7 @@ def _area_vectors(points: FloatArray, faces: IntArray) -> FloatArray:
     return np.cross(b - a, c - a) / 2
 
 
-def edge_on(points: FloatArray, faces: IntArray) -> npt.NDArray[np.bool_]:
+def edge_on(points: FloatArray, faces: IntArray) -> BoolArray:
     """Tell which faces (F, 3) of upright points (V, 3) are seen edge-on from above, to rounding: (F,)."""
     normals = _area_vectors(points, faces)
     return np.asarray(np.abs(normals[:, 2]) <= VERTICAL_SHARE * np.linalg.norm(normals, axis=1))

@@ -15,6 +15,7 @@ from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import read_source
+from meshsimp_pymoo.tiles.grid import open_grid
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402
@@ -169,7 +170,7 @@ def test_degrees_are_warned_of(tiff):
 
 
 def test_rasters_that_are_no_heights_are_refused(tiff):
-    with pytest.raises(ModelError, match=r"has 3 bands; .*gdal_translate -b 1"):
+    with pytest.raises(ModelError, match=r"has 3 bands, .*; say which, such as --band 1$"):
         read_source(tiff(np.zeros((3, 5, 5), np.uint8)))
     with pytest.raises(ModelError, match="type complex64"):
         read_source(tiff(np.zeros((5, 5), np.complex64)))
@@ -238,3 +239,45 @@ def test_cut_files_are_refused(tiff, tmp_path):
         (tmp_path / "cut.tif").write_bytes(content[:size])
         with pytest.raises(ModelError, match=r"cannot be read as a GeoTIFF|declares"):
             read_source(tmp_path / "cut.tif")
+
+
+def test_one_band_of_several_is_named_and_read_as_if_it_were_alone(tiff, tmp_path):
+    first, second = hill(), (hill() * 10).astype(np.float32)
+    second[2, 3] = -7
+    path = tiff(np.stack([first, second, first]), nodata=-7, after={"descriptions": ("ground", "canopy", None)})
+    with pytest.raises(
+        ModelError, match=r"has 3 bands, .*; say which, such as --band 1 \(1 is 'ground', 2 is 'canopy'\)$"
+    ):
+        read_source(path)
+    with pytest.raises(ModelError, match="has 3 bands, and no band 4"):
+        read_source(path, Options(band=4))
+    alone = read_source(tiff(second, nodata=-7))
+    source = read_source(path, Options(band=2))
+    assert_array_equal(source.points, alone.points)
+    assert_array_equal(source.rows, alone.rows)
+    assert_array_equal(read_source(path, Options(band=1)).points, read_source(tiff(first)).points)
+    assert_array_equal(open_grid(path, band=3).height_at(np.arange(108)), first.ravel())
+    np.save(tmp_path / "a.npy", first)
+    with pytest.raises(ModelError, match=r"band describes GeoTIFF \(.tif .tiff\)"):
+        read_source(tmp_path / "a.npy", Options(band=1))
+    assert MeshProblem(path, band=1).model.n_vertices == 108
+
+
+@pytest.mark.parametrize("interleave", ["pixel", "band"])
+def test_each_band_has_its_own_scale_offset_and_mask(tiff, interleave):
+    heights = np.stack([np.arange(108).reshape(9, 12), np.arange(108, 216).reshape(9, 12)]).astype(np.int16)
+    mask = np.full((9, 12), 255, np.uint8)
+    mask[4, 5] = 0
+    path = tiff(heights, mask=mask, interleave=interleave, after={"scales": (1.0, 0.1), "offsets": (0.0, 100.0)})
+    for band, scale, offset in ((1, 1.0, 0.0), (2, 0.1, 100.0)):
+        source = read_source(path, Options(band=band))
+        assert_array_equal(source.rows, np.delete(np.arange(108), 4 * 12 + 5))
+        assert_allclose(source.points[:, 2], heights[band - 1].ravel()[source.rows] * scale + offset)
+
+
+def test_a_band_of_transparency_is_no_band_of_heights(tiff):
+    heights = np.stack([hill(), np.full((9, 12), 255)]).astype(np.float32)
+    heights[1, 0, 2] = 0
+    source = read_source(tiff(heights, alpha="YES"))
+    assert_array_equal(source.rows, np.delete(np.arange(108), 2))
+    assert_array_equal(source.points[:, 2], hill().ravel()[source.rows])

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from pyramid import hostile_array, refusal, write
 
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid
+from meshsimp_pymoo.formats.npz import AXES
+from meshsimp_pymoo.formats.npz import DEGREES as DEGREES_AXES
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
+from meshsimp_pymoo.tiles.grid import open_grid
 
 
 def test_an_npz_carries_heights_and_spacing(tmp_path):
@@ -60,3 +66,82 @@ def test_all_shared_grids_are_read(shared_data):
         row, col = np.divmod(source.rows, elevation.shape[1])
         assert len(source.points) == np.isfinite(elevation).sum()
         np.testing.assert_allclose(source.points, np.column_stack([col * dx, -row * dy, elevation[row, col]]))
+
+
+LON, LAT = np.array([11.0, 11.5, 12.5]), np.array([47.0, 47.25])
+HEIGHTS = np.array([[1.0, 2, 3], [4, 5, 6]])
+DEGREES = pytest.mark.filterwarnings("ignore:.*its coordinates are degrees")
+
+
+def by_place(source):
+    return {(x, y): z for x, y, z in source.points.tolist()}
+
+
+@DEGREES
+@given(
+    names=st.sampled_from(AXES),
+    flips=st.tuples(st.booleans(), st.booleans()),
+    meshed=st.booleans(),
+    turned=st.sampled_from([str.lower, str.upper, str.title]),
+)
+@settings(max_examples=30, deadline=None)
+def test_samples_lie_where_the_axes_say_in_any_order(tmp_path_factory, names, flips, meshed, turned):
+    path = tmp_path_factory.mktemp("axes") / "a.npz"
+    x, y = LON[:: -1 if flips[0] else 1], LAT[:: -1 if flips[1] else 1]
+    heights = HEIGHTS[:: -1 if flips[1] else 1, :: -1 if flips[0] else 1]
+    axes = np.meshgrid(x, y) if meshed else (x, y)
+    np.savez(path, z=heights, **{turned(name): axis for name, axis in zip(names, axes, strict=True)})
+    source = read_source(path)
+    assert by_place(source) == {(x, y): HEIGHTS[i, j] for i, y in enumerate(LAT) for j, x in enumerate(LON)}
+    assert_array_equal(source.points[:, 2], heights.ravel())
+    assert_array_equal(source.rows, np.arange(6))
+    a, b, c = (source.points[source.faces[:, k], :2] for k in range(3))
+    assert (np.linalg.det(np.stack([b - a, c - a], axis=1)) > 0).all()
+    assert source.georeference.get("unit") == ("degree" if names in DEGREES_AXES else None)
+    if not any((flips[0], not flips[1])):
+        grid = open_grid(path)
+        assert_array_equal(grid.file_points(np.arange(6)), source.points)
+    else:
+        with pytest.raises(NoFullGrid, match="as tiles want them"):
+            open_grid(path)
+
+
+def test_degrees_are_said_and_a_spacing_is_in_their_place(tmp_path):
+    np.savez(tmp_path / "a.npz", z=HEIGHTS, lon=LON, lat=LAT)
+    with pytest.warns(ModelWarning, match="its coordinates are degrees, its heights are not"):
+        assert_array_equal(read_source(tmp_path / "a.npz").points[0], [11, 47, 1])
+    source = read_source(tmp_path / "a.npz", Options(spacing=(30, 20)))
+    assert_array_equal(source.points[[0, 5]], [[0, 0, 1], [60, 20, 6]])  # to the north, as the axis runs
+    assert source.georeference == {}
+    np.savez(tmp_path / "b.npz", z=HEIGHTS, x=LON, y=LAT)
+    assert_array_equal(read_source(tmp_path / "b.npz", Options(spacing=30)).points[5], [71, 77, 6])
+
+
+@pytest.mark.parametrize(
+    ("arrays", "cause"),
+    [
+        ({"x": LON[:2], "y": LAT}, r"'x' is float64 of the shape \(2,\) .* give 3 numbers, one for each column"),
+        ({"x": LAT, "y": LON}, "give 3 numbers, one for each column"),
+        ({"x": LON, "y": [1, 1]}, "'y' neither rises nor falls all along"),
+        ({"x": [1, np.nan, 3], "y": LAT}, "'x' neither rises"),
+        ({"x": HEIGHTS, "y": HEIGHTS}, "'x' is not the same in all rows"),
+        ({"x": LON, "y": ["a", "b"]}, "'y' is <U1"),
+        ({"x": LON, "y": LAT, "lon": LON, "lat": LAT}, "more than one pair of axes, lon and lat and x and y"),
+    ],
+)
+def test_axes_that_are_none_are_refused(tmp_path, arrays, cause):
+    np.savez(tmp_path / "a.npz", z=HEIGHTS, **arrays)
+    assert re.search(cause, refusal(tmp_path / "a.npz"))
+
+
+def test_which_array_holds_the_heights_is_known_by_its_name_or_asked(tmp_path):
+    np.savez(tmp_path / "a.npz", slope=HEIGHTS, DEM=HEIGHTS + 10)
+    with pytest.warns(ModelWarning, match="heights are taken to be 'DEM', not 'slope' of the same shape"):
+        assert read_source(tmp_path / "a.npz").points[0, 2] == 11
+    np.savez(tmp_path / "b.npz", slope=np.zeros((5, 5)), z=HEIGHTS)
+    assert len(read_source(tmp_path / "b.npz").points) == 6
+    np.savez(tmp_path / "c.npz", dem=HEIGHTS, dsm=HEIGHTS)
+    assert "['dem', 'dsm']" in refusal(tmp_path / "c.npz")
+    np.savez(tmp_path / "d.npz", z=HEIGHTS, x=LON)
+    with pytest.warns(ModelWarning, match="holds x, but no pair of axes, and the samples were placed without"):
+        assert_array_equal(read_source(tmp_path / "d.npz").points[5], [2, -1, 6])

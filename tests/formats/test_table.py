@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from numpy.testing import assert_array_equal
-from pyramid import COLORS, FACES, POINTS, binary_ply, refusal, write
+from pyramid import COLORS, FACES, POINTS, ascii_ply, binary_ply, refusal, write
 from samples import coloured, write_solutions
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, way_to_install
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import (
     SORTS,
+    WAYS_OUT,
     Format,
     all_formats,
     described,
@@ -73,7 +76,7 @@ def test_nonsense_is_refused_in_one_line_or_read_as_nothing(tmp_path, name):
 
 def test_a_setting_describes_a_sort_of_model_that_there_is():
     of_one_sort = {name: known.describes for name, known in settings_of(Options).items() if known.describes}
-    assert {sort for sorts in of_one_sort.values() for sort in sorts} <= set(SORTS)
+    assert {model for models in of_one_sort.values() for model in models} <= {*SORTS, *(f.name for f in all_formats())}
     assert described() == list(of_one_sort)
     assert described("grid") == ["spacing", "nodata", "window"]
 
@@ -237,7 +240,7 @@ def test_what_is_not_a_readable_file_is_refused(tmp_path, monkeypatch):
     assert "empty (0 bytes)" in refusal(write(tmp_path, "empty.ply", b""))
     message = refusal(write(tmp_path, "a.xyzzy", "1"))
     assert "'.xyzzy'" in message
-    for suffix in (".ply", ".obj", ".stl", ".off", ".glb", ".npy", ".npz", ".asc"):
+    for suffix in (".ply", ".obj", ".stl", ".off", ".glb", ".npy", ".npz", ".asc", ".png"):
         assert suffix in message
 
     def denied(self: Path) -> bytes:
@@ -259,11 +262,99 @@ def test_archives_are_not_unpacked(tmp_path, suffix):
     assert f"unknown suffix '{suffix}'" in refusal(write(tmp_path, f"a{suffix}", binary_ply()))
 
 
-@pytest.mark.parametrize(("suffix", "module", "extra"), [("las", "laspy", "las"), ("tif", "rasterio", "geo")])
-def test_a_missing_library_is_named_with_the_way_to_install_it(tmp_path, monkeypatch, suffix, module, extra):
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("a b.vrt", "gdal_translate 'FOLDER/a b.vrt' out.tif"),
+        ("surfer.GRD", "gdal_translate FOLDER/surfer.GRD out.tif"),
+        ("scan.e57", "save it as .las or .xyz, or with its faces as .ply"),
+        ("house.blend", "export it as .ply, .obj or .glb"),
+        ("part.step", "export it as .ply, .obj or .glb"),
+        ("N47E011.hgt.zip", "unpack it, and name the file in it"),
+        ("a.hdr", "name that one"),
+        ("points.xlsx", "save the table as .csv"),
+        ("contours.shp", "gdal_grid"),
+    ],
+)
+def test_what_is_not_read_is_told_the_way_out(tmp_path, name, advice):
+    message = refusal(write(tmp_path, name, "1"))
+    assert f"unknown suffix {Path(name).suffix.lower()!r}; " in message
+    assert advice.replace("FOLDER", str(tmp_path)) in message
+
+
+def test_no_suffix_is_both_read_and_sent_elsewhere():
+    elsewhere = [suffix for suffixes, _ in WAYS_OUT for suffix in suffixes.split()]
+    assert len(set(elsewhere)) == len(elsewhere)
+    assert not set(elsewhere) & {suffix for kind in all_formats() for suffix in kind.suffixes}
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.ply", ascii_ply()),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n"),
+        ("a.off", "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n3 0 1 2\n3 1 3 2\n"),
+        ("a.stl", trimesh.Trimesh(POINTS, FACES, process=False).export(file_type="stl_ascii")),
+        ("a.asc", "ncols 2\nnrows 2\ncellsize 1\n1 2\n3 4\n"),
+        ("a.csv", "x,y,z\n0,0,0\n1,0,0\n0,1,0\n1,1,1\n"),
+    ],
+)
+def test_a_byte_order_mark_before_text_makes_no_difference(tmp_path, name, content):
+    plain = read_source(write(tmp_path, name, content))
+    marked = read_source(write(tmp_path, name, "\ufeff" + content))
+    assert_array_equal(marked.points, plain.points)
+    assert_array_equal(marked.faces, plain.faces)
+
+
+def test_a_gltf_with_a_byte_order_mark_finds_its_buffers(tmp_path):
+    for file, content in trimesh.Trimesh(POINTS, FACES, process=False).export(file_type="gltf").items():
+        write(tmp_path, file, b"\xef\xbb\xbf" * file.endswith(".gltf") + content)
+    assert len(read_source(tmp_path / "model.gltf").points) == 5
+
+
+GRIDS = {"a.npy": np.save, "a.npz": np.savez_compressed}
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_a_grid_is_compared_with_the_memory_before_it_is_unpacked(tmp_path, name):
+    """Some kilobytes that declare 16 million heights end in one line, and take no memory."""
+    path = tmp_path / name
+    GRIDS[name](path, np.zeros((4000, 4000), np.uint8))
+    code = f"""if True:
+        import resource, sys, meshsimp_pymoo.formats.source.heights, meshsimp_pymoo.files
+        from meshsimp_pymoo import memory
+        from meshsimp_pymoo.errors import ModelError
+        from meshsimp_pymoo.formats.table import read_source
+        memory.free_memory = lambda: (2.0**30, 2.0**30)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        try:
+            read_source({str(path)!r})
+        except ModelError as problem:
+            print(problem)
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 8000, "allocated"
+    """
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ran.stderr == ""
+    assert re.search(
+        r"4000 x 4000 samples need about 4\.5 GiB, and 1\.0 GiB are free; take a part .*--tile", ran.stdout
+    )
+
+
+def test_from_a_clone_that_is_not_installed_the_extra_is_named(monkeypatch):
+    def unknown(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.requires", unknown)
+    assert way_to_install("las") == "pip install '.[las]' in the folder of its pyproject.toml"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "module", "needed"), [("las", "laspy", r"laspy\[lazrs\]>=2.5"), ("tif", "rasterio", "rasterio>=1.3")]
+)
+def test_a_missing_library_is_named_with_the_way_to_install_it(tmp_path, monkeypatch, suffix, module, needed):
     monkeypatch.setitem(sys.modules, module, None)
     (tmp_path / f"a.{suffix}").write_bytes(b"LASF" + bytes(400))
-    with pytest.raises(ModelError, match=rf"needs {module}; install it by pip install 'meshsimp-pymoo\[{extra}\]'"):
+    with pytest.raises(ModelError, match=rf"needs {module}; install it by pip install '{needed}'$"):
         read_source(tmp_path / f"a.{suffix}")
 
 
