@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.files import is_there
@@ -74,14 +76,19 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
         If there is neither a file nor a built-in model of this name, or it cannot be used.
     """
     source = _source_of(model, options)
-    return front_patch(source, options.up) if options.patch == "front" else source
+    if options.patch != "front":
+        return source
+    # cut out in the metric frame, and what is left is as in the file
+    patch = front_patch(replace(source.measured, rows=np.arange(len(source.points))), options.up)
+    rows = patch.rows
+    return replace(patch, points=source.points[rows], rows=source.rows[rows], georeference=source.georeference)
 
 
 def applicable(model: Any, options: Options) -> Options:
     """Return how a model is read as far as that applies to what it is given as, the other settings by default.
 
-    All of it applies to a file; ``up`` and ``patch`` to a mesh that is in memory or built in; nothing to an OpenModel,
-    which was read already.
+    All of it applies to a file; ``up``, ``patch`` and ``scale`` to a mesh that is in memory or built in; nothing to an
+    OpenModel, which was read already.
     """
     if isinstance(model, OpenModel):
         return DEFAULT
@@ -106,7 +113,7 @@ def _source_of(model: Source, options: Options) -> SourceMesh:
         )
     if applicable(model, options) != options:
         raise ModelError(f"{source.name}: {listed(described())} are for files; {what} has its own samples")
-    return source
+    return source.in_frame(options.scale)
 
 
 def _is_file(model: str | os.PathLike[str]) -> bool:

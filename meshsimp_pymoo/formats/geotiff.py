@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, raise_if_memory, reason_of, warn_of
+from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, raise_if_memory, reason_of
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
@@ -63,11 +63,6 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     ------
     ModelError
         If rasterio is not installed, or the file is no GeoTIFF of one band of real numbers.
-
-    Warns
-    -----
-    ModelWarning
-        If its coordinates are degrees.
     """
     from meshsimp_pymoo.formats.source.heights import check_window, grid_mesh
 
@@ -87,7 +82,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
             corner=(row, column),
             file_columns=shape[1],
             mirrored=mirrored,
-            georeference=_georeference(raster, name) | {"window": [column, row, columns, rows]},
+            georeference=_georeference(raster) | {"window": [column, row, columns, rows]},
         )
 
 
@@ -166,7 +161,7 @@ class RasterHeights:
             i, j = row + np.arange(rows, dtype=np.int64), column + np.arange(columns, dtype=np.int64)
             self.x: FloatArray = np.asarray(place(np.int64(row), j)[0], np.float64)
             self.y: FloatArray = np.asarray(place(i, np.int64(column))[1], np.float64)
-            self.georeference = _georeference(raster, name) | {"window": [column, row, columns, rows]}
+            self.georeference = _georeference(raster) | {"window": [column, row, columns, rows]}
             self._raster, self._nodata = raster, options.nodata
 
     def __getitem__(self, key: Any) -> FloatArray:
@@ -340,7 +335,7 @@ def _placement(raster: Any, steps: tuple[float, float] | None, name: str) -> tup
     return place, a * e - b * d > 0
 
 
-def _georeference(raster: Any, name: str) -> dict[str, Any]:
+def _georeference(raster: Any) -> dict[str, Any]:
     facts: dict[str, Any] = {
         "transform": [float(value) for value in tuple(raster.transform)[:6]],
         "size": [raster.width, raster.height],
@@ -349,12 +344,8 @@ def _georeference(raster: Any, name: str) -> dict[str, Any]:
     crs = raster.crs
     if crs:
         facts |= {"crs": crs.to_wkt(), "epsg": crs.to_epsg()}
-        facts["unit"] = crs.linear_units if crs.is_projected else "degree"
-        if crs.is_geographic:
-            warn_of(
-                f"{name}: its coordinates are degrees, its heights are not; triangles are shaped in degrees: for "
-                "shapes in metres project it first (gdalwarp -t_srs)"
-            )
+        if crs.is_projected or crs.is_geographic:
+            facts["unit"] = crs.linear_units if crs.is_projected else "degree"
     return facts
 
 

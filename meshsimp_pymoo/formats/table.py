@@ -238,7 +238,8 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     -----
     ModelWarning
         If faces that name a vertex twice were dropped, per-vertex data could not be kept, a usual "no data" value
-        stands among the heights of a grid, or points of a cloud share their place in the plane.
+        stands among the heights of a grid, points of a cloud share their place in the plane, or coordinates are
+        degrees.
     """
     path = Path(path)
     name = str(path)
@@ -249,7 +250,9 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
         raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; known are {listed(known)}")
     refuse_foreign(name, kind.sort, options)
     with guarded(kind, name):
-        return kind.read(path, name, options)
+        source = kind.read(path, name, options)
+    # clouds had to know before they were triangulated
+    return source if "scale" in source.georeference else source.in_frame(options.scale)
 
 
 def listed(words: Iterable[str]) -> str:

@@ -63,6 +63,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
 
     source = open_source(model, options)
+    measured = source.measured
     used = source.points[np.unique(source.faces)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     content: dict[str, Any] = {
@@ -84,11 +85,11 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
     try:
-        up = up_direction(source, options.up)
+        up = up_direction(measured, options.up)
     except ModelError as problem:
         refusal: str | None = str(problem)
     else:
-        facts = surface_facts(source, source.points @ upright_rotation(up).T)
+        facts = surface_facts(measured, measured.points @ upright_rotation(up).T)
         refusal = facts.refusal
         content |= {"up": up.tolist(), "fold_share": facts.fold_share} | asdict(facts)
         flipped = " (its faces are wound the other way)" if facts.flipped else ""

@@ -75,6 +75,7 @@ def _scored(
 
     from meshsimp_pymoo.cli.terminal import described
     from meshsimp_pymoo.errors import UsageError
+    from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.front import Front
     from meshsimp_pymoo.opening import open_model, open_source
     from meshsimp_pymoo.surface.height import HeightSurface
@@ -88,7 +89,7 @@ def _scored(
             raise UsageError(
                 f"{folder}: its errors are those of --outside {surface.rules.outside}; leave --outside out to compare"
             )
-    source = open_source(other)
+    source = open_source(other, Options(scale="none"))  # in the frame of the model's file, which is measured
     try:
         scored = surface.score(source.points, source.faces)
     except ValueError as problem:
