@@ -385,6 +385,7 @@ def read_record(path: Path, count: int) -> dict[str, Any]:
     else:
         wrong += [f"model.{key}" for key in ("name", "hash") if not isinstance(model.get(key), str)]
         wrong += ["model.file"] * (not isinstance(model.get("file") or "", str))
+        wrong += ["model.georeference"] * (not isinstance(model.get("georeference") or {}, dict))
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
         wrong.append("chosen")
     wrong += ["objectives"] * (objectives is not None and not _are_objectives(objectives))

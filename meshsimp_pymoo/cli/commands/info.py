@@ -61,6 +61,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.opening import open_source
     from meshsimp_pymoo.surface.orient import surface_facts, up_direction, upright_rotation
+    from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source = open_source(model, options)
     measured = source.measured
@@ -73,15 +74,20 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         "unused_vertices": len(source.points) - len(used),
         "low": low.tolist(),
         "extent": extent.tolist(),
+        **known_units(source.georeference),
         "attributes": sorted(source.attributes),
     }
     rows = {
         "vertices": f"{len(used):,}",
         "triangles": f"{len(source.faces):,}",
-        "extent": " x ".join(f"{value:.6g}" for value in extent) + " [file units]",
+        "extent": f"{_sides(extent)} [{_file_unit(source.georeference)}]",
         "from": ", ".join(f"{value:.10g}" for value in low),
         "attributes": ", ".join(sorted(source.attributes)) or "none",
     }
+    if system := reference_system(source.georeference):
+        rows["system"] = system
+    if measured is not source:
+        rows["measured"] = f"{_sides(extent * source.scale)} [{length_unit(source.georeference)}]"
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
     try:
@@ -112,3 +118,14 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         say(refusal)
         return BAD_INPUT
     return OK
+
+
+def _sides(extent: Any) -> str:
+    return " x ".join(f"{value:.6g}" for value in extent)
+
+
+def _file_unit(georeference: dict[str, Any]) -> str:
+    from meshsimp_pymoo.surface.units import length_unit
+
+    unit = str(georeference.get("unit") or "file units")
+    return f"{unit}, {unit}, {length_unit(georeference)}" if "scale" in georeference else unit
