@@ -273,7 +273,7 @@ def write_front(
             path, fitted = "", ["", ""]
             if faces is not None and (solution in with_mesh or row == chosen):
                 arrays = mesh_arrays(model, faces(int(row)))
-                single = max(single, single_precision_shift(arrays[0]))
+                single = max(single, single_precision_shift(arrays[0], surface.view.scale))
                 if solution in with_mesh:
                     path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                     write_mesh(partial / path, *arrays, **look)
@@ -451,7 +451,7 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     kind, model = format_of_output(path), surface.model
     kind.check(model)
     arrays = mesh_arrays(model, faces)
-    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0]))
+    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0], surface.view.scale))
     write_mesh(path, *arrays, **shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference))
 
 

@@ -416,7 +416,7 @@ def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> Non
     exact = listed(other.name for other in known if not other.single_precision)
     stating = listed(other.name for other in known if other.states_origin)
     warnings.warn(
-        f"{name}: {kind.name} holds single precision, which moves vertices by up to {shift:.3g} [file units]; {exact} "
+        f"{name}: {kind.name} holds single precision, which moves vertices by up to {shift:.3g} [model units]; {exact} "
         f"keep them exactly, {stating} states a local origin",
         ModelWarning,
         stacklevel=3,

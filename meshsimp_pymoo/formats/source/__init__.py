@@ -68,11 +68,10 @@ class SourceMesh:
 
     @property
     def measured(self) -> SourceMesh:
-        """The same mesh in the metric frame, in which lengths, areas and directions are taken."""
+        """The same mesh in the metric frame, nowhere on Earth, in which lengths, areas and directions are taken."""
         if "scale" not in self.georeference:
             return self
-        facts = {name: fact for name, fact in self.georeference.items() if name != "scale"}
-        return dataclasses.replace(self, points=self.points * self.scale, georeference=facts)
+        return dataclasses.replace(self, points=self.points * self.scale, georeference={})
 
     def in_frame(self, scale: str | tuple[float, float] | None) -> SourceMesh:
         """Return the mesh with the scale that the user or the reference system says; see :func:`in_metric_frame`."""

@@ -130,12 +130,12 @@ def in_metric_frame(
     facts["scale"] = [angle * length / to_height for length in metres_per_radian(latitude, ellipsoid)]
     across = sorted(angle * metres_per_radian(edge, ellipsoid)[0] / to_height for edge in (south, north))
     wide = f" ({across[0]:.6g} and {across[1]:.6g} at its edges: project it for more)"
-    unit = str(facts["unit"])
+    unit, (x, y) = str(facts["unit"]), facts["scale"]
+    taken = "" if lengths else f"heights are taken for {_plural(height_unit)}; "
     warn_of(
-        f"{name}: its coordinates are in {_plural(unit)}; lengths are measured in {_plural(height_unit)}, "
-        f"{facts['scale'][0]:.8g} to a {unit} of longitude{wide * (across[1] > WIDE * across[0])} and "
-        f"{facts['scale'][1]:.8g} to one of latitude, as at latitude {latitude / DEGREE:.6g}, and heights are taken "
-        f"for {_plural(height_unit)}; files keep their {_plural(unit)} (--scale none: measured in these)"
+        f"{name}: its coordinates are {_plural(unit)}; lengths are measured in {_plural(height_unit)}, {x:.8g} to a "
+        f"{unit} of longitude{wide * (across[1] > WIDE * across[0])} and {y:.8g} to one of latitude, as at latitude "
+        f"{latitude / DEGREE:.6g}; {taken}files keep their {_plural(unit)} (--scale none measures in these)"
     )
     return facts
 
