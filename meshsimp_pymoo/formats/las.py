@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Points that are unpacked at once.
 CHUNK_POINTS = 1_000_000
+# The numbers of units in the keys of a reference system.
+LINEAR_UNITS = {9001: "metre", 9002: "foot", 9003: "US survey foot"}
 # What a small .laz may unpack to, whatever its packing.
 UNPACKED_FLOOR = 64 << 20
 
@@ -158,7 +160,10 @@ def _facts(header: Any) -> dict[str, Any]:
             facts["crs"] = str(wkt).rstrip("\0")
         elif type(record).__name__ == "GeoKeyDirectoryVlr":
             # 3072 and 2048: the projected and the geographic system, by EPSG number; 1024: which of both it is
+            # 3076 and 4099: the units of a projected one and of heights
             keys = {key.id: key.value_offset for key in record.geo_keys if key.tiff_tag_location == 0}
+            units = {"unit": keys.get(3076), "height_unit": keys.get(4099)}
+            facts |= {name: LINEAR_UNITS[number] for name, number in units.items() if number in LINEAR_UNITS}
             if keys.get(1024) == 2:
                 facts["unit"] = "degree"
             epsg = keys.get(3072) or keys.get(2048)

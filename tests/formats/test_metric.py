@@ -182,7 +182,9 @@ def test_las_in_degrees(tmp_path, kind):
         header.vlrs.append(laspy.vlrs.known.WktCoordinateSystemVlr(GEOGCS))
     else:
         keys = laspy.vlrs.known.GeoKeyDirectoryVlr()
-        keys.parse_record_data(np.array([1, 1, 0, 2, 1024, 0, 1, 2, 2048, 0, 1, 4326], "<u2").tobytes())
+        keys.parse_record_data(
+            np.array([1, 1, 0, 3, 1024, 0, 1, 2, 2048, 0, 1, 4326, 4099, 0, 1, 9002], "<u2").tobytes()
+        )
         header.vlrs.append(keys)
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z = points.T
@@ -190,7 +192,9 @@ def test_las_in_degrees(tmp_path, kind):
     with pytest.warns(ModelWarning, match="its coordinates are degrees"):
         source = read_source(tmp_path / "a.las")
     assert source.georeference["unit"] == "degree"
-    assert source.georeference["scale"] == pytest.approx([76_056, 111_171], abs=150)
+    foot = 1 if kind == "wkt" else 0.3048
+    assert np.array(source.georeference["scale"]) * foot == pytest.approx([76_056, 111_171], abs=150)
+    assert source.georeference.get("height_unit") == (None if kind == "wkt" else "foot")
 
 
 def test_a_mesh_in_memory_is_scaled_where_it_says_so():

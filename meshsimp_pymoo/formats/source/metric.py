@@ -13,6 +13,7 @@ from meshsimp_pymoo.errors import ModelError, warn_of
 # WGS 84: semi-major axis [m] and inverse flattening. With other ellipsoids in use a scale differs by less than 0.3 %.
 WGS84 = (6378137.0, 298.257223563)
 DEGREE = math.pi / 180
+FEET = {"foot": 0.3048, "US survey foot": 1200 / 3937}  # [m]
 # No latitude is beyond; rasters may overlap the pole by half a sample.
 LARGEST_LATITUDE = 90.01 * DEGREE
 # The numbers of projected systems, but for some few in between. Of others the coordinates tell: projected ones are far
@@ -102,11 +103,10 @@ def in_metric_frame(
     vertical = _VERTICAL.search(wkt)
     plane, above = (wkt[: vertical.start()], wkt[vertical.start() :]) if vertical else (wkt, "")
     angle = _angular_unit(facts, plane, low, high)
-    to_height, height_unit = 1.0, "metre"
+    to_height = FEET.get(str(facts.get("height_unit")), 1.0)
     if lengths := _UNIT.findall(above):
-        _, height_unit, factor = lengths[-1]
-        to_height = float(factor) or 1.0
-        facts["height_unit"] = height_unit
+        _, facts["height_unit"], size = lengths[-1]
+        to_height = float(size) or 1.0
     if isinstance(scale, tuple):
         facts.pop("scale", None)
         return facts if scale == (1.0, 1.0) else facts | {"scale": list(scale)}
@@ -131,7 +131,8 @@ def in_metric_frame(
     across = sorted(angle * metres_per_radian(edge, ellipsoid)[0] / to_height for edge in (south, north))
     wide = f" ({across[0]:.6g} and {across[1]:.6g} at its edges: project it for more)"
     unit, (x, y) = str(facts["unit"]), facts["scale"]
-    taken = "" if lengths else f"heights are taken for {_plural(height_unit)}; "
+    height_unit = str(facts.get("height_unit", "metre"))
+    taken = "" if "height_unit" in facts else f"heights are taken for {_plural(height_unit)}; "
     warn_of(
         f"{name}: its coordinates are {_plural(unit)}; lengths are measured in {_plural(height_unit)}, {x:.8g} to a "
         f"{unit} of longitude{wide * (across[1] > WIDE * across[0])} and {y:.8g} to one of latitude, as at latitude "
