@@ -143,7 +143,9 @@ def test_the_scale_is_stated_wherever_numbers_are(raster, tmp_path, capsys):
     assert main(["report", str(out), "--quiet"]) == 0
     assert (out / "report.html").read_text() == page
     assert main(["score", str(raster), str(tmp_path / "a.ply"), "--front", str(out), "--json"]) == 0
-    scored = json.loads(capsys.readouterr().out)
+    said = capsys.readouterr()
+    assert said.err.count("its coordinates are degrees") == 1  # the other mesh has no frame of its own
+    scored = json.loads(said.out)
     assert scored["error"] == pytest.approx(front.best(triangles=40).error, rel=1e-9)
     assert (scored["front"]["error_ratio"], scored["scale"]) == (pytest.approx(1.0), [x, y])
 
@@ -214,6 +216,12 @@ def test_pins_scores_and_refitted_heights_come_from_and_go_to_degrees():
     compact = np.searchsorted(fitted.rows, fitted.faces)
     scale = degrees.georeference["scale"]
     assert referee(model.file_points, fitted.vertices, compact, scale) == pytest.approx(fitted.error, rel=1e-9)
+
+
+def test_heights_of_a_tilted_model_are_refitted_along_its_own_direction():
+    surface = HeightSurface(open_model(sheet(), Options(up=(0.02, -0.03, 1))))
+    fitted = surface.refit((np.random.default_rng(2).random(surface.n_vertices) < 0.5) | surface.pinned)
+    assert fitted.bound <= fitted.error <= 1.001 * fitted.bound < 0.98 * fitted.before
 
 
 def test_single_precision_is_judged_in_metres(tmp_path):
