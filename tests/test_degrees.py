@@ -142,6 +142,7 @@ def test_the_scale_is_stated_wherever_numbers_are(raster, tmp_path, capsys):
     assert " m, mean " in capsys.readouterr().out
     assert main(["report", str(out), "--quiet"]) == 0
     assert (out / "report.html").read_text() == page
+    capsys.readouterr()
     assert main(["score", str(raster), str(tmp_path / "a.ply"), "--front", str(out), "--json"]) == 0
     said = capsys.readouterr()
     assert said.err.count("its coordinates are degrees") == 1  # the other mesh has no frame of its own
