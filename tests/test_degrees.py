@@ -189,6 +189,7 @@ def test_a_direction_and_a_patch_are_found_in_metres():
     steep = build_source(degrees.points * [1, 1, 3], degrees.faces, georeference=degrees.georeference)
     model = open_model(steep)  # heights of a thousand, places of a third: a wall in degrees
     np.testing.assert_array_equal(model.up, [0, 0, 1])
+    np.testing.assert_array_equal(open_model(steep, Options(patch="front")).up, [0, 0, 1])
     patch = open_model(trimesh.Trimesh(degrees.points, degrees.faces, process=False), Options(patch="front", up="z"))
     assert patch.scale.tolist() == [1, 1, 1]
     scaled = open_model(degrees, Options(patch="front", up="z"))
