@@ -47,6 +47,7 @@ from meshsimp_pymoo.storage import (
 from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES, Measure, Quality, quality_of
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Refitted, Simplified
+from meshsimp_pymoo.surface.units import length_unit
 
 if TYPE_CHECKING:
     import pandas
@@ -428,6 +429,17 @@ class Front(Sequence[FrontSolution]):
         return self.problem.model
 
     @property
+    def georeference(self) -> Mapping[str, Any]:
+        """Where on Earth the model is, as far as its file says."""
+        recorded = self.run.get("model")
+        return (recorded.get("georeference") or {}) if recorded else self.problem.model.georeference
+
+    @property
+    def unit(self) -> str:
+        """The unit of the errors, such as "m"; "model units" where nobody says."""
+        return length_unit(self.georeference)
+
+    @property
     def name(self) -> str:
         """What the model is called."""
         recorded = (self.run.get("model") or {}).get("name")
@@ -485,6 +497,7 @@ class Front(Sequence[FrontSolution]):
 
         F = self.F
         look: dict[str, Any] = {"knee": knee(F), "measure": self.objectives[0], "series": self.series}
+        look["unit"] = self.unit
         return plot_front(F[:, [0, -1]], ax, **look | kwargs)
 
     def save(

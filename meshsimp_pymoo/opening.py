@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.files import is_there
@@ -15,7 +17,7 @@ from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
 from meshsimp_pymoo.formats.table import are_given, described, listed, read_source
 from meshsimp_pymoo.surface.model import OpenModel, build_model
-from meshsimp_pymoo.surface.orient import front_patch
+from meshsimp_pymoo.surface.orient import Up, front_patch
 from meshsimp_pymoo.surface.repair import Mended, mend
 
 if TYPE_CHECKING:
@@ -98,14 +100,21 @@ def mended_source(model: Source, options: Options = DEFAULT) -> tuple[SourceMesh
     mended = Mended()
     if options.repair == "mend":
         source, mended = mend(source)
-    return (front_patch(source, options.up) if options.patch == "front" else source), mended
+    return (_patch(source, options.up) if options.patch == "front" else source), mended
+
+
+def _patch(source: SourceMesh, up: Up) -> SourceMesh:
+    """Cut out the front patch in the metric frame; what is left is as in the file."""
+    patch = front_patch(replace(source.measured, rows=np.arange(len(source.points))), up)
+    rows = patch.rows
+    return replace(patch, points=source.points[rows], rows=source.rows[rows], georeference=source.georeference)
 
 
 def applicable(model: Any, options: Options) -> Options:
     """Return how a model is read as far as that applies to what it is given as, the other settings by default.
 
-    All of it applies to a file; ``up``, ``patch`` and ``repair`` to a mesh that is in memory or built in; nothing to an
-    OpenModel, which was read already.
+    All of it applies to a file; what does not describe a sort of files (``up``, ``patch``, ``repair``, ``scale``) to a
+    mesh that is in memory or built in; nothing to an OpenModel, which was read already.
     """
     if isinstance(model, OpenModel):
         return DEFAULT
@@ -131,7 +140,7 @@ def _source_of(model: Source, options: Options) -> SourceMesh:
     if given := [name for name in described() if are_given([name], options)]:
         are = "are" if len(given) > 1 else "is"
         raise ModelError(f"{source.name}: {listed(given)} {are} for files; {what} has its own samples")
-    return source
+    return source.in_frame(options.scale)
 
 
 def _is_file(model: str | os.PathLike[str]) -> bool:

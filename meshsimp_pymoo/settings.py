@@ -139,6 +139,27 @@ class Steps:
         return steps[0], steps[-1]
 
 
+class Scale:
+    """What units of x and y measure: two positive numbers, "degrees" to find them out, or "none": 1 for both."""
+
+    EXPECTED = "expected degrees, none, or two positive numbers SX,SY"
+
+    def from_text(self, text: str) -> str | tuple[float, float]:
+        """Return the word, or the pair."""
+        return self.from_plain([Real().from_text(part) for part in text.split(",")] if "," in text else text)
+
+    def from_plain(self, value: Any) -> str | tuple[float, float]:
+        """Return the word, or the pair."""
+        if value == "degrees":
+            return str(value)
+        if value == "none":
+            return 1.0, 1.0
+        if not isinstance(value, list) or len(value) != 2:
+            raise ValueError(self.EXPECTED)
+        x, y = (Real(0, strict=True).from_plain(part) for part in value)
+        return x, y
+
+
 class Part:
     """A part of a grid: column, row, columns, rows; of at least two columns and rows."""
 

@@ -273,7 +273,7 @@ def write_front(
             path, fitted = "", ["", ""]
             if faces is not None and (solution in with_mesh or row == chosen):
                 arrays = mesh_arrays(model, faces(int(row)))
-                single = max(single, single_precision_shift(arrays[0]))
+                single = max(single, single_precision_shift(arrays[0], surface.view.scale))
                 if solution in with_mesh:
                     path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                     write_mesh(partial / path, *arrays, **look)
@@ -386,6 +386,7 @@ def read_record(path: Path, count: int) -> dict[str, Any]:
     else:
         wrong += [f"model.{key}" for key in ("name", "hash") if not isinstance(model.get(key), str)]
         wrong += ["model.file"] * (not isinstance(model.get("file") or "", str))
+        wrong += ["model.georeference"] * (not isinstance(model.get("georeference") or {}, dict))
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
         wrong.append("chosen")
     wrong += ["objectives"] * (objectives is not None and not _are_objectives(objectives))
@@ -451,7 +452,7 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     kind, model = format_of_output(path), surface.model
     kind.check(model)
     arrays = mesh_arrays(model, faces)
-    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0]))
+    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0], surface.view.scale))
     write_mesh(path, *arrays, **shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference))
 
 

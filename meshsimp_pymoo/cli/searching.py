@@ -26,6 +26,7 @@ from meshsimp_pymoo.cli.terminal import (
     Stages,
     described,
     front_in_words,
+    in_unit,
     say,
     stop_if_interrupted,
     tell,
@@ -52,6 +53,7 @@ from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import CHECKPOINT, claim_output, even_selection, is_unfinished, package_versions
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.surface import Refitted
+from meshsimp_pymoo.surface.units import known_units, reference_system
 from meshsimp_pymoo.warming import SEARCH
 
 # Of the time that is given, the share kept for the best heights of the meshes.
@@ -401,6 +403,7 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
                 "hash": model.hash,
+                **known_units(model.georeference),
             },
             "front": str(folder / "front.csv"),
             "solutions": len(quality),
@@ -421,14 +424,16 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
     if output.quiet:
         return
     few, many = quality[0], quality[-1]
-    tell(f"{Path(model.name).name}: {model.n_vertices:,} vertices, {len(model.faces):,} triangles")
+    unit, system = front.unit, reference_system(model.georeference)
+    whole = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
+    tell(f"{Path(model.name).name}: {whole}" + f"; {system}" * bool(system))
     tell(
         f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
-        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g} "
+        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} "
         f"({found.evaluations:,} evaluations, {found.seconds:.1f} s, seed {search.seed})"
     )
     if chosen is not None:
-        tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
+        tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality, unit)}")
     written = len(list(folder.glob("meshes/*")))
     raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
     files = there(folder, "front.csv", "front.png", "report.html")

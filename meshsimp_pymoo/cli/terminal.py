@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ResultError, printable, reason_of
-from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.measures import LENGTH, MEASURES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,6 +37,7 @@ __all__ = [
     "bar",
     "described",
     "front_in_words",
+    "in_unit",
     "interrupted_code",
     "interruptible",
     "say",
@@ -221,12 +222,16 @@ def bar(quiet: bool, name: str, *, timed: bool = True) -> Iterator[Callable[[flo
 
 @contextmanager
 def warnings_as_lines() -> Iterator[None]:
-    """Print our own warnings as one line each; others as usual."""
+    """Print our own warnings as one line each, once, though a model may be read again; others as usual."""
     show_others = warnings.showwarning
+    said: set[str] = set()
 
     def show(message: Warning | str, category: type[Warning], *rest: Any, **kwargs: Any) -> None:
         if category.__module__.partition(".")[0] == "meshsimp_pymoo":
-            say("warning: " + " ".join(str(message).split()))
+            line = "warning: " + " ".join(str(message).split())
+            if line not in said:
+                say(line)
+            said.add(line)
         else:
             show_others(message, category, *rest, **kwargs)
 
@@ -236,15 +241,20 @@ def warnings_as_lines() -> Iterator[None]:
         yield
 
 
-def described(quality: Quality) -> str:
+def described(quality: Quality, unit: str = LENGTH) -> str:
     """Return the size of a mesh, and each of its numbers that has a meaning of its own, in words."""
     said = [f"{quality.triangles:,} triangles"]
     for name, measure in MEASURES.items():
         if measure.meaning:
             value = getattr(quality, name)
-            number = f"{value:.{6 if name == 'error' else 4}g}" if measure.unit else f"{value}"
+            number = f"{value:.{6 if name == 'error' else 4}g}{in_unit(unit)}" if measure.unit else f"{value}"
             said.append(f"{measure.label.removesuffix(' error')} {number}")
     return ", ".join(said)
+
+
+def in_unit(unit: str) -> str:
+    """Return what follows a number of this unit: nothing where it is not known."""
+    return "" if unit == LENGTH else f" {unit}"
 
 
 def say(line: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 from meshsimp_pymoo.cli.arguments import numbered
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling, Wish
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, say, tell, there
+from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, in_unit, say, tell, there
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, printable, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.options import Options
@@ -23,6 +23,7 @@ from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import claim_output
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
 from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.memory import check_memory
@@ -42,7 +43,7 @@ from meshsimp_pymoo.workers import EngineError, open_engine
 KNOWN: dict[type[Any], tuple[str, ...]] = {
     Search: ("seed", "threads", "checkpoint"),  # nothing is left to chance, and finished tiles are always saved
     Rules: ("footprint", "outside"),  # a grid without gaps fills its hull
-    Options: ("up", "spacing", "nodata", "window", "band", "encoding"),
+    Options: ("up", "spacing", "nodata", "window", "band", "encoding", "scale"),
     Output: ("folder", "overwrite", "format", "meshes", "page", "quiet", "json"),
 }
 
@@ -155,9 +156,11 @@ def _draw(front: TiledFront, chosen: int | None, path: Path) -> None:
     grid = front.grid
     figure = Figure(figsize=(7.0, 5.0), dpi=110, layout="constrained")
     axes = figure.subplots()
-    plot_front(front, axes, knee=int(knee(front.F)), chosen=chosen, n_points=grid.n_samples)
+    unit, system = length_unit(grid.georeference), printable(reference_system(grid.georeference))
+    plot_front(front, axes, knee=int(knee(front.F)), chosen=chosen, n_points=grid.n_samples, unit=unit)
     rows, columns = grid.shape
-    axes.set_title(f"{printable(Path(grid.name).name)}: {rows:,} x {columns:,} samples", loc="left")
+    size = f"{rows:,} x {columns:,} samples"
+    axes.set_title(f"{printable(Path(grid.name).name)}: {size}" + f"\n{system}" * bool(system), loc="left")
     figure.savefig(path)
 
 
@@ -218,7 +221,7 @@ def pick_tiled(
         mesh = None if path is None else str(path)
         tell(json.dumps({"mesh": mesh, "solution": known, **asdict(quality)}, indent=2))
     elif not quiet:
-        tell(f"of {folder}: {described(quality)}")
+        tell(f"of {folder}: {described(quality, length_unit(front.grid.georeference))}")
         tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK
 
@@ -253,6 +256,7 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
                 "vertices": grid.n_samples,
                 "triangles": grid.n_triangles,
                 "hash": grid.hash,
+                **known_units(grid.georeference),
             },
             "front": str(out / "front.csv"),
             "solutions": len(quality),
@@ -266,13 +270,15 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
     if output.quiet:
         return
     few, many = quality[-1], quality[0]
-    tell(f"{grid.name}: {grid.shape[0]:,} x {grid.shape[1]:,} samples, thinned tile by tile")
+    unit, system = length_unit(grid.georeference), reference_system(grid.georeference)
+    size = f"{grid.shape[0]:,} x {grid.shape[1]:,} samples, thinned tile by tile"
+    tell(f"{grid.name}: {size}" + f"; {system}" * bool(system))
     tell(
         f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
-        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g} ({seconds:.1f} s)"
+        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} ({seconds:.1f} s)"
     )
     if chosen is not None:
-        tell(f"chosen: {path} (solution {solution}): {described(quality[chosen])}")
+        tell(f"chosen: {path} (solution {solution}): {described(quality[chosen], unit)}")
     written = len(list(out.glob("meshes/*")))
     files = there(out, "front.csv", "nested.npz", "front.png")
     tell(f"written: {out}: {files}" + (f", {written} in meshes" if written else ""))

@@ -356,19 +356,21 @@ def meshlab_front(
         If a method is unknown or a number of triangles impossible; nothing is computed then.
     """
     require_rules(surface, "meshlab_front")
-    model = surface.model
+    model, scale = surface.model, surface.view.scale
+    measured = model.file_points * scale
     numbers = [int(number) for number in triangles]
     for name in methods:
         if name not in MESHLAB_METHODS:
             raise ValueError(f"unknown MeshLab method {name!r}: choose among {', '.join(MESHLAB_METHODS)}")
     for number in numbers:
-        _checked_mesh(model.file_points, model.faces, number)
+        _checked_mesh(measured, model.faces, number)
     _pymeshlab()
     meshes = []
     for name in methods:
         for number in numbers:
             start = time.perf_counter()
-            vertices, faces = MESHLAB_METHODS[name](model.file_points, model.faces, number)
+            vertices, faces = MESHLAB_METHODS[name](measured, model.faces, number)
+            vertices = vertices / scale
             seconds = time.perf_counter() - start
             quality = surface.score(vertices, faces).quality
             meshes.append(BaselineMesh(name, number, vertices, faces, quality, seconds))

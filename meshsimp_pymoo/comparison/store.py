@@ -313,7 +313,7 @@ def read_model(out: Path, relative: str, expected: str) -> OpenModel:
     path = out / relative
     try:
         arrays = _arrays(path.read_bytes(), path)
-        names = [name for name in _stored_fields() if name != "weights" or name in arrays]
+        names = [name for name in _stored_fields() if name not in ("weights", "scale") or name in arrays]
         stored: dict[str, Any] = {name: arrays[name] for name in names}
         plain = {name: values.item() for name, values in stored.items() if values.ndim == 0}
         model = OpenModel(**(stored | plain), attributes={})

@@ -72,11 +72,6 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     ModelError
         If rasterio is not installed, the file is no GeoTIFF of real numbers, or it has several bands and it is not said
         which.
-
-    Warns
-    -----
-    ModelWarning
-        If its coordinates are degrees.
     """
     from meshsimp_pymoo.formats.source.heights import check_room, check_window, grid_mesh
 
@@ -97,7 +92,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
             corner=(row, column),
             file_columns=shape[1],
             mirrored=mirrored,
-            georeference=_georeference(raster, band, name) | {"window": [column, row, columns, rows]},
+            georeference=_georeference(raster, band) | {"window": [column, row, columns, rows]},
         )
 
 
@@ -176,7 +171,7 @@ class RasterHeights:
             i, j = row + np.arange(rows, dtype=np.int64), column + np.arange(columns, dtype=np.int64)
             self.x: FloatArray = np.asarray(place(np.int64(row), j)[0], np.float64)
             self.y: FloatArray = np.asarray(place(i, np.int64(column))[1], np.float64)
-            self.georeference = _georeference(raster, band, name) | {"window": [column, row, columns, rows]}
+            self.georeference = _georeference(raster, band) | {"window": [column, row, columns, rows]}
             self._raster, self._band, self._nodata = raster, band, options.nodata
 
     def __getitem__(self, key: Any) -> FloatArray:
@@ -374,9 +369,7 @@ def _placement(raster: Any, steps: tuple[float, float] | None, name: str) -> tup
     return place, a * e - b * d > 0
 
 
-def _georeference(raster: Any, band: int, name: str) -> dict[str, Any]:
-    from meshsimp_pymoo.formats.source.heights import warn_of_degrees
-
+def _georeference(raster: Any, band: int) -> dict[str, Any]:
     nodata = raster.nodatavals[band - 1]
     facts: dict[str, Any] = {
         "transform": [float(value) for value in tuple(raster.transform)[:6]],
@@ -386,9 +379,8 @@ def _georeference(raster: Any, band: int, name: str) -> dict[str, Any]:
     crs = raster.crs
     if crs:
         facts |= {"crs": crs.to_wkt(), "epsg": crs.to_epsg()}
-        facts["unit"] = crs.linear_units if crs.is_projected else "degree"
-        if crs.is_geographic:
-            warn_of_degrees(name)
+        if crs.is_projected or crs.is_geographic:
+            facts["unit"] = crs.linear_units if crs.is_projected else "degree"
     return facts
 
 

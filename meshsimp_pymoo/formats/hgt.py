@@ -25,7 +25,7 @@ def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) 
     """Place a tile by its name, in degrees; with a spacing, from 0 and in whatever that is in."""
     import numpy as np
 
-    from meshsimp_pymoo.formats.source.heights import Grid, check_room, even_grid, warn_of_degrees
+    from meshsimp_pymoo.formats.source.heights import Grid, check_room, even_grid
 
     shape = _shape(path.stat().st_size, name)
     check_room(shape, 0, options, name, by_windows=by_windows)
@@ -43,7 +43,6 @@ def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) 
         float(number) * (-1 if half in "SWsw" else 1) for half, number in (corner.group(1, 2), corner.group(3, 4))
     )
     rows, columns = shape
-    warn_of_degrees(name)
     return Grid(
         heights,
         west + np.arange(columns) / (columns - 1),

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Points that are unpacked at once.
 CHUNK_POINTS = 1_000_000
+# The numbers of units in the keys of a reference system.
+LINEAR_UNITS = {9001: "metre", 9002: "foot", 9003: "US survey foot"}
 # What a small .laz may unpack to, whatever its packing.
 UNPACKED_FLOOR = 64 << 20
 
@@ -24,7 +26,14 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.formats.source.points import cloud_source
 
     points, attributes, facts = _read_points(path, name)
-    return cloud_source(points, max_edge=options.max_edge, attributes=attributes, name=name, georeference=facts)
+    return cloud_source(
+        points,
+        max_edge=options.max_edge,
+        scale=options.scale,
+        attributes=attributes,
+        name=name,
+        georeference=facts,
+    )
 
 
 def _read_points(path: Path, name: str) -> tuple[FloatArray, dict[str, Any], dict[str, Any]]:
@@ -150,8 +159,13 @@ def _facts(header: Any) -> dict[str, Any]:
         if type(record).__name__ == "WktCoordinateSystemVlr" and wkt:
             facts["crs"] = str(wkt).rstrip("\0")
         elif type(record).__name__ == "GeoKeyDirectoryVlr":
-            # 3072 and 2048: the projected and the geographic system, by EPSG number
+            # 3072 and 2048: the projected and the geographic system, by EPSG number; 1024: which of both it is
+            # 3076 and 4099: the units of a projected one and of heights
             keys = {key.id: key.value_offset for key in record.geo_keys if key.tiff_tag_location == 0}
+            units = {"unit": keys.get(3076), "height_unit": keys.get(4099)}
+            facts |= {name: LINEAR_UNITS[number] for name, number in units.items() if number in LINEAR_UNITS}
+            if keys.get(1024) == 2:
+                facts["unit"] = "degree"
             epsg = keys.get(3072) or keys.get(2048)
             if epsg and epsg < 32767:
                 facts["epsg"] = int(epsg)

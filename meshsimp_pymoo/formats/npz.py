@@ -39,7 +39,7 @@ def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) 
     import numpy as np
 
     from meshsimp_pymoo.files import npz_headers, read_npz
-    from meshsimp_pymoo.formats.source.heights import Grid, check_heights, check_room, even_grid, warn_of_degrees
+    from meshsimp_pymoo.formats.source.heights import Grid, check_heights, check_room, even_grid
 
     with path.open("rb") as stream:
         headers = npz_headers(stream, name)
@@ -67,8 +67,6 @@ def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) 
             (0.0 if in_degrees else axis[0]) + np.copysign(step, axis[1] - axis[0]) * np.arange(len(axis))
             for axis, step in zip((x, y), options.steps, strict=True)
         )
-    elif in_degrees:
-        warn_of_degrees(name)
     facts = {"unit": "degree"} if in_degrees and options.steps is None else {}
     return Grid(heights, x, y, options.nodata, facts)
 

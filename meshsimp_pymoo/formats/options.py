@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-from meshsimp_pymoo.settings import LARGEST, Choice, Direction, Part, Real, Steps, Whole, setting, settle
+from meshsimp_pymoo.settings import LARGEST, Choice, Direction, Part, Real, Scale, Steps, Whole, setting, settle
 
 # The part of a grid to take: column, row, columns, rows.
 Window = tuple[int, int, int, int]
@@ -100,6 +100,19 @@ class Options:
         "(default: its convex hull is covered)",
         metavar="L",
         describes=("cloud",),
+    )
+
+    scale: str | tuple[float, float] | None = setting(
+        None,
+        kind=Scale(),
+        accepts='"degrees", (sx, sy) or "none", optional',
+        doc="Metres to a unit of x and y, by which the plane is scaled before anything is measured; files keep their "
+        'coordinates. By default, and with ``"degrees"``, found out where coordinates are degrees: at the middle '
+        'latitude; ``"none"`` measures them as they are.',
+        help="metres to a unit of x and y: the plane is scaled by them before anything is measured, files keep their "
+        "coordinates (default: that of degrees, at the middle latitude, where the reference system has them; "
+        "degrees: also where the file does not say so; none: measured as they are)",
+        metavar="SX,SY|degrees|none",
     )
 
     def __post_init__(self) -> None:

@@ -59,7 +59,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         raise ModelError(f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again")
     points = np.column_stack([vertex[axis].astype(np.float64) for axis in "xyz"])
     faces = _faces(columns.get("face", {}), name)
-    return build_source(points, faces, _attributes(vertex, name), name)
+    return build_source(points, faces, _attributes(vertex, name), name, georeference=_georeference(data[:start]))
 
 
 def _header(data: bytes, name: str) -> tuple[list[PlyElement], str, int]:
@@ -228,6 +228,15 @@ def _write(path: Path, mesh: OutMesh) -> None:
         "end_header\n",
     ]
     path.write_bytes("\n".join(header).encode("utf-8") + record.tobytes() + triangles.tobytes())
+
+
+def _georeference(header: bytes) -> dict[str, Any]:
+    """Return the coordinate reference system that a comment of a header names: an EPSG number, or WKT."""
+    found = re.search(rb"^comment crs (.+?)\s*$", header, re.MULTILINE | re.IGNORECASE)
+    text = found[1].decode("utf-8", errors="replace") if found else ""
+    if number := re.fullmatch(r"(?:urn:ogc:def:crs:)?EPSG:[\w.]*?:?(\d{4,5})", text, re.IGNORECASE):
+        return {"epsg": int(number[1])}
+    return {"crs": text} if "[" in text else {}
 
 
 def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:

@@ -283,7 +283,8 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     -----
     ModelWarning
         If faces that name a vertex twice were dropped, per-vertex data could not be kept, a usual "no data" value
-        stands among the heights of a grid, or points of a cloud share their place in the plane.
+        stands among the heights of a grid, points of a cloud share their place in the plane, or coordinates are
+        degrees.
     """
     path = Path(path)
     name = str(path)
@@ -293,7 +294,9 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
         raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; {_way_out(path)}")
     refuse_foreign(name, options, kind.name, kind.sort)
     with guarded(kind, name):
-        return kind.read(path, name, options)
+        source = kind.read(path, name, options)
+    # clouds had to know before they were triangulated
+    return source if "scale" in source.georeference else source.in_frame(options.scale)
 
 
 def _way_out(path: Path) -> str:
@@ -468,7 +471,7 @@ def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> Non
     exact = listed(other.name for other in known if not other.single_precision)
     stating = listed(other.name for other in known if other.states_origin)
     warnings.warn(
-        f"{name}: {kind.name} holds single precision, which moves vertices by up to {shift:.3g} [file units]; {exact} "
+        f"{name}: {kind.name} holds single precision, which moves vertices by up to {shift:.3g} [model units]; {exact} "
         f"keep them exactly, {stating} states a local origin",
         ModelWarning,
         stacklevel=3,

@@ -24,7 +24,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.formats.source.points import cloud_source
 
     points, attributes = _read_table(path, name)
-    return cloud_source(points, max_edge=options.max_edge, attributes=attributes, name=name)
+    return cloud_source(points, max_edge=options.max_edge, scale=options.scale, attributes=attributes, name=name)
 
 
 def _read_table(path: Path, name: str) -> tuple[FloatArray, dict[str, Any]]:

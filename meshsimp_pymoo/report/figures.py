@@ -21,8 +21,9 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import printable
-from meshsimp_pymoo.surface.measures import MEASURES, require_measure
+from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, require_rules
+from meshsimp_pymoo.surface.units import length_unit, reference_system
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,6 +71,7 @@ def plot_front(
     n_points: float | None = None,
     measure: str = "error",
     series: Mapping[str, npt.ArrayLike] | None = None,
+    unit: str = LENGTH,
 ) -> Axes:
     """Draw a front: error against triangles.
 
@@ -90,6 +92,8 @@ def plot_front(
         What the first column of F is: one of `meshsimp_pymoo.surface.measures.OBJECTIVES`.
     series : mapping of str to (n, 2) array, optional
         Other fronts to draw faintly behind this one, by name, in the same measure.
+    unit : str
+        Unit of the errors.
 
     Returns
     -------
@@ -102,14 +106,14 @@ def plot_front(
     require_measure(measure)
     ax = ax if ax is not None else _new_axes((6.4, 4.8))
     as_mean = measure == "error" and n_points is not None
-    unit = np.array([n_points if as_mean and n_points else 1.0, 1.0])
-    error, triangles = (F / unit).T
-    drawn = [F / unit]
+    divisor = np.array([n_points if as_mean and n_points else 1.0, 1.0])
+    error, triangles = (F / divisor).T
+    drawn = [F / divisor]
     for k, (name, front_beside) in enumerate((series or {}).items()):
-        beside = np.asarray(front_beside, dtype=np.float64) / unit
+        beside = np.asarray(front_beside, dtype=np.float64) / divisor
         _steps(ax, beside, color=BESIDE, linewidth=1.2, linestyle=BESIDE_LINES[k % len(BESIDE_LINES)], label=name)
         drawn.append(beside)
-    _steps(ax, F / unit, color=LINE, linewidth=1, alpha=0.45)
+    _steps(ax, F / divisor, color=LINE, linewidth=1, alpha=0.45)
     ax.plot(triangles, error, "o", color=LINE, markersize=4, label=f"{len(F)} solution{'s' * (len(F) != 1)}")
     letters = dict(zip(marked, "abcdefgh", strict=False))
     if knee is not None:
@@ -131,14 +135,14 @@ def plot_front(
             zorder=5,
         )
     what = "mean error per vertex" if as_mean else MEASURES[measure].label
-    front_axes(ax, np.vstack(drawn), label=f"{what} [model units]")
+    front_axes(ax, np.vstack(drawn), label=f"{what} [{unit}]")
     if knee is not None or chosen is not None or series:
         for handle in ax.legend(frameon=False).get_lines():
             handle.set_markersize(min(handle.get_markersize(), 9))
     return ax
 
 
-def front_axes(ax: Axes, F: npt.ArrayLike, *, label: str = "error [model units]") -> None:
+def front_axes(ax: Axes, F: npt.ArrayLike, *, label: str = f"error [{LENGTH}]") -> None:
     """Prepare the axes of a front: both logarithmic, readable numbers, and 0 where a solution is exact.
 
     Parameters
@@ -299,7 +303,7 @@ def plot_error(
     _frame(ax, np.column_stack([x, y]))
     if bar:
         shown = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02, extend="max" if greatest > end else "neither")
-        shown.set_label("error [model units]")
+        shown.set_label(f"error [{length_unit(surface.model.georeference)}]")
         shown.outline.set_visible(False)
     return ax
 
@@ -350,9 +354,12 @@ def front_figure(
     front = left.subplots()
     letters = [row for row, _ in meshes]
     marks: dict[str, Any] = {"knee": knee, "chosen": chosen, "marked": letters}
-    plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series)
+    unit, system = length_unit(model.georeference), printable(reference_system(model.georeference))
+    plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series, unit=unit)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
-    front.set_title(title or f"{printable(PurePath(model.name).name)}: {size}", loc="left")
+    front.set_title(
+        title or f"{printable(PurePath(model.name).name)}: {size}" + f"\n{system}" * bool(system), loc="left"
+    )
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
     look: dict[str, Any] = {"exaggeration": view.exaggeration, "colour": model.attributes.get("color")}
@@ -363,6 +370,7 @@ def front_figure(
         error = f"mean error {F[row, 0] / surface.total_weight:.3g}"
         if measure != "error":
             error = f"{MEASURES[measure].label} {F[row, 0]:.3g}"
+        error += f" {unit}" * (unit != LENGTH)
         names = [name for name, marked in (("knee", knee), ("chosen", chosen)) if marked == row]
         label = f" ({', '.join(names)})" if names else ""
         size = f"{int(F[row, 1]):,} triangle{'' if F[row, 1] == 1 else 's'}"

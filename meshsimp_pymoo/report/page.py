@@ -22,8 +22,9 @@ from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_
 from meshsimp_pymoo.report.figures import UNCOVERED
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
-from meshsimp_pymoo.surface.measures import MEASURES, Measure
+from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.units import length_unit, reference_system
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
@@ -139,12 +140,14 @@ def simplification_page(
         columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
     paint = model.attributes.get("color")
     exaggeration = float(f"{view.exaggeration:.2g}")
+    unit, system = length_unit(model.georeference), reference_system(model.georeference)
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
         "folder": printable(as_argument(folder)),
         "measure": problem.objectives[0],
-        "measures": [{"name": name, **spoken(measure)} for name, measure in MEASURES.items()],
+        "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
+        "measures": [{"name": name, **spoken(measure, unit)} for name, measure in MEASURES.items()],
         "columns": columns,
         "meshes": _mesh_files(front, chosen),
         "refitted_meshes": front.refitted_meshes,
@@ -158,6 +161,7 @@ def simplification_page(
             "relief": float(np.ptp(view.points[:, 2]) / np.ptp(view.points[:, :2], axis=0).max()),
             "pivot": view.pivot.tolist(),
             "rotation": view.rotation.tolist(),
+            "scale": view.scale.tolist(),
         },
         "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
         "paint": None if paint is None else embedded_array(paint[held.vertices]) | {"channels": paint.shape[1]},
@@ -175,6 +179,8 @@ def simplification_page(
         title=f"{PurePath(source).name}, simplified",
         model={"vertices": model.n_vertices, "triangles": len(model.faces)},
         solutions=count,
+        unit=unit if unit != LENGTH else "the units of the file",
+        system=printable(system),
         thinned=list(_what_is_thinned(model, held, missing)),
         heights={"value": f"{exaggeration:g}", "step": f"{exaggeration / 20:g}", "most": f"{5 * exaggeration:g}"},
         examples={
@@ -194,9 +200,9 @@ def _errors() -> list[str]:
     return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
 
 
-def spoken(measure: Measure) -> dict[str, str]:
-    """Return what the page says of a measure."""
-    return {"label": measure.label, "meaning": measure.meaning, "unit": measure.unit}
+def spoken(measure: Measure, unit: str = LENGTH) -> dict[str, str]:
+    """Return what the page says of a measure, where lengths have this unit."""
+    return {"label": measure.label, "meaning": measure.meaning, "unit": unit if measure.unit else ""}
 
 
 def _embedded(problem: MeshProblem, front: StoredFront, order: Sequence[int], knee: int, limit: int) -> _Embedded:

@@ -104,7 +104,7 @@ class HeightSurface:
         width, depth, height = np.ptp(self.points, axis=0)
         least = LEAST_RELIEF * float(max(width, depth))
         exaggeration = max(1.0, least / float(height)) if height > 0 else 1.0
-        return View(self.points, exaggeration, self.model.rotation, self.model.pivot)
+        return View(self.points, exaggeration, self.model.rotation, self.model.pivot, self.model.scale)
 
     @cached_property
     def _ground(self) -> Ground:
@@ -202,7 +202,7 @@ class HeightSurface:
         heights, bound = least_error(
             A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance, until=until
         )
-        raised = own + (heights - original)[:, None] * model.rotation[2]
+        raised = own + (heights - original)[:, None] * (model.rotation[2] / model.scale)
         error = self.score(raised, compact).quality.error
         if error >= before:
             raised, error = own, before

@@ -46,7 +46,7 @@ class OpenModel:
     name : str
         Where it came from, for messages.
     points : (N, 3) float array
-        Vertices, upright (height along z), from a local origin [file units].
+        Vertices, upright (height along z), from a local origin [model units].
     faces : (T, 3) int32 array
         Triangles of the original mesh, counter-clockwise from above, as rows of ``points``.
     corners : (4,) int array
@@ -61,13 +61,13 @@ class OpenModel:
     up : (3,) float array
         Unit vector of the file's frame that points to +z here.
     rotation : (3, 3) float array
-        Upright coordinates are ``(file_points - pivot) @ rotation.T - offset``.
+        Upright coordinates are ``(scale * file_points - pivot) @ rotation.T - offset``.
     pivot, offset : (3,) float arrays
-        What is subtracted before and after turning, so that far-off coordinates lose nothing [file units].
+        What is subtracted before and after turning, so that far-off coordinates lose nothing [model units].
     xy : (N, 2) float array
         ``points[:, :2] / unit``, rounded to multiples of 2**-52: the coordinates all predicates work on.
     unit : float
-        Side of the unit square, a power of two [file units].
+        Side of the unit square, a power of two [model units].
     facts : dict
         What was found while checking the surface (see :func:`meshsimp_pymoo.surface.orient.check_open_surface`).
     weights : (N,) float array, optional
@@ -82,6 +82,9 @@ class OpenModel:
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says (see
         :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
+    scale : (3,) float array
+        Model units to a unit of the file along its axes: 1, but metres to a degree of x and y where the file has
+        degrees.
     """
 
     name: str
@@ -103,6 +106,7 @@ class OpenModel:
     feet: IntArray = field(default_factory=lambda: np.empty(0, np.int64), repr=False)
     repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64), repr=False)
     found: dict[str, int] = field(default_factory=dict, repr=False)
+    scale: FloatArray = field(default_factory=lambda: np.ones(3))
 
     @property
     def n_vertices(self) -> int:
@@ -116,12 +120,12 @@ class OpenModel:
 
     @property
     def diagonal(self) -> float:
-        """Diagonal of the bounding box in space [file units]."""
+        """Diagonal of the bounding box in space [model units]."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     @property
     def origin(self) -> FloatArray:
-        """The local origin in the upright frame [file units]."""
+        """The local origin in the upright frame [model units]."""
         return self.pivot @ self.rotation.T + self.offset
 
     @cached_property
@@ -227,8 +231,8 @@ class OpenModel:
         return weighted
 
     def to_local(self, points: npt.ArrayLike) -> FloatArray:
-        """Turn points (M, 3) of the file's frame into this model's upright local frame [file units]."""
-        return (np.asarray(points, float) - self.pivot) @ self.rotation.T - self.offset
+        """Turn points (M, 3) of the file's frame into this model's upright local frame [model units]."""
+        return (np.asarray(points, float) * self.scale - self.pivot) @ self.rotation.T - self.offset
 
     def __len__(self) -> int:
         return self.n_vertices
@@ -302,6 +306,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
             ModelWarning,
             stacklevel=3,
         )
+    file_points, georeference, scale, source = source.points, source.georeference, source.scale, source.measured
     direction, facts = seen_upright(source, up)
     rotation = upright_rotation(direction)
     pivot = source.points[used].min(axis=0)
@@ -322,7 +327,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
     below = below_others(xy)
     ignored = feet(points, faces, below)
     if below.any():
-        warn_of_places(source.name, source.points[rows], xy, unit, int(below.sum()), len(ignored))
+        warn_of_places(source.name, file_points[rows], xy, unit, int(below.sum()), len(ignored))
     weights = None
     if len(ignored):
         weights = np.ones(len(rows))
@@ -334,7 +339,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
         faces=faces.astype(np.int32, copy=False),
         corners=find_corners(xy),
         source_index=source.rows[rows],
-        file_points=source.points[rows],
+        file_points=file_points[rows],
         attributes=_take(source.attributes, rows),
         up=direction,
         rotation=rotation,
@@ -344,10 +349,11 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
         unit=unit,
         facts=facts,
         weights=weights,
-        georeference=source.georeference,
+        georeference=georeference,
         feet=ignored,
         repeats=source.repeats,
         found={what: n for what, n in found.items() if n},
+        scale=scale,
     )
 
 

@@ -102,9 +102,9 @@ def _looked_up(among: IntArray, rows: AnyArray) -> tuple[IntArray, BoolArray]:
 
 def _vertices_near(model: OpenModel, positions: FloatArray) -> IntArray:
     if positions.shape[1] == 3:
-        wanted, vertices = positions, model.file_points
+        wanted, vertices = positions * model.scale, model.file_points * model.scale
     else:
-        wanted, vertices = positions - model.origin[:2], model.points[:, :2]
+        wanted, vertices = positions * model.scale[:2] - model.origin[:2], model.points[:, :2]
     distance, nearest = cKDTree(vertices).query(wanted)
     far = np.flatnonzero(distance > LANDMARK_REACH * model.diagonal)
     if len(far):

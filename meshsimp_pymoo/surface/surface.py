@@ -9,7 +9,7 @@ if it shall be thinned and annealed too, answers to the questions of `surface.mo
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -99,15 +99,18 @@ class View:
     exaggeration : float
         Factor by which z is drawn higher, so that a flat relief shows.
     rotation : (3, 3) float array
-        Drawn directions are ``rotation @ direction`` of the model's file.
+        Drawn directions are ``rotation @ (scale * direction)`` of the model's file.
     pivot : (3,) float array
-        The point of the file's frame that the page turns about.
+        The point that the page turns about, scaled.
+    scale : (3,) float array
+        Model units to a unit of the file along its axes.
     """
 
     points: FloatArray
     exaggeration: float
     rotation: FloatArray
     pivot: FloatArray
+    scale: FloatArray = field(default_factory=lambda: np.ones(3))
 
 
 class Original(Protocol):

@@ -16,6 +16,7 @@ from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, NoFullGrid
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source.heights import Heights, PlacedHeights, placed_heights
+from meshsimp_pymoo.formats.source.metric import in_metric_frame
 from meshsimp_pymoo.formats.table import format_of_input, guarded, refuse_foreign
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -55,6 +56,8 @@ class HeightGrid:
         Columns of the file; None: those of the grid.
     georeference : dict
         Where on Earth it is, as far as the file says; see :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
+    scale : (float, float)
+        Model units to a unit of x and y: 1, but metres to a degree where the file has degrees.
     """
 
     name: str
@@ -67,13 +70,14 @@ class HeightGrid:
     corner: tuple[int, int] = (0, 0)
     file_columns: int | None = None
     georeference: dict[str, Any] = field(default_factory=dict, repr=False)
+    scale: tuple[float, float] = (1.0, 1.0)
     x: FloatArray = field(init=False, repr=False)
     y: FloatArray = field(init=False, repr=False)
     unit: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        x = self.file_x - self.file_x.min()
-        y = self.file_y - self.file_y.min()
+        x, y = (values * scale for values, scale in zip((self.file_x, self.file_y), self.scale, strict=True))
+        x, y = x - x.min(), y - y.min()
         unit = float(2.0 ** np.ceil(np.log2(max(np.ptp(x), np.ptp(y)))))
         # rounded as the vertices of a model are
         for name, values in (("x", (x / unit + 1.0) - 1.0), ("y", (y / unit + 1.0) - 1.0)):
@@ -110,8 +114,8 @@ class HeightGrid:
     def hash(self) -> str:
         """SHA-256 of all samples and their places: read once, band by band."""
         digest = hashlib.sha256(repr(self.shape).encode())
-        digest.update(self.file_x.tobytes())
-        digest.update(self.file_y.tobytes())
+        digest.update((self.file_x * self.scale[0]).tobytes())
+        digest.update((self.file_y * self.scale[1]).tobytes())
         for first, band in self.bands():
             digest.update(np.ascontiguousarray(band).tobytes())
             self._check(band, first, 0)
@@ -234,7 +238,7 @@ def open_grid(
         return _grid_of_model(open_model(model, options))
     if not isinstance(model, (str, os.PathLike)):
         _refuse_other_sides("grid", options)
-        return _grid_of_heights("grid", placed_heights(np.asanyarray(model), "grid", options))
+        return _grid_of_heights("grid", placed_heights(np.asanyarray(model), "grid", options), options)
     path = Path(model)
     kind = format_of_input(path)
     if kind is None or kind.open_heights is None or not path.is_file():
@@ -242,7 +246,7 @@ def open_grid(
     name = str(path)
     _refuse_other_sides(name, options, kind.name)
     with guarded(kind, name):
-        return _grid_of_heights(name, kind.open_heights(path, name, options))
+        return _grid_of_heights(name, kind.open_heights(path, name, options), options)
 
 
 def count_samples(model: str | os.PathLike[str], *, window: Window | None = None) -> int | None:
@@ -274,7 +278,10 @@ def _refuse_other_sides(name: str, options: Options, *formats: str) -> None:
         raise ModelError(f"{name}: all of a grid faces up; leave patch={options.patch!r} out")
 
 
-def _grid_of_heights(name: str, found: PlacedHeights) -> HeightGrid:
+def _grid_of_heights(name: str, found: PlacedHeights, options: Options) -> HeightGrid:
+    low, high = (np.array([end(found.x), end(found.y)]) for end in (np.min, np.max))
+    georeference = in_metric_frame(found.georeference, low, high, scale=options.scale, name=name)
+    x, y = georeference.get("scale", (1.0, 1.0))
     return HeightGrid(
         name,
         found.heights,
@@ -283,7 +290,8 @@ def _grid_of_heights(name: str, found: PlacedHeights) -> HeightGrid:
         nodata=found.nodata,
         corner=found.corner,
         file_columns=found.file_columns,
-        georeference=found.georeference,
+        georeference=georeference,
+        scale=(x, y),
     )
 
 

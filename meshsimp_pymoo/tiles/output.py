@@ -186,8 +186,9 @@ def _warn(front: TiledFront, kind: Format) -> None:
     if not kind.single_precision:
         return
     points = front.grid.file_points(front.samples)
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    warn_of_shift(kind, front.grid.name, diagonal, single_precision_shift(points))
+    scale = np.array([*front.grid.georeference.get("scale", (1.0, 1.0)), 1.0])
+    diagonal = float(np.linalg.norm(np.ptp(points * scale, axis=0)))
+    warn_of_shift(kind, front.grid.name, diagonal, single_precision_shift(points, scale))
 
 
 def _write_chosen(

@@ -167,6 +167,7 @@ def test_degrees_are_warned_of(tiff):
     with pytest.warns(ModelWarning, match="coordinates are degrees"):
         source = read_source(tiff(hill(), crs="EPSG:4326", transform=Affine(0.001, 0, 7, 0, -0.001, 50)))
     assert source.georeference["unit"] == "degree"
+    assert source.georeference["scale"] == pytest.approx([71_702, 111_229], abs=1)  # at 49.9955 degrees north
 
 
 def test_rasters_that_are_no_heights_are_refused(tiff):

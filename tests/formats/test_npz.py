@@ -108,7 +108,7 @@ def test_samples_lie_where_the_axes_say_in_any_order(tmp_path_factory, names, fl
 
 def test_degrees_are_said_and_a_spacing_is_in_their_place(tmp_path):
     np.savez(tmp_path / "a.npz", z=HEIGHTS, lon=LON, lat=LAT)
-    with pytest.warns(ModelWarning, match="its coordinates are degrees, its heights are not"):
+    with pytest.warns(ModelWarning, match="its coordinates are degrees; lengths are measured in metres"):
         assert_array_equal(read_source(tmp_path / "a.npz").points[0], [11, 47, 1])
     source = read_source(tmp_path / "a.npz", Options(spacing=(30, 20)))
     assert_array_equal(source.points[[0, 5]], [[0, 0, 1], [60, 20, 6]])  # to the north, as the axis runs

@@ -28,7 +28,7 @@ def test_merging_takes_equal_positions_alone_and_zero_has_no_sign(tmp_path):
 def test_a_single_precision_format_says_how_far_it_moves_vertices(tmp_path, solutions):
     source = load("face:200")
     far = build_model(dataclasses.replace(source, points=source.points + np.array([5e6, 4e6, 0])))
-    said = r"moves vertices by up to 0\.[12]\d+ \[file units\]; landxml, obj, off and ply keep them exactly, glb states"
+    said = r"by up to 0\.[12]\d+ \[model units\]; landxml, obj, off and ply keep them exactly, glb states"
     with pytest.warns(ModelWarning, match=said):
         write_solutions(tmp_path / "out", far, solutions, mesh_format="stl")
 

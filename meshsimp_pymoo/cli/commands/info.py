@@ -61,8 +61,10 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.opening import mended_source
     from meshsimp_pymoo.surface.orient import seen_upright
+    from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source, mended = mended_source(model, options)
+    measured = source.measured
     used = source.points[np.unique(source.faces)]
     low, extent = used.min(axis=0), np.ptp(used, axis=0)
     content: dict[str, Any] = {
@@ -72,21 +74,26 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         "unused_vertices": len(source.points) - len(used),
         "low": low.tolist(),
         "extent": extent.tolist(),
+        **known_units(source.georeference),
         "attributes": sorted(source.attributes),
         "mended": asdict(mended),
     }
     rows = {
         "vertices": f"{len(used):,}",
         "triangles": f"{len(source.faces):,}",
-        "extent": " x ".join(f"{value:.6g}" for value in extent) + " [file units]",
+        "extent": f"{_sides(extent)} [{_file_unit(source.georeference)}]",
         "from": ", ".join(f"{value:.10g}" for value in low),
         "attributes": ", ".join(sorted(source.attributes)) or "none",
         "mended": str(mended) or "nothing",
     }
+    if system := reference_system(source.georeference):
+        rows["system"] = system
+    if measured is not source:
+        rows["measured"] = f"{_sides(extent * source.scale)} [{length_unit(source.georeference)}]"
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
     try:
-        up, facts = seen_upright(source, options.up)
+        up, facts = seen_upright(measured, options.up)
     except ModelError as problem:
         refusal: str | None = str(problem)
     else:
@@ -112,3 +119,14 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         say(refusal)
         return BAD_INPUT
     return OK
+
+
+def _sides(extent: Any) -> str:
+    return " x ".join(f"{value:.6g}" for value in extent)
+
+
+def _file_unit(georeference: dict[str, Any]) -> str:
+    from meshsimp_pymoo.surface.units import length_unit
+
+    unit = str(georeference.get("unit") or "file units")
+    return f"{unit}, {unit}, {length_unit(georeference)}" if "scale" in georeference else unit

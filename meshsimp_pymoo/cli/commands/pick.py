@@ -98,6 +98,6 @@ def _pick(
         mesh = None if path is None else str(path)
         tell(json.dumps({"mesh": mesh, "solution": solution.solution, **asdict(solution.quality)}, indent=2))
     elif not quiet:
-        tell(f"solution {solution.solution} of {folder}: {described(solution.quality)}")
+        tell(f"solution {solution.solution} of {folder}: {described(solution.quality, front.unit)}")
         tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK

@@ -73,12 +73,13 @@ def _scored(
     from dataclasses import asdict
     from pathlib import Path
 
-    from meshsimp_pymoo.cli.terminal import described
+    from meshsimp_pymoo.cli.terminal import described, in_unit
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.front import Front
     from meshsimp_pymoo.opening import open_model, open_source
     from meshsimp_pymoo.surface.height import HeightSurface
+    from meshsimp_pymoo.surface.units import known_units, length_unit
 
     surface: Any = HeightSurface(open_model(model, options), rules)
     front = None
@@ -89,16 +90,18 @@ def _scored(
             raise UsageError(
                 f"{folder}: its errors are those of --outside {surface.rules.outside}; leave --outside out to compare"
             )
-    source = open_source(other, Options(repair="none"))  # judged as it is
+    # judged as it is, in the frame of the model's file, which is measured
+    source = open_source(other, Options(repair="none", scale="none"))
     try:
         scored = surface.score(source.points, source.faces)
     except ValueError as problem:
         raise UsageError(f"{other}: cannot be measured against {surface.model.name}: {problem}") from None
-    quality, name = scored.quality, surface.model.name
+    quality, name, unit = scored.quality, surface.model.name, length_unit(surface.model.georeference)
     summary: dict[str, Any] = {
-        "model": name, "other": str(other), "outside": surface.rules.outside, **asdict(quality)
+        "model": name, "other": str(other), "outside": surface.rules.outside, **asdict(quality),
+        **known_units(surface.model.georeference),
     }  # fmt: skip
-    lines = [f"{other}: {described(quality)}"]
+    lines = [f"{other}: {described(quality, unit)}"]
     if quality.uncovered > surface.n_vertices // 2:
         share = quality.uncovered / surface.n_vertices
         lines.append(f"{share:.0%} of the vertices of {name} are uncovered; are both in one frame and unit?")
@@ -107,7 +110,9 @@ def _scored(
         summary["front"] = {"folder": str(folder), **compared}
         lines.append(f"{folder}: {line}")
     if path is not None:
-        title = f"{Path(other).name}: {quality.triangles:,} triangles, mean error {quality.mean_error:.3g}"
+        title = (
+            f"{Path(other).name}: {quality.triangles:,} triangles, mean error {quality.mean_error:.3g}{in_unit(unit)}"
+        )
         _draw(surface, scored, title, path)
         summary["picture"] = str(path)
         lines.append(f"written: {path}")

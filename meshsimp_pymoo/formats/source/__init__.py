@@ -2,11 +2,12 @@
 
 Each way in ends in :func:`build_source`, so a :class:`SourceMesh` always has finite vertices and faces that exist. What
 several formats need to get there stands beside it, by topic: ``numbers`` (text), ``rows`` (of a PLY), ``heights``
-(grids), ``points`` (clouds), ``scenes`` (through trimesh) and ``precision`` (of what is written).
+(grids), ``points`` (clouds), ``scenes`` (through trimesh), ``metric`` (degrees) and ``precision`` (of what is written).
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.source.metric import in_metric_frame
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
@@ -44,8 +46,8 @@ class SourceMesh:
         What ``up="auto"`` stands for: ``"z"`` for grids, whose heights are known to be heights, and the
         viewing direction for a patch cut out along it. None: to be found out.
     georeference : dict
-        Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``transform``,
-        ``window`` ...; plain data for run.json.
+        Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``unit``,
+        ``transform``, ``window`` ..., and ``scale`` (see `metric`); plain data for run.json.
     repeats : (R, 2) int64 array, optional
         Rows of the file whose vertex repeats another one exactly, and the rows of those that they were merged into:
         whoever names the former means the latter. Default none.
@@ -65,6 +67,24 @@ class SourceMesh:
             if len(self.rows):
                 raise ValueError(f"rows has {len(self.rows)} entries for {len(self.points)} points")
             object.__setattr__(self, "rows", np.arange(len(self.points)))
+
+    @property
+    def scale(self) -> FloatArray:
+        """What the coordinates are multiplied by before anything is measured, (3,): 1 unless they are degrees."""
+        return np.array([*self.georeference.get("scale", (1.0, 1.0)), 1.0])
+
+    @property
+    def measured(self) -> SourceMesh:
+        """The same mesh in the metric frame, nowhere on Earth, in which lengths, areas and directions are taken."""
+        if "scale" not in self.georeference:
+            return self
+        return dataclasses.replace(self, points=self.points * self.scale, georeference={})
+
+    def in_frame(self, scale: str | tuple[float, float] | None) -> SourceMesh:
+        """Return the mesh with the scale that the user or the reference system says; see :func:`in_metric_frame`."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        facts = in_metric_frame(self.georeference, low, high, scale=scale, name=self.name)
+        return self if facts == self.georeference else dataclasses.replace(self, georeference=facts)
 
 
 def build_source(

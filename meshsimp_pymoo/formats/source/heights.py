@@ -158,14 +158,6 @@ def check_room(
     )
 
 
-def warn_of_degrees(name: str) -> None:
-    """Warn that the plane of a model is in degrees."""
-    warn_of(
-        f"{name}: its coordinates are degrees, its heights are not; triangles are shaped in degrees: for "
-        "shapes in metres project it first (gdalwarp -t_srs)"
-    )
-
-
 def grid_source(
     elevation: npt.ArrayLike,
     dx: float = 1.0,

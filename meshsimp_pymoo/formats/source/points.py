@@ -15,6 +15,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh, build_source, check_points
+from meshsimp_pymoo.formats.source.metric import in_metric_frame
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -28,6 +29,7 @@ def cloud_source(
     attributes: Mapping[str, npt.ArrayLike] | None = None,
     name: str = "points",
     georeference: dict[str, Any] | None = None,
+    scale: str | tuple[float, float] | None = None,
 ) -> SourceMesh:
     """Triangulate points in the plane of x and y: the Delaunay triangulation, ties broken as everywhere here.
 
@@ -38,13 +40,15 @@ def cloud_source(
     max_edge : float, optional
         A triangle with an edge longer than this in the plane is left out [units]. Without it the triangulation covers
         the convex hull of the points, and bridges every bay of their outline and every hole; about three times the
-        usual distance of neighbours keeps both open.
+        usual distance of neighbours keeps both open. Of degrees: metres, as all lengths.
     attributes : mapping of str to arrays of P rows, optional
         Per-point data.
     name : str
         What messages call it.
     georeference : dict, optional
         See :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
+    scale : "degrees", (float, float) or None
+        What a unit of x and y measures; see :class:`~meshsimp_pymoo.formats.options.Options`.
 
     Returns
     -------
@@ -76,7 +80,9 @@ def cloud_source(
     xyz = check_points(points, name)
     if max_edge is not None and not (np.isfinite(max_edge) and max_edge > 0):
         raise ModelError(f"{name}: max_edge is {max_edge}; give a positive length")
-    local = xyz - xyz.min(axis=0)
+    facts = in_metric_frame(georeference or {}, xyz.min(axis=0), xyz.max(axis=0), scale=scale, name=name)
+    local = xyz * [*facts.get("scale", (1.0, 1.0)), 1.0]
+    local -= local.min(axis=0)
     if not np.ptp(local[:, :2], axis=0).any():
         raise ModelError(f"{name}: all {len(xyz)} points share one (x, y); a surface needs different ones")
     _, xy = unit_square(local)
@@ -108,7 +114,7 @@ def cloud_source(
     place = np.full(len(xyz), -1, np.int64)
     place[rows] = np.arange(len(rows))
     values = {key: np.asarray(value)[rows] for key, value in (attributes or {}).items()}
-    facts = dict(georeference or {}) | {"points": len(xyz), "same_place": n_twins, "max_edge": max_edge}
+    facts |= {"points": len(xyz), "same_place": n_twins, "max_edge": max_edge}
     return build_source(xyz[rows], place[faces], values, name, rows=rows, up="z", georeference=facts, repeats="none")
 
 

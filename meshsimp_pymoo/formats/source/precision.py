@@ -24,6 +24,6 @@ def local_origin(vertices: FloatArray) -> FloatArray:
     return np.asarray(np.floor(vertices.min(axis=0)), dtype=np.float64)
 
 
-def single_precision_shift(vertices: FloatArray) -> float:
-    """Return by how much single precision moves the vertices at most, along an axis [their units]."""
-    return float(np.abs(vertices - vertices.astype(np.float32)).max(initial=0.0))
+def single_precision_shift(vertices: FloatArray, scale: FloatArray | float = 1.0) -> float:
+    """Return by how much single precision moves the vertices at most, along an axis [their units times the scale]."""
+    return float((np.abs(vertices - vertices.astype(np.float32)) * scale).max(initial=0.0))

@@ -10,6 +10,8 @@ const ROUNDING = 1e-6;
 // Of so many points the marks would hide each other: they are drawn smaller, those of a series not at all.
 const MANY = 150;
 const MANY_BESIDE = 40;
+// Width of a digit on an axis, rounded up [pixels].
+const LETTER = 8;
 
 // 12,300 and 0.0123, but 1.2e+7
 function readable(value) {
@@ -152,20 +154,22 @@ class FrontChart {
     const visible = this.series.filter((one) => !this.hidden.has(one));
     this.width = Math.max(260, this.host.clientWidth);
     this.height = Math.round(Math.max(260, Math.min(450, 0.8 * this.width)));
-    const box = { left: 58, right: this.width - 12, top: 28, bottom: this.height - 42 };
+    const box = { right: this.width - 12, top: 28, bottom: this.height - 42 };
     const svg = this.svg;
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     svg.setAttribute("height", this.height);
     const parts = [...(this.front ? [this.front] : []), ...visible, ...visible.flatMap((one) => one.half || [])];
     if (!parts.length) return;
-    const x = this.scale("x", parts.flatMap((part) => Array.from(part.x)), box.left, box.right);
     const y = this.scale("y", parts.flatMap((part) => Array.from(part.y)), box.bottom, box.top);
+    box.left = Math.max(58, 14 + LETTER * Math.max(...y.ticks.map(([, text]) => text.length)));
+    const x = this.scale("x", parts.flatMap((part) => Array.from(part.x)), box.left, box.right);
     const grid = svgPart(svg, "g", { class: "axes" });
     for (const [value, text] of x.ticks) {
       const at = x.at(value);
       svgPart(grid, "line", { x1: at, x2: at, y1: box.top, y2: box.bottom });
-      svgPart(grid, "text", { x: at, y: box.bottom + 16, "text-anchor": "middle" }, text);
+      const within = Math.min(at, this.width - (LETTER * text.length) / 2);
+      svgPart(grid, "text", { x: within, y: box.bottom + 16, "text-anchor": "middle" }, text);
     }
     for (const [value, text] of y.ticks) {
       const at = y.at(value);

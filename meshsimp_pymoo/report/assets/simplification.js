@@ -14,14 +14,14 @@ function spell(value) {
 }
 
 function describe(row) {
-  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles, mean error ${readable(columns.mean_error[row])}`;
+  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles, mean error ${readable(columns.mean_error[row])}${data.unit}`;
 }
 
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
 const named = (column) => measures[column]?.label ?? column.replace("_", " ");
 const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
 const isSize = ({ name }) => name in model; // what the original has too
-const percent = (share) => `${d3.format(share < 0.0995 ? ".2~f" : ".1~f")(100 * share)} %`;
+const percent = (share) => `${d3.format(share < 1e-3 ? ".2~r" : share < 0.0995 ? ".2~f" : ".1~f")(100 * share)} %`;
 
 // -------------------------------------------------------------------------------------------------------- picking
 
@@ -119,7 +119,7 @@ function numbers(row) {
     shown.value = value;
     shown.id = `number-${name}`;
     shown.textContent = spell(value);
-    cell.append(shown);
+    cell.append(shown, measures[name]?.unit || name === "refitted_error" ? data.unit : "");
     const remark = document.createElement("td");
     remark.textContent = note;
     line.append(head, cell, remark);
@@ -234,12 +234,12 @@ async function openViewer() {
     data.paint && unpackArray(data.paint),
   ]);
   state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
-  const { pivot, rotation } = model;
+  const { pivot, rotation, scale } = model; // scaled, coordinates are lengths
   const upright = new Float64Array(points.length);
   for (let i = 0; i < points.length; i += 3) {
     for (let k = 0; k < 3; k++) {
       let sum = 0;
-      for (let j = 0; j < 3; j++) sum += rotation[k][j] * (points[i + j] - pivot[j]);
+      for (let j = 0; j < 3; j++) sum += rotation[k][j] * (scale[j] * points[i + j] - pivot[j]);
       upright[i + k] = sum;
     }
   }

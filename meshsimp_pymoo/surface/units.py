@@ -1,0 +1,52 @@
+"""The unit of a model's lengths and the system of its coordinates, in words: what people are told beside numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from meshsimp_pymoo.surface.measures import LENGTH
+
+METRE = ("metre", "meter", "m")
+ANGLES = ("degree", "grad", "gon", "radian")
+
+
+def length_unit(georeference: Mapping[str, Any]) -> str:
+    """Return the unit of errors: that of heights, of which the plane is scaled to be; LENGTH where nobody says.
+
+    Examples
+    --------
+    >>> length_unit({"unit": "degree", "scale": [76056.3, 111173.5]}), length_unit({"unit": "US survey foot"})
+    ('m', 'US survey foot')
+    >>> length_unit({"unit": "degree"}), length_unit({})
+    ('model units', 'model units')
+    """
+    unit = str(georeference.get("height_unit") or (METRE[0] if "scale" in georeference else georeference.get("unit")))
+    if unit.lower() in METRE:
+        return "m"
+    return LENGTH if unit in ("None", *ANGLES) else unit
+
+
+def reference_system(georeference: Mapping[str, Any]) -> str:
+    """Return what the coordinates are, and how the plane is scaled; empty where nobody says.
+
+    Examples
+    --------
+    >>> reference_system({"epsg": 4326, "unit": "degree", "scale": [76056.321, 111173.456]})
+    'EPSG:4326, 76056.321 x 111173.46 m to a degree'
+    >>> reference_system({"crs": 'PROJCS["WGS 84 / UTM zone 33N",...]'}), reference_system({})
+    ('WGS 84 / UTM zone 33N', '')
+    """
+    number, wkt = georeference.get("epsg"), str(georeference.get("crs") or "")
+    said = [f"EPSG:{number}" if number else wkt.partition('"')[2].partition('"')[0]]
+    if "scale" in georeference:
+        x, y = georeference["scale"]
+        said.append(f"{x:.8g} x {y:.8g} {length_unit(georeference)} to a {georeference.get('unit') or 'unit'}")
+    return ", ".join(filter(None, said))
+
+
+def known_units(georeference: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the same as plain data, for summaries: ``epsg``, ``unit`` and ``scale``, as far as they are known."""
+    unit = length_unit(georeference)
+    found = {"epsg": georeference.get("epsg"), "unit": unit, "scale": georeference.get("scale")}
+    return {name: fact for name, fact in found.items() if fact not in (None, LENGTH)}
