@@ -170,8 +170,8 @@ def test_what_was_mended_is_said_once_with_its_numbers_and_none_leaves_it():
     faces[::60] = faces[::60, ::-1]
     broken = build_source(source.points, faces, name="broken.ply")
     told = (
-        "broken.ply: 3 faces listed twice and dropped, 2 faces that stand on edges of two others dropped, 13 faces wound "
-        "against the others turned (repair='none' leaves them)"
+        "broken.ply: 3 faces listed twice and dropped, 2 faces that stand on edges of two others dropped, 13 faces "
+        "wound against the others turned (repair='none' leaves them)"
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
