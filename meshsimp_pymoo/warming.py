@@ -176,7 +176,7 @@ PARTS = (
         (
             "plane.hilbert:hilbert_keys", "plane.footprint:_mark_outline", "plane.footprint:_face_cells",
         ),
-        _reading, 2.2, False,
+        _reading, 0.7, False,
     ),
     Part("evaluation", ("surface.evaluate:_evaluate",), _evaluation, 5.2, False),
     Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 4.6, False),
@@ -193,7 +193,7 @@ PARTS = (
         _tiles, 2.5, False,
     ),
     Part("scores", ("surface.score:_cover", "surface.score:_measure_outside"), _scores, 1.5, False),
-    Part("folded scans", ("surface.overlap:_mark_hidden", "surface.orient:_seen_sides"), _folds, 2.0, False),
+    Part("folded scans", ("surface.overlap:_mark_hidden", "surface.orient:_seen_sides"), _folds, 3.0, False),
     Part("files", ("formats.source.rows:_scan_bytes", "formats.source.rows:_scan_numbers"), _files, 1.0, False),
 )  # fmt: skip
 

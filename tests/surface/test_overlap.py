@@ -114,3 +114,16 @@ def test_what_would_take_too_many_comparisons_is_refused_in_one_line(monkeypatch
     )
     with pytest.raises(ModelError, match=r"^fan.ply: so many of its 3001 faces meet in one place that 900300 compar"):
         check_open_surface(flake, flake.points)
+
+
+@pytest.mark.parametrize(("shift", "hidden"), [(0.0, 0), (0.001, 9)])
+def test_an_overlap_within_single_precision_of_far_coordinates_is_none_where_they_are_so_rounded(shift, hidden):
+    sheet = grid_source(np.zeros((10, 10)), 10.0, 10.0)
+    far = sheet.points + np.array([500_000, 5_000_000, 0])
+    # of 0.5 units: what two roundings at five millions may come to
+    points = np.vstack([far, far + np.array([89.5, 0, 1])]) + shift
+    tiles = build_source(points, np.vstack([sheet.faces, sheet.faces + 100]))
+    facts = surface_facts(tiles, points)
+    assert (facts.folds, facts.refusal is None) == (0, hidden == 0)
+    assert facts.hidden >= hidden
+    assert (facts.hidden == 0) == (hidden == 0)
