@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import Csr, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
@@ -73,6 +74,8 @@ class OpenModel:
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says (see
         :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
+    material : Material, optional
+        What all faces look like, as far as the file says.
     """
 
     name: str
@@ -91,6 +94,7 @@ class OpenModel:
     facts: Any = field(default=None, repr=False)
     weights: FloatArray | None = None
     georeference: dict[str, Any] = field(default_factory=dict, repr=False)
+    material: Material | None = field(default=None, repr=False)
 
     @property
     def n_vertices(self) -> int:
@@ -310,6 +314,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
         unit=unit,
         facts=facts,
         georeference=source.georeference,
+        material=source.material,
     )
 
 

@@ -463,6 +463,7 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
         rows=source.rows[used],
         up=(float(direction[0]), float(direction[1]), float(direction[2])),
         georeference=source.georeference,
+        material=source.material,
     )
 
 

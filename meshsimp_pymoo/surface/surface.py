@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality, require_measure
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -146,6 +147,11 @@ class Original(Protocol):
     @property
     def georeference(self) -> dict[str, Any]:
         """Where on Earth it is, as far as the file says."""
+        ...
+
+    @property
+    def material(self) -> Material | None:
+        """What all faces look like, as far as the file says."""
         ...
 
     @property

@@ -2,7 +2,8 @@
 
 Each way in ends in :func:`build_source`, so a :class:`SourceMesh` always has finite vertices and faces that exist. What
 several formats need to get there stands beside it, by topic: ``numbers`` (text), ``rows`` (of a PLY), ``heights``
-(grids), ``points`` (clouds), ``scenes`` (through trimesh) and ``precision`` (of what is written).
+(grids), ``points`` (clouds), ``scenes`` (through trimesh), ``texture`` (images and where vertices lie on them) and
+``precision`` (of what is written).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.material import Material
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
@@ -32,7 +34,8 @@ class SourceMesh:
     faces : (F, 3) int64 array
         Rows of `points`; three different ones each.
     attributes : dict of arrays, each with V rows
-        Per-vertex data under the file's names; ``"color"`` is (V, 4) uint8, red green blue alpha.
+        Per-vertex data under the file's names; ``"color"`` is (V, 4) uint8, red green blue alpha, and ``"uv"`` (V, 2)
+        where on the image of `material` the vertex lies.
     name : str
         What messages call it: the path, or a built-in's name.
     rows : (V,) int64 array, optional
@@ -43,6 +46,8 @@ class SourceMesh:
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``transform``,
         ``window`` ...; plain data for run.json.
+    material : Material, optional
+        What all faces look like.
     """
 
     points: FloatArray
@@ -52,6 +57,7 @@ class SourceMesh:
     rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     up: str | tuple[float, float, float] | None = None
     georeference: dict[str, Any] = field(default_factory=dict)
+    material: Material | None = None
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
@@ -69,8 +75,11 @@ def build_source(
     rows: IntArray | None = None,
     up: str | tuple[float, float, float] | None = None,
     georeference: dict[str, Any] | None = None,
+    material: Material | None = None,
 ) -> SourceMesh:
     """Check arrays and make a :class:`SourceMesh` of them, whose fields the parameters are.
+
+    A material whose image no texture coordinates place is left out.
 
     Raises
     ------
@@ -115,7 +124,9 @@ def build_source(
         if array.ndim == 0 or len(array) != count:
             raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
         kept_attributes[key] = array
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}))
+    if material is not None and material.image and "uv" not in kept_attributes:
+        material = None
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), material)
 
 
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:
