@@ -27,6 +27,12 @@ def test_a_trimesh_object_keeps_rows_colours_and_attributes_and_is_not_changed()
     assert "color" not in from_trimesh(trimesh.Trimesh(POINTS, FACES)).attributes
 
 
+def test_colours_of_faces_stay_behind_with_their_number():
+    mesh = trimesh.Trimesh(POINTS, FACES, face_colors=COLORS[:4], process=False)
+    with pytest.warns(ModelWarning, match="colours of 4 faces stay behind"):
+        assert from_trimesh(mesh).attributes == {}
+
+
 def test_faces_that_name_a_vertex_twice_are_dropped_with_their_number():
     with pytest.warns(ModelWarning, match=r"^named: 2 of 6 faces name a vertex twice"):
         source = build_source(POINTS, [*FACES.tolist(), [0, 0, 1], [2, 3, 2]], name="named")
