@@ -437,7 +437,7 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
         tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
     if any(origin):
         place = ", ".join(f"{value:.15g}" for value in origin)
-        tell(f"origin of the glb meshes: ({place}); each file puts itself back there")
+        tell(f"origin of the glb meshes: ({place}); each file states it")
     if chosen is None:
         size = _round_size(front)
         tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")

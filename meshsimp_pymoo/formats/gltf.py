@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -36,6 +36,9 @@ UPRIGHT = {
     "z": ("x", "z", "-y"), "y": ("x", "y", "z"), "x": ("-y", "x", "z"),
     "-z": ("x", "-z", "y"), "-y": ("x", "-y", "-z"), "-x": ("y", "-x", "z"),
 }  # fmt: skip
+# What extras repeat of a georeference, and what it is; and what they say of a unit that nobody knows.
+STATED = {"epsg": int, "crs": str, "unit": str, "height_unit": str, "scale": list}
+UNKNOWN = "unknown"
 # Single precision holds distances between these [m].
 LEAST_EXTENT, MOST_EXTENT = 1e-30, 1e30
 
@@ -223,12 +226,18 @@ def _stated_frame(tree: dict[str, Any]) -> _Frame | None:
     axes, scale = extras.get("axes"), extras.get("metres_per_unit")
     if not isinstance(axes, list) or tuple(axes) not in UPRIGHT.values():
         return None
-    if not isinstance(scale, list) or len(scale) != 3 or not all(type(value) in (int, float) for value in scale):
+    if not isinstance(scale, list) or len(scale) != 3 or not _are_lengths(scale):
         return None
-    if not all(0 < value < math.inf for value in scale):
-        return None
-    facts = {key: extras[key] for key in ("epsg", "crs", "unit") if extras.get(key) and extras[key] != UNKNOWN}
+    facts = {key: extras[key] for key, kind in STATED.items() if isinstance(extras.get(key), kind)}
+    if not (len(facts.get("scale", [])) == 2 and _are_lengths(facts["scale"])):
+        facts.pop("scale", None)
+    if facts.get("unit") == UNKNOWN:
+        del facts["unit"]
     return _Frame(_turn(axes), np.array(scale, np.float64), facts)
+
+
+def _are_lengths(values: list[Any]) -> bool:
+    return all(type(value) in (int, float) and 0 < value < math.inf for value in values)
 
 
 def _turn(axes: Sequence[str]) -> FloatArray:
@@ -247,9 +256,6 @@ def _turn(axes: Sequence[str]) -> FloatArray:
 
 # ------------------------------------------------------------------------------------------------------------ writing
 
-# What extras say of a unit that nobody knows.
-UNKNOWN = "unknown"
-
 
 def _refuse(model: Held) -> None:
     """Refuse a model of a size that single precision cannot hold."""
@@ -261,6 +267,24 @@ def _refuse(model: Held) -> None:
             f"{model.name}: GLB holds single precision, and this model is {extent:.3g} wide; write another format, "
             "such as ply"
         )
+
+
+def _metres_per_unit(georeference: Mapping[str, Any]) -> FloatArray:
+    """Return what units of the file's x, y and z are in metres, 1 where that is not known.
+
+    A ``scale`` makes units of height of those of the plane, such as degrees.
+
+    >>> _metres_per_unit({"unit": "degree", "scale": [55_600.0, 111_400.0], "height_unit": "metre"}).tolist()
+    [55600.0, 111400.0, 1.0]
+    >>> _metres_per_unit({"unit": "metre", "height_unit": "foot"}).tolist()
+    [1.0, 1.0, 0.3048]
+    """
+    import numpy as np
+
+    plane = metres_of(georeference.get("unit")) or 1.0
+    height = metres_of(georeference.get("height_unit")) or plane
+    scale = georeference.get("scale")
+    return np.array([plane, plane, height] if scale is None else [scale[0] * height, scale[1] * height, height])
 
 
 def _axes(mesh: OutMesh) -> tuple[str, ...]:
@@ -285,8 +309,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
 
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     origin = local_origin(vertices) if mesh.origin is None else mesh.origin
-    metres = metres_of(mesh.georeference.get("unit"))
-    scale = np.full(3, 1.0 if metres is None else metres) if mesh.scale is None else np.asarray(mesh.scale, np.float64)
+    scale = _metres_per_unit(mesh.georeference)
     axes = _axes(mesh)
     turn = _turn(axes)
     points = (((vertices - origin) * scale) @ turn.T).astype("<f4") + np.float32(0)  # no -0.0
@@ -336,12 +359,12 @@ def _write(path: Path, mesh: OutMesh) -> None:
         {"buffer": 0, "byteOffset": first, "byteLength": len(content)} | use
         for first, (content, use) in zip(starts, parts, strict=False)
     ]
-    known = {key: mesh.georeference[key] for key in ("epsg", "crs") if mesh.georeference.get(key)}
+    known = {key: mesh.georeference[key] for key in STATED if mesh.georeference.get(key)}
     extras = {
         "origin": (np.asarray(origin, np.float64) + 0.0).tolist(),
         "axes": list(axes),
         "metres_per_unit": scale.tolist(),
-        "unit": str(mesh.georeference.get("unit") or UNKNOWN),
+        "unit": UNKNOWN,
     } | known
     tree = {
         "asset": {"version": "2.0", "generator": "meshsimp_pymoo"},

@@ -37,7 +37,6 @@ class OutMesh:
     georeference: dict[str, Any] = field(default_factory=dict)
     name: str = "surface"
     up: FloatArray | None = None
-    scale: FloatArray | None = None
     material: Material | None = None
 
     @property

@@ -349,7 +349,6 @@ def write_mesh(
     georeference: Mapping[str, Any] | None = None,
     name: str = "surface",
     up: npt.ArrayLike | None = None,
-    scale: npt.ArrayLike | None = None,
     material: Material | None = None,
 ) -> None:
     """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
@@ -374,15 +373,13 @@ def write_mesh(
         by this package, it has the coordinates of the file again.
     georeference : mapping, optional
         What is known of the coordinates (see :class:`~meshsimp_pymoo.formats.source.SourceMesh`): PLY says the CRS in a
-        comment, GLB in ``extras``, LandXML as its coordinate system and unit.
+        comment, GLB in ``extras``, LandXML as its coordinate system and unit. What its ``unit``, ``height_unit`` and
+        ``scale`` make metres is scaled in GLB; where nothing is known, units are taken for metres, and it says so.
     name : str
         What LandXML calls the surface.
     up : (3,) floats, optional
         Of GLB: the direction of the height; the axis next to it becomes glTF's Y. By default z. What was read from a
         glTF is written as it lay.
-    scale : (3,) floats, optional
-        Of GLB: metres per unit along the file's x, y and z. By default what the unit of the georeference is, and 1
-        where none is known; ``extras`` then says that the unit is unknown.
     material : Material, optional
         Of PLY, OBJ and GLB: what all faces look like. OBJ and PLY name an image, and OBJ a library, in files that are
         put beside, with a checksum of their content in their names.
@@ -405,7 +402,6 @@ def write_mesh(
         dict(georeference or {}),
         name,
         None if up is None else np.asarray(up, dtype=np.float64),
-        None if scale is None else np.asarray(scale, dtype=np.float64),
         material,
     )
     kind.write(Path(path), mesh)
@@ -418,7 +414,6 @@ def shared_frame(
     name: str,
     georeference: Mapping[str, Any],
     up: npt.ArrayLike | None = None,
-    scale: npt.ArrayLike | None = None,
     material: Material | None = None,
 ) -> dict[str, Any]:
     """Return what `write_mesh` is to know of a model beside a mesh, so that all its meshes have one frame.
@@ -433,7 +428,7 @@ def shared_frame(
         The model's name.
     georeference : mapping
         What is known of the coordinates.
-    up, scale, material
+    up, material
         As :func:`write_mesh` takes them.
     """
     import numpy as np
@@ -442,9 +437,7 @@ def shared_frame(
 
     origin = local_origin(points) if kind.states_origin else np.zeros(3)
     stem = Path(name).stem
-    return {
-        "origin": origin, "georeference": georeference, "name": stem, "up": up, "scale": scale, "material": material
-    }  # fmt: skip
+    return {"origin": origin, "georeference": georeference, "name": stem, "up": up, "material": material}
 
 
 def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> None:
