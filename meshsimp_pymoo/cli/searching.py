@@ -429,8 +429,8 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
     )
     if chosen is not None:
         tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality)}")
-    written = len(list(folder.glob("meshes/*")))
-    raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
+    written, n_raised = (len(list(folder.glob(f"{place}/*{kind.suffix}"))) for place in ("meshes", "refitted"))
+    raised = "" if fitted is None or not written else f", {n_raised} in refitted"
     files = there(folder, "front.csv", "front.png", "report.html")
     tell(f"written: {folder}: {files}" + (f", {written} in meshes" if written else "") + raised)
     if (compiled := keeper.before["compile_seconds"]) >= 1.0:
