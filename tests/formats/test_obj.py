@@ -179,6 +179,8 @@ def test_a_front_carries_the_texture_and_puts_it_beside_its_meshes_once(textures
 
 def test_a_mesh_taken_from_a_folder_brings_its_texture_and_replaces_no_file_of_the_user(textures):
     write(textures, "a.obj", textured())
+    for name in ("texture.png", "material.mtl", "rock.png", "a.mtl", "b.mtl"):
+        write(textures, name, "the user's")
     problem = MeshProblem(textures / "a.obj", n_threads=1)
     assert problem.mesh(np.ones(5, bool)).visual.material.baseColorTexture.size == (2, 3)
     front = Front.from_subsets(problem, np.ones((1, 5), bool), ends=False)
