@@ -130,7 +130,7 @@ class FrontSolution(_Numbers):
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
-        A mesh that the front's folder holds in this format is copied.
+        A mesh that the front's folder holds in this format is copied, unless it names files beside it.
 
         Raises
         ------
@@ -141,7 +141,7 @@ class FrontSolution(_Numbers):
         suffix = path.suffix.lower()
         stored = self.front.stored_mesh(self.solution)
         with new_file(path) as unfinished:
-            if stored is not None and stored.suffix == suffix:
+            if stored is not None and stored.suffix == suffix and self.front.model.material is None:
                 shutil.copyfile(stored, unfinished)
             else:
                 write_solution(unfinished, self.front.problem.surface, self.faces)

@@ -19,6 +19,7 @@ from pymoo.core.problem import ElementwiseProblem, Problem
 from meshsimp_pymoo.arrays import BoolArray, FloatArray
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.scenes import textured
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.settings import documentation, settings_of, taken
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -301,7 +302,7 @@ class MeshProblem(ElementwiseProblem):
         return self.simplify(kept).quality
 
     def mesh(self, kept: npt.NDArray[Any]) -> trimesh.Trimesh:
-        """Return the simplified mesh of one chromosome (N,) in the frame of the file, with its colours and attributes.
+        """Return the simplified mesh of one chromosome (N,) in the frame of the file, with its looks and attributes.
 
         Its vertices are original ones, in double precision, in vector order; none is without a face.
         """
@@ -315,6 +316,9 @@ class MeshProblem(ElementwiseProblem):
                 mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=values[used])
             else:
                 mesh.vertex_attributes[name] = values[used]
+        if self.model.material is not None and "uv" in self.model.attributes:
+            own = {name: values[used] for name, values in self.model.attributes.items() if name in ("uv", "color")}
+            mesh.visual = textured(own, self.model.material, mesh.visual)
         return mesh
 
     def name(self) -> str:

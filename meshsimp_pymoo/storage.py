@@ -49,7 +49,15 @@ from meshsimp_pymoo.files import (
     write_npz,
 )
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
-from meshsimp_pymoo.formats.table import format_of_output, format_to_write, shared_frame, warn_of_shift, write_mesh
+from meshsimp_pymoo.formats.table import (
+    Format,
+    format_of_output,
+    format_to_write,
+    shared_frame,
+    warn_of_left_behind,
+    warn_of_shift,
+    write_mesh,
+)
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
 from meshsimp_pymoo.surface.surface import Original, Refitted, Surface, require_rules
 
@@ -251,7 +259,7 @@ def write_front(
         )
     kind = format_to_write(mesh_format)
     kind.check(model)
-    look = shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference)
+    look = _look(kind, surface)
     F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
     if not np.isfinite(F).all():
         raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
@@ -290,6 +298,8 @@ def write_front(
             numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
         warn_of_shift(kind, model.name, surface.diagonal, single)
+        if with_mesh or chosen is not None:
+            warn_of_left_behind(kind, model.name, model.attributes)
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
@@ -447,13 +457,27 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     Warns
     -----
     ModelWarning
-        If single precision moves vertices by more than rounding.
+        If single precision moves vertices by more than rounding, or the format does not hold all that is known of them.
     """
     kind, model = format_of_output(path), surface.model
     kind.check(model)
     arrays = mesh_arrays(model, faces)
     warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0], surface.view.scale))
-    write_mesh(path, *arrays, **shared_frame(kind, model.file_points, name=model.name, georeference=model.georeference))
+    warn_of_left_behind(kind, model.name, model.attributes)
+    write_mesh(path, *arrays, **_look(kind, surface))
+
+
+def _look(kind: Format, surface: Surface) -> dict[str, Any]:
+    """Return what writing a mesh of a surface takes beside the mesh."""
+    model, up = surface.model, surface.view.rotation[2]
+    return shared_frame(
+        kind,
+        model.file_points,
+        name=model.name,
+        georeference=model.georeference,
+        up=up,
+        material=model.material,
+    )
 
 
 def package_versions() -> dict[str, str]:

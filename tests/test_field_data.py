@@ -72,7 +72,7 @@ def test_a_raster_becomes_meshes_in_its_own_coordinates_and_the_record_says_whic
 @pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
 def test_the_summary_says_where_glb_meshes_have_their_origin(dem, tmp_path, capsys):
     assert run("simplify", dem, "-o", tmp_path / "out", "--format", "glb", *QUICK) == 0
-    assert "origin of the glb meshes: (500005, 5399865, 0); each file puts itself back" in capsys.readouterr().out
+    assert "origin of the glb meshes: (500005, 5399865, 0); each file states it" in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "run.json").read_text())["mesh_origin"] == [500005, 5399865, 0]
     arguments = ("--format", "glb", "--json", *QUICK)
     assert run("simplify", dem, "-o", tmp_path / "two", *arguments) == 0

@@ -434,15 +434,15 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
     )
     if chosen is not None:
         tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality, unit)}")
-    written = len(list(folder.glob("meshes/*")))
-    raised = "" if fitted is None or not written else f", {len(list(folder.glob('refitted/*')))} in refitted"
+    written, n_raised = (len(list(folder.glob(f"{place}/*{kind.suffix}"))) for place in ("meshes", "refitted"))
+    raised = "" if fitted is None or not written else f", {n_raised} in refitted"
     files = there(folder, "front.csv", "front.png", "report.html")
     tell(f"written: {folder}: {files}" + (f", {written} in meshes" if written else "") + raised)
     if (compiled := keeper.before["compile_seconds"]) >= 1.0:
         tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
     if any(origin):
         place = ", ".join(f"{value:.15g}" for value in origin)
-        tell(f"origin of the glb meshes: ({place}); each file puts itself back there")
+        tell(f"origin of the glb meshes: ({place}); each file states it")
     if chosen is None:
         size = _round_size(front)
         tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")

@@ -248,7 +248,8 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
     out = output.folder
     grid, quality = front.grid, front.quality
     solution = None if chosen is None else len(front) - 1 - chosen
-    path = str(out / "chosen") if tiling.pieces else str(out / f"chosen{format_to_write(output.format).suffix}")
+    suffix = format_to_write(output.format).suffix
+    path = str(out / "chosen") if tiling.pieces else str(out / f"chosen{suffix}")
     if output.json:
         summary = {
             "model": {
@@ -279,6 +280,6 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
     )
     if chosen is not None:
         tell(f"chosen: {path} (solution {solution}): {described(quality[chosen], unit)}")
-    written = len(list(out.glob("meshes/*")))
+    written = len(list(out.glob(f"meshes/*{suffix}")))
     files = there(out, "front.csv", "nested.npz", "front.png")
     tell(f"written: {out}: {files}" + (f", {written} in meshes" if written else ""))

@@ -48,7 +48,7 @@ WAY_OUT = "mend that, and the same command does what is missing"
 KEY_DIGITS = 16
 
 # What is not stored of a model: results can be shown without its colours and the checks it passed.
-NOT_STORED = ("attributes", "facts", "georeference", "found")
+NOT_STORED = ("attributes", "facts", "georeference", "found", "material")
 
 
 class ExperimentWarning(UserWarning):

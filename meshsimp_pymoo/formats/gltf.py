@@ -1,35 +1,84 @@
-"""glTF 2.0: single precision from an origin that the file states, as one file (GLB) or with files beside it."""
+"""glTF 2.0: Y up, in metres, single precision from an origin that the file states, its images inside it (GLB).
+
+A file of ours says in the ``extras`` of its one node how its coordinates came about, and goes back into the frame of
+its model; files of others are read as they lie, and written as they lay.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 import struct
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from meshsimp_pymoo.errors import ModelError, reason_of
+from meshsimp_pymoo.errors import ModelError, ResultError, reason_of, warn_of
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.outmesh import OutMesh
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.outmesh import OutMesh, metres_of
+from meshsimp_pymoo.formats.table import Format, Held, register
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.arrays import AnyArray
+    from meshsimp_pymoo.arrays import AnyArray, FloatArray
     from meshsimp_pymoo.formats.source import SourceMesh
 
-# The numbers of the types, of what a buffer is for, and of "triangles".
+# The numbers of the types, of what a buffer is for, and of what primitives are made of.
 GLTF_FLOAT, GLTF_UINT, GLTF_UBYTE = 5126, 5125, 5121
-GLTF_VERTICES, GLTF_INDICES, GLTF_TRIANGLES = 34962, 34963, 4
+GLTF_VERTICES, GLTF_INDICES, GLTF_TRIANGLES, GLTF_STRIP = 34962, 34963, 4, 5
+# What is read of a vertex beside its own attributes, whose names begin with a line below; normals follow from the rest.
+CARRIED = ("POSITION", "COLOR_0", "TEXCOORD_0", "NORMAL", "TANGENT")
+# Extensions without which a file looks otherwise but is no other mesh.
+LOOKS = re.compile(r"KHR_(materials_|texture_|lights_|xmp)|EXT_texture_|KHR_mesh_quantization$")
+# The axes of a model's file along X, Y and Z of glTF, by its direction of height: Y is up.
+UPRIGHT = {
+    "z": ("x", "z", "-y"), "y": ("x", "y", "z"), "x": ("-y", "x", "z"),
+    "-z": ("x", "-z", "y"), "-y": ("x", "-y", "-z"), "-x": ("y", "-x", "z"),
+}  # fmt: skip
+# What extras repeat of a georeference, and what it is; and what they say of a unit that nobody knows.
+STATED = {"epsg": int, "crs": str, "unit": str, "height_unit": str, "scale": list}
+UNKNOWN = "unknown"
+# Single precision holds distances between these [m].
+LEAST_EXTENT, MOST_EXTENT = 1e-30, 1e30
+
+
+# ------------------------------------------------------------------------------------------------------------ reading
 
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
+    """Read all meshes of the scene as they lie there; a file of ours goes back into the frame that it states."""
+    import dataclasses
+
     from meshsimp_pymoo.formats.source.scenes import read_scene
 
-    _check(path, name, packed=path.suffix.lower() == ".glb")
-    return read_scene(path, name)
+    tree, start = _check(path, name, packed=path.suffix.lower() == ".glb")
+    source = read_scene(path, name, repeats="usual")  # wherever a texture or a normal has a seam
+    attributes = dict(source.attributes)
+    with _json_of(name):
+        triangles = _triangles(tree, name)
+        material = _material(path, tree, start, triangles, attributes, name)
+        frame = _stated_frame(tree)
+    if frame is None:  # in metres, by definition; whoever writes it again writes it as it lies
+        points, facts = source.points, {"axes": list(UPRIGHT["y"]), "unit": "metre"}
+    else:
+        points, facts = (source.points @ frame.turn) / frame.scale + 0.0, frame.georeference
+    return dataclasses.replace(source, points=points, attributes=attributes, georeference=facts, material=material)
 
 
-def _check(path: Path, name: str, *, packed: bool) -> None:
-    """Refuse a glTF whose declared sizes exceed what its file can hold."""
+@contextmanager
+def _json_of(name: str) -> Iterator[None]:
+    """Say in one line that the JSON part of a file is not what it should be."""
+    try:
+        yield
+    except ModelError:
+        raise
+    except (ValueError, AttributeError, TypeError, LookupError, OverflowError, RecursionError) as error:
+        raise ModelError(f"{name}: its JSON part cannot be read ({reason_of(error)}); export the file again") from error
+
+
+def _check(path: Path, name: str, *, packed: bool) -> tuple[dict[str, Any], int]:
+    """Refuse a glTF that declares more than its file can hold; return its tree, and where its binary part begins."""
     import json
 
     from meshsimp_pymoo.formats.source.numbers import glimpse
@@ -48,18 +97,25 @@ def _check(path: Path, name: str, *, packed: bool) -> None:
             text = stream.read(chunk)
         else:
             text = stream.read()
-    try:
+        start = stream.tell() + 8
+    with _json_of(name):
         tree = json.loads(text)
         accessors = tree.get("accessors", [])
         # an accessor without a buffer view is all zeros: a few bytes that could ask for any amount of memory
         counts = [int(item.get("count", 0)) for item in accessors if "bufferView" not in item]
         outside = [uri for uri in _uris(tree) if not _is_beside(uri)]
-    except (ValueError, AttributeError, TypeError, OverflowError, RecursionError) as error:
-        raise ModelError(f"{name}: its JSON part cannot be read ({reason_of(error)}); export the file again") from error
+        needed = [str(word) for word in tree.get("extensionsRequired", []) if not LOOKS.match(str(word))]
+        needed += ["sparse accessors"] * any("sparse" in item for item in accessors)
+        parts = [part for mesh in tree.get("meshes", []) for part in mesh["primitives"]]
+        positions = {part["attributes"]["POSITION"] for part in parts}
+        needed += ["normalized positions"] * any(accessors[k].get("normalized") for k in positions)
     if outside:
         raise ModelError(f"{name}: names {outside[0][:80]!r}, which is outside its folder; export it as .glb")
     if max(counts, default=0) > size:
         raise ModelError(f"{name}: declares {max(counts)} empty values in a file of {size} bytes; export it again")
+    if needed:
+        raise ModelError(f"{name}: needs {', '.join(needed)[:80]}, which is not read; export it without compression")
+    return tree, start
 
 
 def _uris(tree: Any) -> list[str]:
@@ -73,6 +129,176 @@ def _is_beside(uri: str) -> bool:
     return not re.search(r"[:\\%\0]|^/|(^|/)\.\.(/|$)", uri)
 
 
+def _triangles(tree: dict[str, Any], name: str) -> list[dict[str, Any]]:
+    """Return the primitives that are triangles, and say what of the others and of their vertices is not read."""
+    primitives = [part for mesh in tree.get("meshes", []) for part in mesh["primitives"]]
+    triangles = [part for part in primitives if part.get("mode", GLTF_TRIANGLES) in (GLTF_TRIANGLES, GLTF_STRIP)]
+    others: dict[str, int] = {}
+    for part in triangles:
+        further = [key for key in part["attributes"] if not key.startswith("_") and key not in CARRIED]
+        further += ["morph targets"] * bool(part.get("targets"))
+        further += ["TEXCOORD_0 without a material"] * ("TEXCOORD_0" in part["attributes"] and "material" not in part)
+        for key in further:
+            others[key] = others.get(key, 0) + 1
+    words = [f"{key} of {count} primitive(s)" for key, count in sorted(others.items())]
+    if len(triangles) < len(primitives):
+        words.append(f"{len(primitives) - len(triangles)} primitive(s) that are no triangles")
+    if words:
+        warn_of(f"{name}: {', '.join(words)[:200]} stay behind")
+    return triangles
+
+
+def _material(
+    path: Path, tree: dict[str, Any], start: int, triangles: list[dict[str, Any]], attributes: dict[str, Any], name: str
+) -> Material | None:
+    """Return the material of all triangles, if they have but one; remove texture coordinates that mean something else.
+
+    ``start`` is where the binary part of a GLB begins.
+    """
+    from meshsimp_pymoo.formats.source.texture import checked_image
+
+    used = {part.get("material") for part in triangles}
+    if len(used) > 1:
+        warn_of(f"{name}: its triangles are of {len(used)} materials, of which a mesh here has one; they stay behind")
+    if len(used) != 1 or used == {None}:
+        return None
+    item = tree["materials"][used.pop()]
+    surface = item.get("pbrMetallicRoughness", {})
+    texture = surface.get("baseColorTexture", {})
+    places = [tree["accessors"][part["attributes"]["TEXCOORD_0"]] for part in triangles if "uv" in attributes]
+    elsewhere = texture.get("texCoord", 0) or "KHR_texture_transform" in texture.get("extensions", {})
+    if any(place["componentType"] != GLTF_FLOAT for place in places) or (places and elsewhere):
+        warn_of(f"{name}: its texture coordinates are packed, or another set counts; its texture stays behind")
+        del attributes["uv"]
+    image = b""
+    if texture and "uv" in attributes:
+        source = tree["textures"][texture["index"]].get("source")
+        content = None if source is None else _image(path, tree, start, tree["images"][source], name)
+        image = checked_image(content, name, str(source)) if content is not None else b""
+        further = [f"{key}" for key in (*surface, *item) if key.endswith("Texture") and key != "baseColorTexture"]
+        further += ["an image of an unknown kind"] * (source is None)
+        if further:
+            warn_of(f"{name}: of its material {', '.join(further)[:80]} stay behind")
+    red, green, blue, opacity = (float(value) for value in surface.get("baseColorFactor", 4 * [1.0]))
+    return Material(str(item.get("name") or Material.name), (red, green, blue, opacity), image)
+
+
+def _image(path: Path, tree: dict[str, Any], start: int, image: dict[str, Any], name: str) -> bytes | None:
+    """Return the file of an image, wherever a glTF has it."""
+    if "bufferView" not in image:
+        return _content(path, str(image["uri"]), name)
+    view = tree["bufferViews"][image["bufferView"]]
+    first, size = int(view.get("byteOffset", 0)), int(view["byteLength"])
+    buffer = tree["buffers"][view["buffer"]]
+    if "uri" in buffer:
+        return (_content(path, str(buffer["uri"]), name) or b"")[first : first + size]
+    with path.open("rb") as stream:
+        stream.seek(start + first)
+        return stream.read(size)
+
+
+def _content(path: Path, uri: str, name: str) -> bytes | None:
+    import base64
+
+    from meshsimp_pymoo.formats.source.texture import file_beside
+
+    if uri.startswith("data:"):
+        return base64.b64decode(uri.partition(",")[2])
+    return file_beside(path, uri, name, "image")
+
+
+class _Frame(NamedTuple):
+    """How coordinates of a file of ours came about: as ``turn @ (scale * those of the model)``."""
+
+    turn: FloatArray
+    scale: FloatArray
+    georeference: dict[str, Any]
+
+
+def _stated_frame(tree: dict[str, Any]) -> _Frame | None:
+    """Return the frame that the nodes with meshes state in their extras, if all of them state the same."""
+    import numpy as np
+
+    stated = [node.get("extras") for node in tree.get("nodes", []) if "mesh" in node]
+    if not stated or not isinstance(stated[0], dict) or any(extras != stated[0] for extras in stated):
+        return None
+    extras = stated[0]
+    axes, scale = extras.get("axes"), extras.get("metres_per_unit")
+    if not isinstance(axes, list) or tuple(axes) not in UPRIGHT.values():
+        return None
+    if not isinstance(scale, list) or len(scale) != 3 or not _are_lengths(scale):
+        return None
+    facts = {key: extras[key] for key, kind in STATED.items() if isinstance(extras.get(key), kind)}
+    if not (len(facts.get("scale", [])) == 2 and _are_lengths(facts["scale"])):
+        facts.pop("scale", None)
+    if facts.get("unit") == UNKNOWN:
+        del facts["unit"]
+    return _Frame(_turn(axes), np.array(scale, np.float64), facts)
+
+
+def _are_lengths(values: list[Any]) -> bool:
+    return all(type(value) in (int, float) and 0 < value < math.inf for value in values)
+
+
+def _turn(axes: Sequence[str]) -> FloatArray:
+    """Return the rotation whose rows are axes with signs.
+
+    >>> _turn(["x", "z", "-y"]).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
+    """
+    import numpy as np
+
+    turn = np.zeros((3, 3))
+    for row, axis in enumerate(axes):
+        turn[row, "xyz".index(axis[-1])] = -1.0 if axis.startswith("-") else 1.0
+    return turn
+
+
+# ------------------------------------------------------------------------------------------------------------ writing
+
+
+def _refuse(model: Held) -> None:
+    """Refuse a model of a size that single precision cannot hold."""
+    import numpy as np
+
+    extent = float(np.ptp(model.file_points, axis=0).max())
+    if not LEAST_EXTENT < extent < MOST_EXTENT:
+        raise ResultError(
+            f"{model.name}: GLB holds single precision, and this model is {extent:.3g} wide; write another format, "
+            "such as ply"
+        )
+
+
+def _metres_per_unit(georeference: Mapping[str, Any]) -> FloatArray:
+    """Return what units of the file's x, y and z are in metres, 1 where that is not known.
+
+    A ``scale`` makes units of height of those of the plane, such as degrees.
+
+    >>> _metres_per_unit({"unit": "degree", "scale": [55_600.0, 111_400.0], "height_unit": "metre"}).tolist()
+    [55600.0, 111400.0, 1.0]
+    >>> _metres_per_unit({"unit": "metre", "height_unit": "foot"}).tolist()
+    [1.0, 1.0, 0.3048]
+    """
+    import numpy as np
+
+    plane = metres_of(georeference.get("unit")) or 1.0
+    height = metres_of(georeference.get("height_unit")) or plane
+    scale = georeference.get("scale")
+    return np.array([plane, plane, height] if scale is None else [scale[0] * height, scale[1] * height, height])
+
+
+def _axes(mesh: OutMesh) -> tuple[str, ...]:
+    """Return which axes of the file lie along X, Y and Z: those of a glTF as they are, else so that Y is up."""
+    import numpy as np
+
+    stated = tuple(mesh.georeference.get("axes", ()))
+    if stated in UPRIGHT.values():
+        return stated
+    up = np.array([0.0, 0.0, 1.0]) if mesh.up is None else np.asarray(mesh.up, np.float64)
+    k = int(np.argmax(np.abs(up)))
+    return UPRIGHT["-" * bool(up[k] < 0) + "xyz"[k]]
+
+
 def _write(path: Path, mesh: OutMesh) -> None:
     """Write a GLB of one node with one mesh, whose coordinates are those from the origin."""
     import json
@@ -81,61 +307,102 @@ def _write(path: Path, mesh: OutMesh) -> None:
 
     from meshsimp_pymoo.formats.source.precision import local_origin
 
-    origin = local_origin(mesh.vertices) if mesh.origin is None else mesh.origin
-    color = mesh.attributes.get("color")
-    points = (np.asarray(mesh.vertices, dtype=np.float64) - origin).astype("<f4")
-    parts: list[tuple[AnyArray, int, dict[str, Any]]] = [
+    vertices = np.asarray(mesh.vertices, dtype=np.float64)
+    origin = local_origin(vertices) if mesh.origin is None else mesh.origin
+    scale = _metres_per_unit(mesh.georeference)
+    axes = _axes(mesh)
+    turn = _turn(axes)
+    points = (((vertices - origin) * scale) @ turn.T).astype("<f4") + np.float32(0)  # no -0.0
+    uv, material = mesh.uv, mesh.material if mesh.uv is None else mesh.material or Material()
+    columns: list[tuple[str, AnyArray, dict[str, Any]]] = [
         (
+            "POSITION",
             points,
-            GLTF_VERTICES,
             {
                 "componentType": GLTF_FLOAT,
                 "type": "VEC3",
-                "count": len(points),
                 "min": points.min(axis=0).tolist(),
                 "max": points.max(axis=0).tolist(),
             },
-        ),
-        (
-            np.asarray(mesh.faces).astype("<u4").ravel(),
-            GLTF_INDICES,
-            {"componentType": GLTF_UINT, "type": "SCALAR", "count": 3 * len(mesh.faces)},
-        ),
+        )
     ]
-    attributes = {"POSITION": 0}
-    if color is not None:
+    if (color := mesh.attributes.get("color")) is not None:
         rgba = np.full((len(points), 4), 255, np.uint8)
         rgba[:, : color.shape[1]] = color
-        form = {"componentType": GLTF_UBYTE, "type": "VEC4", "count": len(points), "normalized": True}
-        parts.append((rgba, GLTF_VERTICES, form))
-        attributes["COLOR_0"] = 2
-    binary, views = b"", []
-    for values, target, _ in parts:
-        content = values.tobytes()
-        views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(content), "target": target})
-        binary += content + b"\0" * (-len(content) % 4)
-    node: dict[str, Any] = {"mesh": 0}
-    if origin.any():
-        node |= {"translation": origin.tolist(), "extras": {"origin": origin.tolist()}}
-    crs = {key: mesh.georeference[key] for key in ("epsg", "crs") if mesh.georeference.get(key)}
-    if crs:
-        node["extras"] = node.get("extras", {}) | crs
+        columns.append(("COLOR_0", rgba, {"componentType": GLTF_UBYTE, "type": "VEC4", "normalized": True}))
+    if uv is not None:  # counted from the upper left corner
+        flipped = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype("<f4")
+        columns.append(("TEXCOORD_0", flipped, {"componentType": GLTF_FLOAT, "type": "VEC2"}))
+    parts: list[tuple[bytes, dict[str, int]]] = [
+        (values.tobytes(), {"target": GLTF_VERTICES}) for _, values, _ in columns
+    ]
+    parts.append((np.asarray(mesh.faces).astype("<u4").tobytes(), {"target": GLTF_INDICES}))
+    accessors = [{"bufferView": k, "count": len(points)} | form for k, (_, _, form) in enumerate(columns)]
+    accessors.append(
+        {"bufferView": len(columns), "count": 3 * len(mesh.faces), "componentType": GLTF_UINT, "type": "SCALAR"}
+    )
+    primitive: dict[str, Any] = {
+        "attributes": {key: k for k, (key, _, _) in enumerate(columns)},
+        "indices": len(columns),
+        "mode": GLTF_TRIANGLES,
+    }
+    looks: dict[str, Any] = {}
+    if material is not None:
+        primitive["material"] = 0
+        looks["materials"] = [_described(material, has_image=mesh.has_image)]
+    if material is not None and mesh.has_image:
+        looks |= {"textures": [{"source": 0}], "images": [{"bufferView": len(parts), "mimeType": material.media_type}]}
+        parts.append((material.image, {}))
+    binary = [content + b"\0" * (-len(content) % 4) for content, _ in parts]
+    starts = np.cumsum([0, *map(len, binary)]).tolist()
+    views = [
+        {"buffer": 0, "byteOffset": first, "byteLength": len(content)} | use
+        for first, (content, use) in zip(starts, parts, strict=False)
+    ]
+    known = {key: mesh.georeference[key] for key in STATED if mesh.georeference.get(key)}
+    extras = {
+        "origin": (np.asarray(origin, np.float64) + 0.0).tolist(),
+        "axes": list(axes),
+        "metres_per_unit": scale.tolist(),
+        "unit": UNKNOWN,
+    } | known
     tree = {
         "asset": {"version": "2.0", "generator": "meshsimp_pymoo"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [node],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "mode": GLTF_TRIANGLES}]}],
-        "accessors": [{"bufferView": k} | form for k, (_, _, form) in enumerate(parts)],
+        "nodes": [{"mesh": 0, "translation": (turn @ (origin * scale) + 0.0).tolist(), "extras": extras}],
+        "meshes": [{"primitives": [primitive]}],
+        **looks,
+        "accessors": accessors,
         "bufferViews": views,
-        "buffers": [{"byteLength": len(binary)}],
+        "buffers": [{"byteLength": starts[-1]}],
     }
     text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
-    length = 12 + 8 + len(text) + 8 + len(binary)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    path.write_bytes(struct.pack("<4sII", b"glTF", 2, length) + chunks)
+    length = 12 + 8 + len(text) + 8 + starts[-1]
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", starts[-1], b"BIN\0")
+    path.write_bytes(b"".join([struct.pack("<4sII", b"glTF", 2, length), chunks, *binary]))
 
 
-register(Format("glb", (".glb",), "GLB", read=_read, write=_write, single_precision=True, states_origin=True))
+def _described(material: Material, *, has_image: bool) -> dict[str, Any]:
+    surface: dict[str, Any] = {"baseColorFactor": list(material.color), "metallicFactor": 0.0}
+    if has_image:
+        surface["baseColorTexture"] = {"index": 0}
+    blended = {"alphaMode": "BLEND"} if material.color[3] < 1 else {}
+    return {"name": material.name, "pbrMetallicRoughness": surface} | blended
+
+
+register(
+    Format(
+        "glb",
+        (".glb",),
+        "GLB",
+        read=_read,
+        write=_write,
+        single_precision=True,
+        states_origin=True,
+        keeps=("color", "uv"),
+        refuse=_refuse,
+    )
+)
 register(Format("gltf", (".gltf",), "glTF", read=_read))

@@ -6,18 +6,19 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.outmesh import OutMesh, metres_of
 from meshsimp_pymoo.formats.table import Format, Held, register
 
 NAMESPACE = "http://www.landxml.org/schema/LandXML-1.2"
 # LandXML demands a date and a time; one that never changes keeps equal meshes equal.
 DATE = {"date": "1980-01-01", "time": "00:00:00"}
-# What a CRS calls its unit, and LandXML's system of units and names for it; metres where nothing is known.
+# LandXML's system of units and its name for one of so many metres.
 UNITS = {
-    "metre": ("Metric", "meter"), "meter": ("Metric", "meter"), "m": ("Metric", "meter"),
-    "kilometre": ("Metric", "kilometer"), "foot": ("Imperial", "foot"), "ft": ("Imperial", "foot"),
-    "us survey foot": ("Imperial", "USSurveyFoot"), "ftus": ("Imperial", "USSurveyFoot"),
-}  # fmt: skip
+    1.0: ("Metric", "meter"),
+    1000.0: ("Metric", "kilometer"),
+    0.3048: ("Imperial", "foot"),
+    1200 / 3937: ("Imperial", "USSurveyFoot"),
+}
 MEASURES = {
     "Metric": {
         "areaUnit": "squareMeter", "volumeUnit": "cubicMeter",
@@ -48,7 +49,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
 
     import numpy as np
 
-    system, unit = UNITS.get(str(mesh.georeference.get("unit") or "").lower(), UNITS["metre"])
+    system, unit = UNITS[metres_of(mesh.georeference.get("unit")) or 1.0]  # metres where nothing is known
     measures = {"linearUnit": unit} | MEASURES[system]
     crs = {"epsgCode": str(mesh.georeference.get("epsg") or ""), "ogcWktCode": str(mesh.georeference.get("crs") or "")}
     z = mesh.vertices[:, 2]

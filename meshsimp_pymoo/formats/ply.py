@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.arrays import AnyArray, IntArray
+    from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
     from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.formats.source.rows import PlyElement
 
@@ -30,6 +31,8 @@ COLOR_NAMES = (
     ("red", "green", "blue", "alpha"),
     ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
 )
+# Where a vertex lies on the image; the first pair is written.
+UV_NAMES = (("s", "t"), ("texture_u", "texture_v"))
 # PLY has no 64-bit integers, no half floats and no booleans: such attributes are written in the next type that holds
 # them.
 TYPES_WRITTEN = {
@@ -59,7 +62,75 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         raise ModelError(f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again")
     points = np.column_stack([vertex[axis].astype(np.float64) for axis in "xyz"])
     faces = _faces(columns.get("face", {}), name)
-    return build_source(points, faces, _attributes(vertex, name), name, georeference=_georeference(data[:start]))
+    attributes = _attributes(vertex, name)
+    _say_left_behind(elements, columns.get("face", {}), name)
+    if (uv := _uv_of_faces(columns.get("face", {}), len(points), name)) is not None:
+        attributes.setdefault("uv", uv)
+    material = _material(path, data[:start], attributes, name)
+    where = _georeference(data[:start])
+    return build_source(points, faces, attributes, name, georeference=where, material=material)
+
+
+def _say_left_behind(elements: list[PlyElement], face: dict[str, Any], name: str) -> None:
+    """Say what of a file is no part of a surface as it is read here."""
+    others = [
+        f"{element.count} of {element.name!r}"
+        for element in elements
+        if element.count and element.name not in ("vertex", "face")
+    ]
+    known = (_vertex_list(face), "texcoord", "texnumber")
+    count = next((element.count for element in elements if element.name == "face"), 0)
+    others += [f"{key!r} of {count} faces" for key in face if count and key not in known]
+    if others:
+        warn_of(f"{name}: {', '.join(others)[:200]} are not read and stay behind")
+
+
+def _uv_of_faces(face: dict[str, Any], count: int, name: str) -> FloatArray | None:
+    """Return where on the image each vertex lies, of a file that says it for the corners of its faces."""
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.rows import Ragged
+    from meshsimp_pymoo.formats.source.texture import uv_of_corners
+
+    def joined(key: str) -> tuple[AnyArray, IntArray]:
+        column = face[key]
+        if isinstance(column, Ragged):
+            return column.values, column.counts
+        return column.reshape(-1), np.full(len(column), column[:1].size)
+
+    key = _vertex_list(face)
+    if not key or "texcoord" not in face:
+        return None
+    (corners, counts), (uv, numbers) = joined(key), joined("texcoord")
+    if len(uv) == 0:
+        return None
+    images = np.unique(face["texnumber"]) if isinstance(face.get("texnumber"), np.ndarray) else ()
+    if (numbers != 2 * counts).any() or len(images) > 1:
+        several = f"are of {len(images)} images" if len(images) > 1 else "are not two a corner"
+        warn_of(f"{name}: the texture coordinates of its faces {several} and stay behind")
+        return None
+    vertex = _integers(corners, name)
+    if vertex.min(initial=0) < 0 or vertex.max(initial=-1) >= count:
+        return None  # whose faces are refused
+    found = uv_of_corners(vertex, uv.reshape(-1, 2).astype(np.float64), name)
+    return None if found is None else np.pad(found, ((0, count - len(found)), (0, 0)))
+
+
+def _material(path: Path, header: bytes, attributes: Mapping[str, AnyArray], name: str) -> Material | None:
+    """Return the image that a comment names, if there is one and vertices lie on it."""
+    from meshsimp_pymoo.formats.source.texture import checked_image, file_beside
+
+    named = [
+        line.decode("utf-8", errors="replace").strip()
+        for line in re.findall(rb"[\r\n]comment[ \t]+TextureFile[ \t]+([^\r\n]+)", header)
+    ]
+    if not named or "uv" not in attributes:
+        return None
+    if len(named) > 1:
+        warn_of(f"{name}: names {len(named)} images, of which a mesh here has one; they stay behind")
+        return None
+    image = checked_image(file_beside(path, named[0], name, "image"), name, named[0])
+    return Material(image=image) if image else None
 
 
 def _header(data: bytes, name: str) -> tuple[list[PlyElement], str, int]:
@@ -142,9 +213,8 @@ def _faces(columns: dict[str, Any], name: str) -> IntArray:
     from meshsimp_pymoo.formats.source.numbers import fans
     from meshsimp_pymoo.formats.source.rows import Ragged
 
-    lists = [key for key, value in columns.items() if isinstance(value, Ragged) or value.ndim == 2]
-    usual = [key for key in lists if key in ("vertex_indices", "vertex_index")]
-    key = (usual or (lists if len(lists) == 1 else [""]))[0]
+    lists = _lists(columns)
+    key = _vertex_list(columns)
     if not key:
         if columns and len(next(iter(columns.values()), ())) and not lists:
             raise ModelError(f"{name}: its faces have no list of vertices (but {sorted(columns)}); export it again")
@@ -157,6 +227,19 @@ def _faces(columns: dict[str, Any], name: str) -> IntArray:
     if isinstance(column, Ragged):
         return fans(_integers(column.values, name), column.counts)
     return fans(_integers(column.ravel(), name), np.full(len(column), column.shape[1]))
+
+
+def _lists(columns: dict[str, Any]) -> list[str]:
+    from meshsimp_pymoo.formats.source.rows import Ragged
+
+    return [key for key, value in columns.items() if isinstance(value, Ragged) or value.ndim == 2]
+
+
+def _vertex_list(columns: dict[str, Any]) -> str:
+    """Return which of the faces' properties lists their vertices; empty: none, or nobody knows."""
+    lists = _lists(columns)
+    usual = [key for key in lists if key in ("vertex_indices", "vertex_index")]
+    return (usual or (lists if len(lists) == 1 else [""]))[0]
 
 
 def _integers(values: AnyArray, name: str) -> IntArray:
@@ -183,6 +266,11 @@ def _attributes(vertex: dict[str, Any], name: str) -> dict[str, AnyArray]:
             attributes["color"] = color
             rest = {key: value for key, value in rest.items() if key not in names}
             break
+    for both in UV_NAMES:
+        pair = [rest[key] for key in both if key in rest]
+        if len(pair) == 2 and "uv" not in rest and all(isinstance(x, np.ndarray) and x.dtype.kind == "f" for x in pair):
+            attributes["uv"] = np.column_stack(pair)
+            rest = {key: value for key, value in rest.items() if key not in both}
     for key, value in rest.items():
         if isinstance(value, Ragged):
             warn_of(f"{name}: the per-vertex lists {key!r} differ in length and stay behind")
@@ -206,7 +294,9 @@ def _write(path: Path, mesh: OutMesh) -> None:
             )
         table = values.astype(kind).reshape(len(values), -1)
         for k in range(table.shape[1]):
-            spelled = COLOR_NAMES[0][k] if name == "color" else name if values.ndim == 1 else f"{name}_{k}"
+            spelled = name if values.ndim == 1 else f"{name}_{k}"
+            if name == "color" or (name == "uv" and mesh.uv is not None):
+                spelled = (COLOR_NAMES if name == "color" else UV_NAMES)[0][k]
             columns.append((spelled, table[:, k]))
     names = ["_".join(name.split()) for name, _ in columns]
     record = np.empty(len(vertices), dtype=[(f"c{k}", f"<{c.dtype.str[1:]}") for k, (_, c) in enumerate(columns)])
@@ -221,6 +311,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
         "ply",
         "format binary_little_endian 1.0",
         *_crs_comments(mesh.georeference),
+        *_image_comments(path.parent, mesh),
         f"element vertex {len(vertices)}",
         *properties,
         f"element face {len(mesh.faces)}",
@@ -239,6 +330,13 @@ def _georeference(header: bytes) -> dict[str, Any]:
     return {"crs": text} if "[" in text else {}
 
 
+def _image_comments(folder: Path, mesh: OutMesh) -> list[str]:
+    """Put a mesh's image into a folder and return the line of a PLY header that names it, if there is one."""
+    if mesh.material is None or not mesh.has_image:
+        return []
+    return [f"comment TextureFile {mesh.material.put_image(folder)}"]
+
+
 def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
     """Return the line of a PLY header that says the coordinate reference system, if it is known."""
     if georeference.get("epsg"):
@@ -247,4 +345,4 @@ def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
     return [f"comment crs {wkt}"] if wkt else []
 
 
-register(Format("ply", (".ply",), "PLY", read=_read, write=_write))
+register(Format("ply", (".ply",), "PLY", read=_read, write=_write, keeps=None))

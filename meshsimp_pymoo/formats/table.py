@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from meshsimp_pymoo import formats
 from meshsimp_pymoo.discovery import modules_in
 from meshsimp_pymoo.errors import ModelError, ModelWarning, raise_if_memory, reason_of, way_to_install
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.settings import defaults_of, settings_of
@@ -106,6 +107,8 @@ class Format(NamedTuple):
         Whether it cannot hold double precision.
     states_origin : bool
         Whether it says from which origin its coordinates count; then single precision loses nothing that matters.
+    keeps : tuple of str, optional
+        The attributes of vertices that it holds when written, among them "uv", with which the material goes; None: all.
     refuse : callable, optional
         ``refuse(model)`` raises a ResultError if it cannot hold meshes of this model.
     open_heights : callable, optional
@@ -124,6 +127,7 @@ class Format(NamedTuple):
     further: Callable[[], Iterable[str]] | None = None
     single_precision: bool = False
     states_origin: bool = False
+    keeps: tuple[str, ...] | None = ()
     refuse: Callable[[Held], None] | None = None
     open_heights: Callable[[Path, str, Options], PlacedHeights] | None = None
     count_samples: Callable[[Path, str], int | None] | None = None
@@ -402,6 +406,8 @@ def write_mesh(
     origin: npt.ArrayLike | None = None,
     georeference: Mapping[str, Any] | None = None,
     name: str = "surface",
+    up: npt.ArrayLike | None = None,
+    material: Material | None = None,
 ) -> None:
     """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
 
@@ -415,16 +421,26 @@ def write_mesh(
     faces : (M, 3) int array
         Triangles.
     attributes : mapping of str to (V,) or (V, k) array, optional
-        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, anything else to PLY only.
+        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, ``uv`` (V, 2: where on the
+        image of the material each vertex lies) to PLY, OBJ and GLB, anything else to PLY only.
     origin : (3,) floats, optional
-        Of GLB: what is subtracted from the coordinates before they lose their double precision. The file says it twice:
-        as the translation of its one node, which puts the mesh back where it was, and as ``extras.origin``. By default
-        it is 0 where that loses nothing, else the mesh's lower corner in whole units.
+        Of GLB: what is subtracted from the coordinates before they lose their double precision. By default the mesh's
+        lower corner in round numbers. GLB is Y up and in metres; its one node puts the mesh, by its translation, where
+        its coordinates are so, and says in its ``extras`` how they came about: ``origin`` and ``unit`` as in the file,
+        ``metres_per_unit`` along the file's x, y and z, and ``axes``, those of the file along X, Y and Z of glTF. Read
+        by this package, it has the coordinates of the file again.
     georeference : mapping, optional
         What is known of the coordinates (see :class:`~meshsimp_pymoo.formats.source.SourceMesh`): PLY says the CRS in a
-        comment, GLB in ``extras``, LandXML as its coordinate system and unit.
+        comment, GLB in ``extras``, LandXML as its coordinate system and unit. What its ``unit``, ``height_unit`` and
+        ``scale`` make metres is scaled in GLB; where nothing is known, units are taken for metres, and it says so.
     name : str
         What LandXML calls the surface.
+    up : (3,) floats, optional
+        Of GLB: the direction of the height; the axis next to it becomes glTF's Y. By default z. What was read from a
+        glTF is written as it lay.
+    material : Material, optional
+        Of PLY, OBJ and GLB: what all faces look like. OBJ and PLY name an image, and OBJ a library, in files that are
+        put beside, with a checksum of their content in their names.
 
     Raises
     ------
@@ -436,11 +452,29 @@ def write_mesh(
     kind = format_of_output(path)
     start = None if origin is None else np.asarray(origin, dtype=np.float64)
     assert kind.write is not None
-    kind.write(Path(path), OutMesh(vertices, faces, dict(attributes or {}), start, dict(georeference or {}), name))
+    mesh = OutMesh(
+        vertices,
+        faces,
+        dict(attributes or {}),
+        start,
+        dict(georeference or {}),
+        name,
+        None if up is None else np.asarray(up, dtype=np.float64),
+        material,
+    )
+    kind.write(Path(path), mesh)
 
 
-def shared_frame(kind: Format, points: FloatArray, *, name: str, georeference: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what `write_mesh` is to know of a model's frame, so that all its meshes have one origin.
+def shared_frame(
+    kind: Format,
+    points: FloatArray,
+    *,
+    name: str,
+    georeference: Mapping[str, Any],
+    up: npt.ArrayLike | None = None,
+    material: Material | None = None,
+) -> dict[str, Any]:
+    """Return what `write_mesh` is to know of a model beside a mesh, so that all its meshes have one frame.
 
     Parameters
     ----------
@@ -452,13 +486,16 @@ def shared_frame(kind: Format, points: FloatArray, *, name: str, georeference: M
         The model's name.
     georeference : mapping
         What is known of the coordinates.
+    up, material
+        As :func:`write_mesh` takes them.
     """
     import numpy as np
 
     from meshsimp_pymoo.formats.source.precision import local_origin
 
     origin = local_origin(points) if kind.states_origin else np.zeros(3)
-    return {"origin": origin, "georeference": georeference, "name": Path(name).stem}
+    stem = Path(name).stem
+    return {"origin": origin, "georeference": georeference, "name": stem, "up": up, "material": material}
 
 
 def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> None:
@@ -476,3 +513,15 @@ def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> Non
         ModelWarning,
         stacklevel=3,
     )
+
+
+def warn_of_left_behind(kind: Format, name: str, attributes: Iterable[str]) -> None:
+    """Warn if the format holds not all of what is known of the vertices."""
+    lost = [] if kind.keeps is None else sorted(set(attributes) - set(kind.keeps))
+    if lost:
+        exact = listed(other.name for other in written_formats().values() if other.keeps is None)
+        warnings.warn(
+            f"{name}: {kind.name} does not hold {listed(lost)[:200]} of the vertices; {exact} does",
+            ModelWarning,
+            stacklevel=3,
+        )

@@ -18,6 +18,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument, put_text
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
 from meshsimp_pymoo.settings import settings_of
@@ -188,6 +189,7 @@ def simplification_page(
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,
+        further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
         errors={name: MEASURES[name].label for name in _errors()},
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import Csr, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning, warn_of
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
@@ -85,6 +86,8 @@ class OpenModel:
     scale : (3,) float array
         Model units to a unit of the file along its axes: 1, but metres to a degree of x and y where the file has
         degrees.
+    material : Material, optional
+        What all faces look like, as far as the file says.
     """
 
     name: str
@@ -107,6 +110,7 @@ class OpenModel:
     repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64), repr=False)
     found: dict[str, int] = field(default_factory=dict, repr=False)
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
+    material: Material | None = field(default=None, repr=False)
 
     @property
     def n_vertices(self) -> int:
@@ -354,6 +358,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
         repeats=source.repeats,
         found={what: n for what, n in found.items() if n},
         scale=scale,
+        material=source.material,
     )
 
 

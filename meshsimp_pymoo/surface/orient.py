@@ -488,6 +488,7 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
         up=(float(direction[0]), float(direction[1]), float(direction[2])),
         georeference=source.georeference,
         repeats=source.repeats,
+        material=source.material,
     )
 
 

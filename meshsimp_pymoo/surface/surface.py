@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality, require_measure
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -154,6 +155,11 @@ class Original(Protocol):
     @property
     def found(self) -> dict[str, int]:
         """What was changed or left out when it was read, and how often."""
+        ...
+
+    @property
+    def material(self) -> Material | None:
+        """What all faces look like, as far as the file says."""
         ...
 
     @property

@@ -39,6 +39,7 @@ from meshsimp_pymoo.formats.table import (
     format_of_output,
     format_to_write,
     shared_frame,
+    warn_of_left_behind,
     warn_of_shift,
     write_mesh,
 )
@@ -179,10 +180,13 @@ def clear_up(folder: Path) -> None:
 def _frame(front: TiledFront, kind: Format) -> dict[str, Any]:
     grid = front.grid
     points = grid.file_points(front.samples) if kind.states_origin else np.empty((0, 3))
-    return shared_frame(kind, points, name=grid.name, georeference=grid.georeference)
+    look = shared_frame(kind, points, name=grid.name, georeference=grid.georeference)
+    return look if grid.model is None else look | {"up": grid.model.up, "material": grid.model.material}
 
 
 def _warn(front: TiledFront, kind: Format) -> None:
+    if front.grid.model is not None:
+        warn_of_left_behind(kind, front.grid.name, front.grid.model.attributes)
     if not kind.single_precision:
         return
     points = front.grid.file_points(front.samples)

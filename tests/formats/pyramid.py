@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.options import Options
@@ -20,6 +22,17 @@ FACES = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
 
 COLORS = np.array([[1, 2, 3], [9, 8, 7], [50, 60, 70], [255, 0, 255], [0, 9, 0]], np.uint8)
 COLORS = np.column_stack([COLORS, np.full(5, 255, np.uint8)])
+
+# A place on an image for each vertex, none of which single precision changes; and an image.
+UV = np.array([[0.0, 0.125], [1.0, 0.25], [0.75, 1.0], [0.0, 0.5], [0.5, 0.5]])
+
+
+def picture(kind: str = "PNG") -> bytes:
+    """Return the file of a small image."""
+    stream = io.BytesIO()
+    Image.new("RGB", (2, 3), (200, 100, 50)).save(stream, format=kind)
+    return stream.getvalue()
+
 
 HEADER = """ply
 format {} 1.0

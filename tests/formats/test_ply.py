@@ -13,12 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_array_equal
-from pyramid import COLORS, FACES, HEADER, LABEL, POINTS, QUALITY, ascii_ply, binary_ply, refusal, write
+from pyramid import COLORS, FACES, HEADER, LABEL, POINTS, QUALITY, UV, ascii_ply, binary_ply, picture, refusal, write
 from samples import coloured, write_solutions
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning
-from meshsimp_pymoo.formats.table import read_source
+from meshsimp_pymoo.formats.material import Material
+from meshsimp_pymoo.formats.table import read_source, write_mesh
 from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.model import build_model
 
@@ -68,7 +69,11 @@ def test_mixed_polygons_with_further_face_properties_become_fans_in_their_order(
         data = head + POINTS.astype(f"{order}f4").tobytes()
         for p in polygons:
             data += struct.pack(f"{order}BH{len(p)}IB2fd", 7, len(p), *p, 2, 0.5, 0.5, 1.25)
-    source = read_source(write(tmp_path, "mixed.ply", data))
+    with pytest.warns(ModelWarning) as said:
+        source = read_source(write(tmp_path, "mixed.ply", data))
+    messages = sorted(str(warning.message).split("mixed.ply: ")[1] for warning in said)
+    assert messages[0] == "'flags' of 4 faces, 'weight' of 4 faces are not read and stay behind"
+    assert "not two a corner" in messages[1]
     fans = [[0, 1, 2], [0, 2, 3], [0, 1, 4], [0, 1, 2], [0, 2, 3], [0, 3, 4]]
     assert_array_equal(source.faces, fans)
 
@@ -264,3 +269,57 @@ def test_the_reference_system_stands_in_the_record_and_in_the_ply(tmp_path, solu
     folder = write_solutions(tmp_path / "b", model, solutions, chosen=1)
     assert '\ncomment crs LOCAL_CS["Höhe 2", UNIT["metre",1]]\n'.encode() in (folder / "chosen.ply").read_bytes()
     assert len(read_source(folder / "chosen.ply").faces) == solutions[1][1].quality.triangles
+
+
+# ------------------------------------------------------------------------------------------------------------ texture
+
+
+@pytest.mark.parametrize("names", [("s", "t"), ("texture_u", "texture_v")])
+def test_texture_coordinates_of_vertices_are_an_attribute_and_the_image_comes_along(tmp_path, names):
+    write(tmp_path, "skin.png", picture())
+    text = ascii_ply().replace("property float quality\nproperty short label", "property float {}\nproperty float {}")
+    text = text.format(*names).replace("comment made by hand", "comment TextureFile skin.png")
+    lines = text.splitlines()
+    start = lines.index("end_header") + 1
+    for k, (u, v) in enumerate(UV):
+        lines[start + k] = " ".join([*lines[start + k].split()[:6], str(u), str(v)])
+    source = read_source(write(tmp_path, "a.ply", "\n".join(lines)))
+    assert_array_equal(source.attributes["uv"], UV)
+    assert source.material.image == picture()
+    write_mesh(tmp_path / "b.ply", source.points, source.faces, source.attributes, material=source.material)
+    again = read_source(tmp_path / "b.ply")
+    assert again.material == source.material
+    assert_array_equal(again.attributes["uv"], UV)
+    assert b"property float s\nproperty float t\n" in (tmp_path / "b.ply").read_bytes()
+
+
+def wedges(images, seam):
+    """Return the pyramid as MeshLab writes textured ones: with coordinates for the corners of faces."""
+    head = "\n".join(["ply", "format ascii 1.0", *(f"comment TextureFile {name}" for name in images)])
+    head += "\nelement vertex 5\nproperty double x\nproperty double y\nproperty double z\nelement face 4\n"
+    head += "property list uchar int vertex_indices\nproperty list uchar float texcoord\nproperty int texnumber\n"
+    rows = [" ".join(map(str, point)) for point in POINTS.tolist()]
+    for number, face in enumerate(FACES.tolist()):
+        places = UV[face] + seam * (number == 3)
+        rows.append(f"3 {' '.join(map(str, face))} 6 {' '.join(map(str, places.ravel()))} {number % len(images)}")
+    return head + "end_header\n" + "\n".join(rows) + "\n"
+
+
+def test_texture_coordinates_of_corners_are_those_of_vertices_without_seams(tmp_path):
+    write(tmp_path, "skin.png", picture())
+    source = read_source(write(tmp_path, "a.ply", wedges(["skin.png"], 0.0)))
+    assert_array_equal(source.attributes["uv"], UV)
+    assert source.material == Material(image=picture())
+    with pytest.warns(ModelWarning, match="3 of 5 vertices lie on seams") as said:
+        source = read_source(write(tmp_path, "a.ply", wedges(["skin.png"], 0.25)))
+    assert len(said) == 1
+    assert source.material is None
+    with pytest.warns(ModelWarning, match="are of 2 images"):
+        source = read_source(write(tmp_path, "a.ply", wedges(["skin.png", "other.png"], 0.0)))
+    assert source.attributes == {}
+
+
+def test_other_elements_are_said_with_their_number(tmp_path):
+    text = ascii_ply().replace("end_header", "element edge 1\nproperty int vertex1\nend_header") + "0\n"
+    with pytest.warns(ModelWarning, match="1 of 'edge' are not read"):
+        assert len(read_source(write(tmp_path, "a.ply", text)).faces) == 4

@@ -47,15 +47,14 @@ def test_vertices_that_repeat_a_position_are_merged_with_their_number():
 
 
 def test_of_attributes_that_differ_the_first_ones_stay_with_their_number():
-    points, faces, _ = soup()
+    points, faces, corners = soup()
     values = np.arange(len(points), dtype=float)
-    values[points[:, 0] == points[0, 0]] = np.nan
-    with pytest.warns(ModelWarning, match=r"differ in attributes \(age of \d+\) the first one's stay"):
+    values[corners == 0] = np.nan  # no number is like no number
+    several = sum(np.count_nonzero(corners == k) > 1 for k in range(1, len(POINTS)))
+    told = f"{several} of {len(np.unique(corners))} vertices have several values of 'age', of which the first stays"
+    with pytest.warns(ModelWarning, match="repeat the position"), pytest.warns(ModelWarning, match=told):
         source = build_source(points, faces, {"age": values, "same": points}, name="soup")
     assert_array_equal(source.attributes["age"], values[source.rows])
-    n_lost = int((np.isfinite(values[source.repeats[:, 0]])).sum())
-    with pytest.warns(ModelWarning, match=rf"age of {n_lost}\)"):
-        build_source(points, faces, {"age": values}, name="soup")
 
 
 def test_minus_zero_is_zero_and_fewer_than_four_positions_are_no_mesh():
@@ -64,6 +63,12 @@ def test_minus_zero_is_zero_and_fewer_than_four_positions_are_no_mesh():
         assert len(build_source(points, [[0, 1, 2], [4, 2, 3]]).points) == 4
     with pytest.warns(ModelWarning), pytest.raises(ModelError, match="only 3 different positions among 4 vertices"):
         build_source([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 0]], [[0, 1, 2]])
+
+
+def test_colours_of_faces_stay_behind_with_their_number():
+    mesh = trimesh.Trimesh(POINTS, FACES, face_colors=COLORS[:4], process=False)
+    with pytest.warns(ModelWarning, match="colours of 4 faces stay behind"):
+        assert from_trimesh(mesh).attributes == {}
 
 
 def test_faces_that_name_a_vertex_twice_are_dropped_with_their_number():

@@ -16,7 +16,7 @@ from pyramid import COLORS, FACES, POINTS, ascii_ply, binary_ply, refusal, write
 from samples import coloured, write_solutions
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, way_to_install
+from meshsimp_pymoo.errors import ModelError, ModelWarning, way_to_install
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import (
     SORTS,
@@ -388,8 +388,10 @@ def test_every_format_opens_in_trimesh_with_the_same_shape(tmp_path, model, solu
     assert len(mesh.faces) == len(faces)
     corners = mesh.triangles.reshape(-1, 9)
     expected = vertices[faces].reshape(-1, 9)
+    if suffix == "glb":  # Y is up there
+        expected = (vertices[faces] @ [[1, 0, 0], [0, 0, -1], [0, 1, 0]]).reshape(-1, 9)
     if single:
-        np.testing.assert_allclose(corners, expected, rtol=1e-6)
+        np.testing.assert_allclose(corners, expected, rtol=1e-6, atol=1e-5)
     else:
         assert np.array_equal(corners, expected)
 
@@ -397,9 +399,11 @@ def test_every_format_opens_in_trimesh_with_the_same_shape(tmp_path, model, solu
 @pytest.mark.parametrize("suffix", ["obj", "glb"])
 def test_colours_travel_in_the_other_formats_that_hold_them(tmp_path, solutions, suffix):
     source = coloured(load("face:200"))
-    folder = write_solutions(tmp_path / "out", build_model(source), solutions, chosen=1, mesh_format=suffix)
+    lost = f"{suffix} does not hold label, pair, quality, seen and two words of the vertices; ply does"
+    with pytest.warns(ModelWarning, match=lost):
+        folder = write_solutions(tmp_path / "out", build_model(source), solutions, chosen=1, mesh_format=suffix)
     mesh = trimesh.load(folder / f"chosen.{suffix}", process=False, force="mesh")
-    row = {tuple(point): k for k, point in enumerate(source.points.astype(np.float32).tolist())}
-    came_from = [row[tuple(point)] for point in mesh.vertices.astype(np.float32).tolist()]
+    points = read_source(folder / f"chosen.{suffix}").points
+    came_from = np.linalg.norm(points[:, None] - source.points, axis=2).argmin(axis=1)
     expected = source.attributes["color"][came_from, :3]
     np.testing.assert_allclose(mesh.visual.vertex_colors[:, :3].astype(int), expected.astype(int), atol=1)

@@ -340,7 +340,7 @@ def parsed(path):
         return vertices, faces.astype(np.int64)
     lines = [line.split() for line in path.read_text(encoding="ascii").splitlines()]
     if path.suffix == ".obj":
-        vertices = np.array([words[1:] for words in lines if words[0] == "v"], dtype=float)
+        vertices = np.array([words[1:4] for words in lines if words[0] == "v"], dtype=float)
         return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=np.int64) - 1
     corners = np.array([words[1:] for words in lines if words[0] == "vertex"], dtype=float)
     return corners, np.arange(len(corners)).reshape(-1, 3)
@@ -360,7 +360,12 @@ def test_a_downloaded_mesh_has_the_triangles_and_the_error_that_the_page_says(vi
     assert found.triangles == number(visit.page, "triangles") == front[6].triangles
     assert found.error == pytest.approx(number(visit.page, "error"), rel=1e-9)
     assert found.max_error == pytest.approx(number(visit.page, "max_error"), rel=1e-9)
-    assert len(read_source(path).faces) == front[6].triangles  # and the package opens it
+    source = read_source(path)  # and the package opens it
+    assert len(source.faces) == front[6].triangles
+    if suffix != "stl":
+        used = np.unique(front[6].faces)
+        assert source.points.tolist() == front.model.file_points[used].tolist()
+        assert source.attributes["color"].tolist() == front.model.attributes["color"][used].tolist()
 
 
 def test_a_downloaded_ply_is_the_file_that_the_package_writes(visit, front, tmp_path):

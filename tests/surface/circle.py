@@ -35,6 +35,7 @@ class Curve:
     attributes: dict[str, AnyArray] = field(default_factory=dict)
     georeference: dict[str, Any] = field(default_factory=dict)
     found: dict[str, int] = field(default_factory=dict)
+    material: None = None
 
     @property
     def n_vertices(self) -> int:

@@ -72,6 +72,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         "vertices": len(used),
         "triangles": len(source.faces),
         "unused_vertices": len(source.points) - len(used),
+        "merged_vertices": len(source.repeats),
         "low": low.tolist(),
         "extent": extent.tolist(),
         **known_units(source.georeference),
@@ -90,6 +91,8 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         rows["system"] = system
     if measured is not source:
         rows["measured"] = f"{_sides(extent * source.scale)} [{length_unit(source.georeference)}]"
+    if len(source.repeats):
+        rows["vertices"] += f" ({len(source.repeats):,} that repeated others are merged with them)"
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
     try:

@@ -2,7 +2,8 @@
 
 Each way in ends in :func:`build_source`, so a :class:`SourceMesh` always has finite vertices and faces that exist. What
 several formats need to get there stands beside it, by topic: ``numbers`` (text), ``rows`` (of a PLY), ``heights``
-(grids), ``points`` (clouds), ``scenes`` (through trimesh), ``metric`` (degrees) and ``precision`` (of what is written).
+(grids), ``points`` (clouds), ``scenes`` (through trimesh), ``metric`` (degrees), ``texture`` (images and where vertices
+lie on them) and ``precision`` (of what is written).
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source.metric import in_metric_frame
+from meshsimp_pymoo.formats.source.texture import merged
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
@@ -37,7 +40,8 @@ class SourceMesh:
     faces : (F, 3) int64 array
         Rows of `points`; three different ones each.
     attributes : dict of arrays, each with V rows
-        Per-vertex data under the file's names; ``"color"`` is (V, 4) uint8, red green blue alpha.
+        Per-vertex data under the file's names; ``"color"`` is (V, 4) uint8, red green blue alpha, and ``"uv"`` (V, 2)
+        where on the image of `material` the vertex lies.
     name : str
         What messages call it: the path, or a built-in's name.
     rows : (V,) int64 array, optional
@@ -51,6 +55,8 @@ class SourceMesh:
     repeats : (R, 2) int64 array, optional
         Rows of the file whose vertex repeats another one exactly, and the rows of those that they were merged into:
         whoever names the former means the latter. Default none.
+    material : Material, optional
+        What all faces look like.
     """
 
     points: FloatArray
@@ -61,6 +67,7 @@ class SourceMesh:
     up: str | tuple[float, float, float] | None = None
     georeference: dict[str, Any] = field(default_factory=dict)
     repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    material: Material | None = None
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
@@ -97,16 +104,18 @@ def build_source(
     up: str | tuple[float, float, float] | None = None,
     georeference: dict[str, Any] | None = None,
     repeats: str = "said",
+    material: Material | None = None,
 ) -> SourceMesh:
     """Check arrays and make a :class:`SourceMesh` of them, whose fields the parameters are.
 
-    Vertices at exactly the same position are one: the first stays, with its attributes.
+    Vertices at exactly the same position are one: the first stays, with its attributes. A material whose image no
+    texture coordinates place is left out.
 
     Parameters
     ----------
     repeats : {"said", "usual", "none"}
         Whether a warning says how many vertices repeat another one, or that is usual (a format that lists the corners
-        of each face), or there are none and they are not looked for.
+        of each face, or two vertices wherever two looks meet), or there are none and they are not looked for.
 
     Raises
     ------
@@ -143,20 +152,22 @@ def build_source(
         if array.ndim == 0 or len(array) != count:
             raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
         kept_attributes[key] = array
-    merged = np.empty((0, 2), np.int64)
+    found = np.empty((0, 2), np.int64)
     if repeats != "none":
         leader = _leaders(xyz)
         again = np.flatnonzero(leader != np.arange(count))
         if len(again):
             if repeats == "said":
-                _say_repeats(name, leader, again, kept_attributes)
+                repeat = f"{len(again)} of {count} vertices repeat the position of another one"
+                warn_of(f"{name}: {repeat} and were merged with it")
             own = np.flatnonzero(leader == np.arange(count))
             place = np.empty(count, np.int64)
             place[own] = np.arange(len(own))
-            merged = np.column_stack([rows[again], rows[leader[again]]])
-            triangles = place[leader[triangles]]
+            place = place[leader]
+            found = np.column_stack([rows[again], rows[leader[again]]])
+            triangles = place[triangles]
             xyz, rows = xyz[own], rows[own]
-            kept_attributes = {key: array[own] for key, array in kept_attributes.items()}
+            kept_attributes = merged(kept_attributes, own, place, name)
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     if flat.all():
         raise ModelError(
@@ -170,7 +181,10 @@ def build_source(
             f"{name}: has only {len(xyz)} different positions among {count} vertices; at least {LEAST_VERTICES} are "
             "needed"
         )
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), merged)
+    if material is not None and material.image and "uv" not in kept_attributes:
+        material = None
+    facts = dict(georeference or {})
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, facts, found, material)
 
 
 def _leaders(points: FloatArray) -> IntArray:
@@ -183,20 +197,6 @@ def _leaders(points: FloatArray) -> IntArray:
     leader = np.empty(len(points), np.int64)
     leader[order] = order[starts][np.cumsum(starts) - 1]
     return leader
-
-
-def _say_repeats(name: str, leader: IntArray, again: IntArray, attributes: Mapping[str, AnyArray]) -> None:
-    others = {key: int(_differ(array[again], array[leader[again]]).sum()) for key, array in attributes.items()}
-    lost = [f"{key} of {n}" for key, n in sorted(others.items()) if n]
-    rest = f"; where they differ in attributes ({', '.join(lost)}) the first one's stay" if lost else ""
-    repeat = f"{len(again)} of {len(leader)} vertices repeat the position of another one"
-    warn_of(f"{name}: {repeat} and were merged with it{rest}")
-
-
-def _differ(a: AnyArray, b: AnyArray) -> BoolArray:
-    """Tell which rows of two arrays differ; no number (NaN) is like no number."""
-    same = ((a == b) | ((a != a) & (b != b))).reshape(len(a), -1)
-    return np.logical_not(same.all(axis=1))
 
 
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:

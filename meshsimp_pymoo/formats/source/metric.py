@@ -9,11 +9,11 @@ from typing import Any
 
 from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.outmesh import metres_of
 
 # WGS 84: semi-major axis [m] and inverse flattening. With other ellipsoids in use a scale differs by less than 0.3 %.
 WGS84 = (6378137.0, 298.257223563)
 DEGREE = math.pi / 180
-FEET = {"foot": 0.3048, "US survey foot": 1200 / 3937}  # [m]
 # No latitude is beyond; rasters may overlap the pole by half a sample.
 LARGEST_LATITUDE = 90.01 * DEGREE
 # The numbers of projected systems, but for some few in between. Of others the coordinates tell: projected ones are far
@@ -103,7 +103,7 @@ def in_metric_frame(
     vertical = _VERTICAL.search(wkt)
     plane, above = (wkt[: vertical.start()], wkt[vertical.start() :]) if vertical else (wkt, "")
     angle = _angular_unit(facts, plane, low, high)
-    to_height = FEET.get(str(facts.get("height_unit")), 1.0)
+    to_height = metres_of(facts.get("height_unit")) or 1.0
     if lengths := _UNIT.findall(above):
         _, facts["height_unit"], size = lengths[-1]
         to_height = float(size) or 1.0

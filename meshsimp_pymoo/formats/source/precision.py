@@ -11,17 +11,22 @@ SINGLE_PRECISION_LOSS = 1e-6
 
 
 def local_origin(vertices: FloatArray) -> FloatArray:
-    """Return the origin (3,) from which single precision holds vertices (V, 3): 0 if that does, else whole units.
+    """Return the origin (3,) near which single precision holds vertices (V, 3): their lower corner in round numbers.
 
-    >>> local_origin(np.array([[0.0, 0.5, 1.0], [1.0, 1.0, 2.0]])).tolist()
-    [0.0, 0.0, 0.0]
-    >>> local_origin(np.array([[500000.1, 5400000.1, 7.5], [500001.1, 5400001.1, 8.5]])).tolist()
+    Round are whole units, or along an axis on which a model is less than a unit wide a fraction that is a power of two.
+
+    >>> local_origin(np.array([[500000.1, 5400000.1, 7.5], [502001.1, 5400001.1, 8.5]])).tolist()
     [500000.0, 5400000.0, 7.0]
+    >>> local_origin(np.array([[13.4, 60.2, 0.0], [13.7, 60.4, 0.2]])).tolist()
+    [13.25, 60.125, 0.0]
     """
-    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) if len(vertices) else 0.0
-    if single_precision_shift(vertices) <= SINGLE_PRECISION_LOSS * diagonal:
+    if len(vertices) == 0:
         return np.zeros(3)
-    return np.asarray(np.floor(vertices.min(axis=0)), dtype=np.float64)
+    extent = np.ptp(vertices, axis=0)
+    if not extent.any():
+        return np.zeros(3)
+    step = 2.0 ** np.minimum(0.0, np.floor(np.log2(np.where(extent > 0, extent, extent.max()))))
+    return np.asarray(np.floor(vertices.min(axis=0) / step) * step, dtype=np.float64)
 
 
 def single_precision_shift(vertices: FloatArray, scale: FloatArray | float = 1.0) -> float:

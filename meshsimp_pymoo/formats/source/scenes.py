@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, reason_of, warn_of
+from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
 from meshsimp_pymoo.formats.source.numbers import rgba_of, without_mark
 
@@ -24,31 +26,44 @@ if TYPE_CHECKING:
 # it.
 logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
+# How the pixels of a PNG may be stored, as Pillow calls it.
+PNG_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
 # Significant digits that carry any double.
 EXACT_DIGITS = 17
 
 
 def from_trimesh(mesh: trimesh.Trimesh, name: str = "mesh") -> SourceMesh:
-    """Take over a ``trimesh.Trimesh``: its vertices in their order, its vertex colours and vertex attributes.
-
-    Texture coordinates, face attributes and normals stay behind.
+    """Take over a ``trimesh.Trimesh``: its vertices in their order, their colours, texture and other attributes.
 
     Raises
     ------
     ModelError
         As :func:`~meshsimp_pymoo.formats.source.build_source`.
+
+    Warns
+    -----
+    ModelWarning
+        If faces have colours, which stay behind as all that is said of faces.
     """
-    points, faces, attributes = _trimesh_arrays(mesh)
-    return build_source(points, faces, attributes, name)
+    points, faces, attributes = _trimesh_arrays(mesh, name)
+    material = _material_of(mesh.visual) if "uv" in attributes else None
+    return build_source(points, faces, attributes, name, material=material)
 
 
 def read_scene(path: Path, name: str, *, repeats: str = "said") -> SourceMesh:
     """Read a file as trimesh does; ``repeats`` as in :func:`~meshsimp_pymoo.formats.source.build_source`.
 
+    Materials stay behind; who knows them adds one.
+
     Raises
     ------
     ModelError
         If trimesh cannot, or it holds no mesh.
+
+    Warns
+    -----
+    ModelWarning
+        If attributes could not be kept, and as :func:`~meshsimp_pymoo.formats.source.build_source`.
     """
     suffix = path.suffix.lower()
     with warnings.catch_warnings():
@@ -64,7 +79,7 @@ def read_scene(path: Path, name: str, *, repeats: str = "said") -> SourceMesh:
                 f"{name}: cannot be read as {suffix} ({type(error).__name__}: {reason_of(error)}); "
                 "export the file again"
             ) from error
-        pieces = _scene_pieces(loaded)
+    pieces = _scene_pieces(loaded, name)
     if not pieces:
         raise ModelError(f"{name}: holds no triangle mesh; export it with faces")
     points, faces, attributes = _concatenated(pieces, name)
@@ -84,7 +99,7 @@ def _loaded(path: Path, suffix: str) -> Any:
     return trimesh.load(content, file_type=suffix.lstrip("."), resolver=beside, process=False)
 
 
-def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
+def _trimesh_arrays(mesh: Any, name: str) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
     points = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     faces = np.array(mesh.faces)
     attributes = {
@@ -93,6 +108,11 @@ def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, AnyArray
         if np.ndim(values) > 0 and len(values) == len(points)
     }
     visual = mesh.visual
+    if visual.kind == "face":
+        warn_of(f"{name}: the colours of {len(faces)} faces stay behind; give colours to vertices")
+    uv = getattr(visual, "uv", None)
+    if uv is not None and np.ndim(uv) == 2 and np.shape(uv)[1] >= 2 and len(uv) == len(points):
+        attributes["uv"] = np.array(uv[:, :2], dtype=np.float64)
     if visual.kind == "vertex":
         colors = np.asarray(visual.vertex_colors)
     else:  # a glTF with a material keeps its vertex colours beside it
@@ -103,10 +123,46 @@ def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, AnyArray
     return points, faces, attributes
 
 
-def _scene_pieces(loaded: Any) -> list[tuple[FloatArray, IntArray, dict[str, AnyArray]]]:
+def _material_of(visual: Any) -> Material | None:
+    """Return the material of a mesh in memory, its image as a PNG file."""
+    import io
+
+    material = getattr(visual, "material", None)
+    if not any(hasattr(material, name) for name in ("baseColorTexture", "image")):
+        return None
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    stream = io.BytesIO()
+    if image is not None:
+        (image if image.mode in PNG_MODES else image.convert("RGB")).save(stream, format="PNG")
+    factor = getattr(material, "baseColorFactor", None)  # that of a SimpleMaterial is grey unless it is said
+    red, green, blue, opacity = (1.0,) * 4 if factor is None else (np.asarray(factor, np.float64) / 255).tolist()
+    name = str(getattr(material, "name", None) or Material.name)
+    return Material(name, (red, green, blue, opacity), stream.getvalue())
+
+
+def textured(attributes: Mapping[str, AnyArray], material: Material, plain: Any) -> Any:
+    """Return how trimesh draws a mesh of this material, whose image lies at its attribute uv, else ``plain``."""
+    import io
+
+    from PIL import Image
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    try:
+        image = Image.open(io.BytesIO(material.image)) if material.image else None
+    except OSError:  # damaged, which costs nothing until it is drawn
+        return plain
+    look = PBRMaterial(name=material.name, baseColorFactor=material.color, baseColorTexture=image)
+    visual = TextureVisuals(uv=attributes["uv"], material=look)
+    if "color" in attributes:  # as trimesh itself keeps them of a glTF that has both
+        visual.vertex_attributes["color"] = attributes["color"]
+    return visual
+
+
+def _scene_pieces(loaded: Any, name: str) -> list[tuple[FloatArray, IntArray, dict[str, AnyArray]]]:
     """Return the arrays of every mesh in a scene, placed where the scene has it."""
     if hasattr(loaded, "faces"):
-        return [_trimesh_arrays(loaded)]
+        return [_trimesh_arrays(loaded, name)]
     if not hasattr(loaded, "graph"):  # a point cloud: vertices without faces
         points = np.array(getattr(loaded, "vertices", np.empty((0, 3))), dtype=np.float64)
         return [(points, np.empty((0, 3), np.int64), {})]
@@ -116,7 +172,7 @@ def _scene_pieces(loaded: Any) -> list[tuple[FloatArray, IntArray, dict[str, Any
         mesh = loaded.geometry[geometry]
         if not hasattr(mesh, "faces"):
             continue
-        points, faces, attributes = _trimesh_arrays(mesh)
+        points, faces, attributes = _trimesh_arrays(mesh, name)
         if not np.array_equal(transform, np.eye(4)):
             points = points @ transform[:3, :3].T + transform[:3, 3]
             if np.linalg.det(transform[:3, :3]) < 0:

@@ -39,9 +39,14 @@ function plyFile({ vertices, colours, channels, faces }) {
   return new Blob([header.join("\n"), body], { type: "application/octet-stream" });
 }
 
-function objFile({ vertices, faces }) {
+// Colours stand behind the coordinates, as fractions of 1.
+function objFile({ vertices, colours, channels, faces }) {
   const lines = [];
-  for (let i = 0; i < vertices.length; i += 3) lines.push(`v ${vertices[i]} ${vertices[i + 1]} ${vertices[i + 2]}`);
+  for (let i = 0; i < vertices.length / 3; i++) {
+    const numbers = [...vertices.subarray(3 * i, 3 * i + 3)];
+    if (colours) for (let k = 0; k < 3; k++) numbers.push(colours[channels * i + k] / 255);
+    lines.push(`v ${numbers.join(" ")}`);
+  }
   for (let i = 0; i < faces.length; i += 3) lines.push(`f ${faces[i] + 1} ${faces[i + 1] + 1} ${faces[i + 2] + 1}`);
   return new Blob([lines.join("\n"), "\n"], { type: "text/plain" });
 }
