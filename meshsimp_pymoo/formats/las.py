@@ -11,7 +11,7 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.arrays import AnyArray, FloatArray
+    from meshsimp_pymoo.arrays import AnyArray
     from meshsimp_pymoo.formats.source import SourceMesh
 
 # Points that are unpacked at once.
@@ -21,36 +21,43 @@ UNPACKED_FLOOR = 64 << 20
 
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    from meshsimp_pymoo.formats.source.points import cloud_source
+    """Read the points of a LAS or LAZ file that are not marked as withheld, their classes, intensities and colours.
 
-    points, attributes, facts = _read_points(path, name)
-    return cloud_source(points, max_edge=options.max_edge, attributes=attributes, name=name, georeference=facts)
+    ``georeference`` holds ``classes``: how many points of each class there are in the file, whichever are taken.
+    """
+    from collections import Counter
 
-
-def _read_points(path: Path, name: str) -> tuple[FloatArray, dict[str, Any], dict[str, Any]]:
-    """Read the points of a LAS or LAZ file that are not marked as withheld, their classes, intensities and colours."""
     import laspy
     import numpy as np
+
+    from meshsimp_pymoo.formats.source.classes import count_classes
+    from meshsimp_pymoo.formats.source.points import read_cloud
 
     with path.open("rb") as stream:
         packed = _check(stream, path.stat().st_size, name)
     if packed and not laspy.LazBackend.Lazrs.is_available():
         raise ModelError(f"{name}: packed points need lazrs; install it by pip install 'meshsimp-pymoo[las]'")
     parts: list[dict[str, Any]] = []
-    withheld = 0
+    counts: Counter[str] = Counter()
+    withheld, row = 0, 0
     try:
         backend = laspy.LazBackend.Lazrs if packed else None
         with laspy.open(str(path), laz_backend=backend) as reader:
             facts = _facts(reader.header)
             for chunk in reader.chunk_iterator(CHUNK_POINTS):
+                classes = np.asarray(chunk["classification"])
                 kept = np.asarray(chunk.withheld) == 0
                 withheld += len(kept) - int(kept.sum())
+                counts.update(count_classes(classes[kept]))
+                if options.classes is not None:
+                    kept &= np.isin(classes, options.classes)
                 names = set(chunk.point_format.dimension_names)
                 part = {axis: np.asarray(chunk[axis], np.float64)[kept] for axis in "xyz"}
-                part |= {key: np.asarray(chunk[key])[kept] for key in ("classification", "intensity")}
+                part |= {"classification": classes[kept], "intensity": np.asarray(chunk["intensity"])[kept]}
                 if {"red", "green", "blue"} <= names:
                     part["color"] = np.column_stack([np.asarray(chunk[key])[kept] for key in ("red", "green", "blue")])
-                parts.append(part)
+                parts.append(part | {"row": row + np.flatnonzero(kept)})
+                row += len(kept)
     except MemoryError:
         raise
     except BaseException as error:  # a damaged file may break the reader anywhere; lazrs panics outside of Exception
@@ -64,11 +71,12 @@ def _read_points(path: Path, name: str) -> tuple[FloatArray, dict[str, Any], dic
         warn_of(f"{name}: {withheld} points are marked as withheld and were left out")
     if not parts:
         raise ModelError(f"{name}: has 0 vertices; at least 4 are needed")
+    facts["classes"] = {number: counts[number] for number in sorted(counts, key=int)}
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     points = np.column_stack([joined.pop(axis) for axis in "xyz"])
     if "color" in joined:
         joined["color"] = _color(joined["color"])
-    return points, joined, facts
+    return read_cloud(points, options, rows=joined.pop("row"), attributes=joined, name=name, georeference=facts)
 
 
 def _check(stream: IO[bytes], size: int, name: str) -> bool:
@@ -145,13 +153,15 @@ def _facts(header: Any) -> dict[str, Any]:
         "scales": [float(value) for value in header.scales],
         "offsets": [float(value) for value in header.offsets],
     }
-    for record in header.vlrs:
+    for record in [*header.vlrs, *(header.evlrs or [])]:
         wkt = getattr(record, "string", None)
         if type(record).__name__ == "WktCoordinateSystemVlr" and wkt:
             facts["crs"] = str(wkt).rstrip("\0")
         elif type(record).__name__ == "GeoKeyDirectoryVlr":
-            # 3072 and 2048: the projected and the geographic system, by EPSG number
+            # 3072 and 2048: the projected and the geographic system, by EPSG number; 1024: which of both it is
             keys = {key.id: key.value_offset for key in record.geo_keys if key.tiff_tag_location == 0}
+            if keys.get(1024) == 2:
+                facts["unit"] = "degree"
             epsg = keys.get(3072) or keys.get(2048)
             if epsg and epsg < 32767:
                 facts["epsg"] = int(epsg)

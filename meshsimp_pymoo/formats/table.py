@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.formats.source.heights import PlacedHeights
 
-# The sorts of models, as messages call them; a setting may describe one of them alone.
+# The sorts of models, as messages call them; a setting may describe some of them alone, or a format.
 SORTS = {"mesh": "meshes", "grid": "height grids", "cloud": "point clouds"}
 
 
@@ -67,6 +67,8 @@ class Format(NamedTuple):
         What people call it.
     sort : str
         What it holds: "mesh", "grid" or "cloud".
+    bare_points : bool
+        Whether its files may hold points without faces, which are read as a point cloud.
     read : callable, optional
         ``read(path, name, options)`` returns the model that a file holds; ``name`` is what messages call it, and the
         file is there and not empty. None: it is not read.
@@ -92,6 +94,7 @@ class Format(NamedTuple):
     suffixes: tuple[str, ...]
     title: str
     sort: str = "mesh"
+    bare_points: bool = False
     read: Callable[[Path, str, Options], SourceMesh] | None = None
     write: Callable[[Path, OutMesh], None] | None = None
     extra: str = ""
@@ -222,7 +225,7 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
         A file in one of the formats of this folder. A scene of several meshes is read as one. Polygons are cut into
         triangle fans.
     options : Options
-        How it is read; what describes another sort of model than this one is refused.
+        How it is read; what describes another sort of model, or another format, than this one is refused.
 
     Returns
     -------
@@ -238,7 +241,8 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     -----
     ModelWarning
         If faces that name a vertex twice were dropped, per-vertex data could not be kept, a usual "no data" value
-        stands among the heights of a grid, or points of a cloud share their place in the plane.
+        stands among the heights of a grid or a cloud, points of a cloud share their place in the plane or have no
+        height, or points without faces are read as a cloud.
     """
     path = Path(path)
     name = str(path)
@@ -247,9 +251,11 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     if kind is None or kind.read is None:
         known = [f"{' '.join(read_suffixes(sort))} for {title}" for sort, title in SORTS.items()]
         raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; known are {listed(known)}")
-    refuse_foreign(name, kind.sort, options)
+    refuse_foreign(name, options, kind.name, kind.sort, *(["cloud"] if kind.bare_points else []))
     with guarded(kind, name):
-        return kind.read(path, name, options)
+        source = kind.read(path, name, options)
+    refuse_foreign(name, options, kind.name, source.sort)
+    return source
 
 
 def listed(words: Iterable[str]) -> str:
@@ -262,10 +268,10 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def described(sort: str | None = None) -> list[str]:
-    """Return the settings of `Options` that describe this sort of model; None: that describe some sorts alone."""
+def described(*models: str) -> list[str]:
+    """Return the settings of `Options` that describe one of these sorts or formats of models; none: all such ones."""
     known = settings_of(Options).items()
-    return [name for name, setting in known if setting.describes and (sort is None or sort in setting.describes)]
+    return [name for name, setting in known if setting.describes and (not models or {*models} & {*setting.describes})]
 
 
 def are_given(names: Iterable[str], options: Options) -> bool:
@@ -274,21 +280,23 @@ def are_given(names: Iterable[str], options: Options) -> bool:
     return any(getattr(options, name) != defaults[name] for name in names)
 
 
-def refuse_foreign(name: str, sort: str, options: Options) -> None:
-    """Refuse settings that describe another sort of model than this one.
+def refuse_foreign(name: str, options: Options, *models: str) -> None:
+    """Refuse settings that describe other models than those of these sorts and formats.
 
     Raises
     ------
     ModelError
-        With the settings of that sort, and the suffixes of its files.
+        With the settings of another sort or format, and the suffixes of its files.
     """
-    for other, title in SORTS.items():
-        names = [known for known in described(other) if known not in described(sort)]
+    known = {sort: (title, read_suffixes(sort, further=False)) for sort, title in SORTS.items()}
+    known |= {kind.name: (kind.title, list(kind.suffixes)) for kind in all_formats()}
+    own = described(*models)
+    for other, (title, suffixes) in known.items():
+        names = [setting for setting in described(other) if setting not in own]
         if not are_given(names, options):
             continue
         describe, leave = ("describe", "them") if len(names) > 1 else ("describes", "it")
-        suffixes = " ".join(read_suffixes(other, further=False))
-        raise ModelError(f"{name}: {listed(names)} {describe} {title} ({suffixes}); leave {leave} out")
+        raise ModelError(f"{name}: {listed(names)} {describe} {title} ({' '.join(suffixes)}); leave {leave} out")
 
 
 def _check_file(path: Path, name: str) -> None:

@@ -16,6 +16,7 @@ from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, NoFullGrid
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source.heights import Heights, PlacedHeights, placed_heights
+from meshsimp_pymoo.formats.source.missing import is_nodata
 from meshsimp_pymoo.formats.table import format_of_input, guarded, refuse_foreign
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -186,10 +187,7 @@ class HeightGrid:
     def _check(self, values: FloatArray, rows: Any, columns: Any) -> None:
         missing = ~np.isfinite(values)
         if self.nodata is not None:
-            # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
-            own = self.heights.dtype
-            with np.errstate(over="ignore"):
-                missing |= values == (float(own.type(self.nodata)) if own.kind == "f" else self.nodata)
+            missing |= is_nodata(values.astype(self.heights.dtype), self.nodata)
         if missing.any():
             i, j = np.argwhere(missing)[0]
             row = int(rows[i]) if np.ndim(rows) else rows + int(i)
@@ -267,7 +265,7 @@ def count_samples(model: str | os.PathLike[str], *, window: Window | None = None
 
 def _refuse_other_sides(name: str, options: Options) -> None:
     """Refuse what says nothing of heights over rows and columns."""
-    refuse_foreign(name, "grid", options)
+    refuse_foreign(name, options, "grid")
     if options.up not in ("auto", "z", "+z"):
         raise ModelError(f"{name}: heights of a grid are along z; leave up={options.up!r} out")
     if options.patch is not None:

@@ -41,8 +41,10 @@ class SourceMesh:
         What ``up="auto"`` stands for: ``"z"`` for grids, whose heights are known to be heights, and the
         viewing direction for a patch cut out along it. None: to be found out.
     georeference : dict
-        Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``transform``,
-        ``window`` ...; plain data for run.json.
+        Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``unit``,
+        ``transform``, ``window`` ...; plain data for run.json.
+    sort : str
+        What it was made of: "mesh", "grid" or "cloud".
     """
 
     points: FloatArray
@@ -52,6 +54,7 @@ class SourceMesh:
     rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     up: str | tuple[float, float, float] | None = None
     georeference: dict[str, Any] = field(default_factory=dict)
+    sort: str = "mesh"
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
@@ -69,6 +72,7 @@ def build_source(
     rows: IntArray | None = None,
     up: str | tuple[float, float, float] | None = None,
     georeference: dict[str, Any] | None = None,
+    sort: str = "mesh",
 ) -> SourceMesh:
     """Check arrays and make a :class:`SourceMesh` of them, whose fields the parameters are.
 
@@ -115,7 +119,7 @@ def build_source(
         if array.ndim == 0 or len(array) != count:
             raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
         kept_attributes[key] = array
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}))
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), sort)
 
 
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:

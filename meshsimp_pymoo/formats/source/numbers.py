@@ -12,6 +12,15 @@ from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
 
 
+# What the channels of a colour are called.
+COLOR_NAMES = (
+    ("red", "green", "blue", "alpha"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("r", "g", "b", "a"),
+    ("rf", "gf", "bf", "af"),
+)
+
+
 def parse_numbers(text: str, name: str) -> FloatArray:
     """Parse white-space separated numbers; NaN and infinity are numbers, anything else names its place."""
     with warnings.catch_warnings():
@@ -62,6 +71,18 @@ def rgba_of(channels: list[AnyArray]) -> npt.NDArray[np.uint8] | None:
     if len(columns) == 3:
         columns.append(np.full(len(columns[0]), 255, np.uint8))
     return np.column_stack(columns)
+
+
+def with_color(columns: dict[str, AnyArray]) -> dict[str, AnyArray]:
+    """Return per-vertex columns with the channels of a colour, whatever they are called, as one: ``"color"``."""
+    for names in COLOR_NAMES:
+        found = {key: value for key, value in columns.items() if key.lower() in names and value.ndim == 1}
+        channels = {key.lower(): value for key, value in found.items()}
+        if "color" in columns or not set(names[:3]) <= set(channels):
+            continue
+        if (color := rgba_of([channels[name] for name in names if name in channels])) is not None:
+            return {"color": color} | {key: value for key, value in columns.items() if key not in found}
+    return columns
 
 
 def text_lines(path: Path) -> list[str]:
