@@ -11,7 +11,6 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
 
-
 # What the channels of a colour are called.
 COLOR_NAMES = (
     ("red", "green", "blue", "alpha"),

@@ -169,7 +169,7 @@ def bare_cloud(
 
 def _samples(xyz: FloatArray, rows: IntArray, nodata: float | None, name: str) -> BoolArray:
     """Return which points (P, 3) have a place and a height, and say what is left out or looks like it."""
-    missing: BoolArray = np.isnan(xyz).any(axis=1)
+    missing = np.asarray(np.isnan(xyz).any(axis=1))
     if missing.any():
         warn_of(f"{name}: {missing.sum()} of {len(xyz)} points lack a coordinate (NaN or empty) and were left out")
     infinite = np.isinf(xyz).any(axis=1) & ~missing
