@@ -329,18 +329,22 @@ def _chunks(path: Path, encoding: str, name: str) -> Chunks:
 
 
 def _table(chunks: Chunks, layout: Layout, name: str) -> tuple[FloatArray, dict[str, FloatArray | None]]:
-    """Return the points (P, 3) and the other columns that have names, (P,), NaN where no number is; None: it is text."""
+    """Return the points (P, 3) and the other named columns (P,), NaN where there is no number; None: one is text."""
     import numpy as np
 
     parts: list[list[FloatArray]] = []
     texts: set[str] = set()
+    wanted = [*layout.axes, *layout.names]
     for number, lines in chunks:
+        if (table := _even_numbers(lines, layout)) is not None:
+            parts.append([table[:, k] for k in wanted])
+            continue
         places, rows = _rows(number, lines, layout, name)
         if not rows:
             continue
         columns = list(zip(*rows, strict=True))
-        parts.append([_numbers(columns[k]) for k in (*layout.axes, *layout.names)])
-        for k, values in zip((*layout.axes, *layout.names), parts[-1], strict=True):
+        parts.append([np.array([float(x) if _is_real(x) else math.nan for x in columns[k]]) for k in wanted])
+        for k, values in zip(wanted, parts[-1], strict=True):
             wrong = (i for i in np.flatnonzero(~np.isfinite(values)) if not _is_missing(columns[k][i]))
             if (first := next(wrong, None)) is None:
                 continue
@@ -354,6 +358,29 @@ def _table(chunks: Chunks, layout: Layout, name: str) -> tuple[FloatArray, dict[
     numbers = dict(zip(layout.names.values(), others, strict=True))
     texts |= {key for key, values in numbers.items() if np.isnan(values).all()}
     return np.column_stack([x, y, z]), {key: None if key in texts else values for key, values in numbers.items()}
+
+
+def _even_numbers(lines: list[str], layout: Layout) -> FloatArray | None:
+    """Return the numbers (L, width) of lines that hold nothing else and have one length, at once; None: others."""
+    import numpy as np
+
+    text = "\n".join(lines).strip("\n")
+    n_lines, separator = text.count("\n") + 1, layout.separator
+    if layout.loose or (separator != BLANK and text.count(separator) != n_lines * (layout.width - 1)):
+        return None
+    # each line ends in a number that is none of a point
+    text = _points(text, separator).replace(separator, " ").replace("\n", " inf ") + " inf"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # older NumPy only warns about text it cannot read
+        try:
+            numbers = np.fromstring(text, sep=" ")
+        except (ValueError, DeprecationWarning):
+            return None
+    if len(numbers) != n_lines * (layout.width + 1):
+        return None
+    table = numbers.reshape(n_lines, layout.width + 1)
+    even = np.isinf(table[:, -1]).all() and not np.isinf(table[:, :-1]).any()
+    return table[:, :-1] if even else None
 
 
 def _rows(number: int, lines: list[str], layout: Layout, name: str) -> tuple[list[int], list[list[str]]]:
@@ -373,21 +400,6 @@ def _rows(number: int, lines: list[str], layout: Layout, name: str) -> tuple[lis
             wanted = f"{max(layout.axes) + 1} are needed" if layout.loose else f"the first one has {width}"
             raise ModelError(f"{name}: its line {place} has {len(row)} columns, where {wanted}; export it again")
     return places, [(row + [""] * (width - len(row)))[:width] for row in rows]
-
-
-def _numbers(fields: tuple[str, ...]) -> FloatArray:
-    """Return a column's numbers, NaN where there is none."""
-    import numpy as np
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # older NumPy only warns about text it cannot read
-        try:
-            values = np.fromstring(" ".join(fields), sep=" ")
-        except (ValueError, DeprecationWarning):
-            values = np.empty(0)
-    if len(values) == len(fields) and "" not in fields:
-        return values
-    return np.array([float(field) if _is_real(field) else math.nan for field in fields])
 
 
 register(Format("xyz", (".xyz", ".pts", ".txt", ".csv"), "text of x y z", "cloud", read=_read))

@@ -85,8 +85,10 @@ def build_source(
     Warns
     -----
     ModelWarning
-        If faces that name a vertex twice were dropped; they have no area.
+        If faces that name a vertex twice were dropped; they have no area. If vertices with a NaN that no face names
+        were dropped, as scanners write them where they saw nothing.
     """
+    points, faces, attributes, rows = _without_unseen(points, faces, attributes or {}, rows, name)
     xyz = check_points(points, name, rows)
     count = len(xyz)
     rows = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
@@ -120,6 +122,27 @@ def build_source(
             raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
         kept_attributes[key] = array
     return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), sort)
+
+
+def _without_unseen(
+    points: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    attributes: Mapping[str, npt.ArrayLike],
+    rows: IntArray | None,
+    name: str,
+) -> tuple[npt.ArrayLike, npt.ArrayLike, Mapping[str, npt.ArrayLike], IntArray | None]:
+    """Drop vertices with a NaN that no face names, if arrays have the right shapes."""
+    xyz, triangles = np.asarray(points, dtype=np.float64), np.asarray(faces)
+    missing = np.asarray(np.isnan(xyz).any(axis=-1))
+    if xyz.ndim != 2 or not missing.any() or triangles.dtype.kind not in "iu":
+        return points, faces, attributes, rows
+    if not triangles.size or triangles.min() < 0 or triangles.max() >= len(xyz) or missing[triangles].any():
+        return points, faces, attributes, rows
+    warn_of(f"{name}: {missing.sum()} of {len(xyz)} vertices have NaN coordinates and no faces, and were dropped")
+    seen = ~missing
+    number = np.cumsum(seen) - 1
+    values = {key: np.asarray(value)[seen] for key, value in attributes.items()}
+    return xyz[seen], number[triangles], values, np.flatnonzero(seen) if rows is None else rows[seen]
 
 
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:
