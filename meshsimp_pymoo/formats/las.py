@@ -19,6 +19,13 @@ CHUNK_POINTS = 1_000_000
 # What a small .laz may unpack to, whatever its packing.
 UNPACKED_FLOOR = 64 << 20
 
+# Of the GeoTIFF specification: the keys of a system and their values.
+MODEL_TYPE, PROJECTED_SYSTEM, GEOGRAPHIC_SYSTEM, LINEAR_UNIT = 1024, 3072, 2048, 3076
+PROJECTED, GEOGRAPHIC = 1, 2
+SYSTEMS = {PROJECTED: PROJECTED_SYSTEM, GEOGRAPHIC: GEOGRAPHIC_SYSTEM}
+USER_DEFINED = 32767
+LENGTHS = {9001: "metre", 9002: "foot", 9003: "US survey foot"}
+
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
     """Read the points of a LAS or LAZ file that are not marked as withheld, their classes, intensities and colours.
@@ -158,13 +165,14 @@ def _facts(header: Any) -> dict[str, Any]:
         if type(record).__name__ == "WktCoordinateSystemVlr" and wkt:
             facts["crs"] = str(wkt).rstrip("\0")
         elif type(record).__name__ == "GeoKeyDirectoryVlr":
-            # 3072 and 2048: the projected and the geographic system, by EPSG number; 1024: which of both it is
             keys = {key.id: key.value_offset for key in record.geo_keys if key.tiff_tag_location == 0}
-            if keys.get(1024) == 2:
-                facts["unit"] = "degree"
-            epsg = keys.get(3072) or keys.get(2048)
-            if epsg and epsg < 32767:
+            kind = keys.get(MODEL_TYPE, PROJECTED if PROJECTED_SYSTEM in keys else GEOGRAPHIC)
+            epsg = keys.get(SYSTEMS.get(kind, 0), USER_DEFINED)
+            if 0 < epsg < USER_DEFINED:
                 facts["epsg"] = int(epsg)
+            unit = "degree" if kind == GEOGRAPHIC else LENGTHS.get(keys.get(LINEAR_UNIT, 0))
+            if unit is not None and MODEL_TYPE in keys:
+                facts["unit"] = unit
     return facts
 
 

@@ -7,6 +7,7 @@ are x, y and z says the user, else the header by the usual names, else they are 
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import itertools
 import math
@@ -191,7 +192,8 @@ def _points(text: str, separator: str) -> str:
 
 def _split(line: str, separator: str) -> list[str]:
     if '"' in line:
-        return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
+        with contextlib.suppress(csv.Error):
+            return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
     return line.split() if separator == BLANK else line.split(separator)
 
 
@@ -279,7 +281,12 @@ def _layout(head: Head, suffix: str, wanted: tuple[str | int, ...] | None, name:
     elif choices > 1:
         taken = ", ".join(names[k] for k in axes)
         warn_of(f"{name}: several of its columns may be x, y and z; {taken} are taken (--columns says others)")
-    others = {k: key for k, key in enumerate(names) if key and k not in axes and key.lower() not in NORMALS}
+    # a name that is that of a coordinate in other files would hide it there
+    others = {
+        k: f"{key}_in_file" if key.lower() in ("x", "y", "z") else key
+        for k, key in enumerate(names)
+        if key and k not in axes and key.lower() not in NORMALS
+    }
     return Layout(head.separator, width, axes, others, guessed, loose, unit)
 
 

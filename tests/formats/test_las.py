@@ -104,13 +104,24 @@ def test_info_says_which_classes_a_laser_scan_has(las, capsys):
     assert "1,200 of its points are ground, others 9 water (100); all of them become surface" in said.err
 
 
-def test_a_las_in_degrees_says_so(las):
+@pytest.mark.parametrize(
+    ("keys", "facts"),
+    [
+        ({1024: 2, 2048: 4326}, {"epsg": 4326, "unit": "degree"}),
+        ({1024: 1, 2048: 4269, 3072: 2994, 3076: 9002}, {"epsg": 2994, "unit": "foot"}),
+        ({1024: 1, 2048: 4326, 3072: 32767, 3076: 9001}, {"unit": "metre"}),  # its ellipsoid is no system of it
+        ({1024: 3, 2048: 4326}, {}),
+        ({2048: 4326}, {"epsg": 4326}),
+    ],
+)
+def test_the_reference_system_of_a_las_says_its_unit(las, keys, facts):
     from laspy.vlrs.known import GeoKeyDirectoryVlr
 
-    keys = GeoKeyDirectoryVlr()
-    keys.parse_record_data(struct.pack("<12H", 1, 1, 0, 2, 1024, 0, 1, 2, 2048, 0, 1, 4326))
-    facts = read_source(las("a.las", scattered(9), records=[keys])).georeference
-    assert (facts["unit"], facts["epsg"]) == ("degree", 4326)
+    record = GeoKeyDirectoryVlr()
+    entries = [part for key, value in keys.items() for part in (key, 0, 1, value)]
+    record.parse_record_data(struct.pack(f"<{4 + len(entries)}H", 1, 1, 0, len(keys), *entries))
+    found = read_source(las("a.las", scattered(9), records=[record])).georeference
+    assert {key: found[key] for key in ("epsg", "unit") if key in found} == facts
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
