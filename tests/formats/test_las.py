@@ -74,6 +74,7 @@ def test_the_reference_system_of_a_las_is_kept(las):
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 def test_of_a_laser_scan_the_ground_is_taken_by_its_class(las, monkeypatch, name):
     from meshsimp_pymoo.formats import las as reader
+    from meshsimp_pymoo.formats.source import points as clouds
 
     points = np.round(scattered(100), 3)
     ground = np.arange(100) % 4 == 0
@@ -88,6 +89,12 @@ def test_of_a_laser_scan_the_ground_is_taken_by_its_class(las, monkeypatch, name
     np.testing.assert_allclose(source.points, points[expected], rtol=0, atol=1e-9)
     assert_array_equal(source.rows, expected)
     assert source.georeference["classes"] == {"2": 24, "5": 75}
+    held = []
+    with monkeypatch.context() as patch:
+        patch.setattr(clouds, "read_cloud", lambda found, *_, **facts: held.append(len(found)) or source)
+        with pytest.warns(ModelWarning, match="withheld"):
+            read_source(path, Options(classes=[2]))
+    assert held == [24]  # the others were never held together
     absent = r"has no points of class 9, but of 2 ground \(24\), 5 high vegetation \(75\); take some of these classes"
     with pytest.warns(ModelWarning), pytest.raises(ModelError, match=absent):
         read_source(path, Options(classes=9))

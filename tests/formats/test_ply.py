@@ -301,6 +301,7 @@ def test_triangle_strips_alternate_their_winding_and_end_at_minus_one(tmp_path, 
         [[*strip, -1]],
         [[*strip[:6], -1, *strip[4:]]],
         [strip[:6], [-1, *strip[4:], -1, -1]],
+        expected,  # a row ends a strip, too
         [[*strip[:6], 5, 5, 4, 4, *strip[4:]]],  # joined by faces without an area
     ):
         source = read_source(connected(tmp_path, points, "tristrips", rows, order))
