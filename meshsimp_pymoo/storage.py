@@ -304,6 +304,7 @@ def write_front(
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
                 "up": surface.view.rotation[2],
+                **({"found": model.found} if model.found else {}),
                 **({"georeference": model.georeference} if model.georeference else {}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),

@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ModelWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import Source, open_model
 from meshsimp_pymoo.storage import write_front
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Simplified
 
@@ -23,6 +25,12 @@ from meshsimp_pymoo.surface.surface import Simplified
 def surface(model: Source | OpenModel, *, up: Any = "auto", **rules: Any) -> HeightSurface:
     """Return the height surface of a built-in name, a mesh or a model, with these rules."""
     return HeightSurface(open_model(model, Options(up=up)), Rules(**rules))
+
+
+def stepped_model(source: SourceMesh) -> OpenModel:
+    """Return the model of a mesh with several vertices at one place, which is said."""
+    with pytest.warns(ModelWarning, match=r"lie below another one at their \(x, y\)"):
+        return build_model(source, up="z")
 
 
 def holey_grid() -> SourceMesh:

@@ -328,6 +328,21 @@ def test_pinned_vertices_by_name_row_and_position():
         assert (mesh.vertices == source.points[row]).all(axis=1).any()
 
 
+def test_the_pinned_border_is_the_outline_and_the_rims_of_holes():
+    height = np.zeros((7, 8))
+    height[3, 4] = np.nan
+    problem = MeshProblem(grid_source(height, 1.0, 1.0), pin="border")
+    place = problem.surface.points[:, :2]
+    rim = (place == 0).any(axis=1) | (place == (7, 6)).any(axis=1)
+    hole = np.abs(place - (4, 3)).sum(axis=1) == 1
+    assert rim.sum() == 26
+    assert hole.sum() == 4
+    np.testing.assert_array_equal(problem.pinned, rim | hole)
+    # Every mesh has the whole border, so that tiles fit together again.
+    fewest = problem.mesh(np.zeros(problem.n_var, bool))
+    assert len(fewest.vertices) == 30
+
+
 @pytest.mark.parametrize(
     ("pin", "message"),
     [

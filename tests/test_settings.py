@@ -89,7 +89,7 @@ WRONG_TEXTS = [
     (Part(), "1,2,3", "'1,2,3' is not COLUMN,ROW,COLUMNS,ROWS"),
     (Part(), "0,0,1,5", "'1' is not a whole number of at least 2"),
     (Pins(PINS), "7,-1", "'-1' is not a whole number of at least 0"),
-    (Pins(PINS), "border", "'border' is not a whole number"),
+    (Pins(PINS), "rim", "'rim' is not a whole number"),
 ]
 PLAIN = [
     (Choice(("hull", "model")), "model", "model"),
@@ -138,8 +138,8 @@ WRONG_PLAIN = [
     (Direction(), [0, 0, 0], "three numbers that are not all 0"),
     (Direction(), [0, 1], "expected an axis"),
     (Direction(), "", "expected an axis"),
-    (Pins(PINS), 1.5, "expected corners, hull, or a list"),
-    (Pins(PINS), True, "expected corners, hull, or a list"),
+    (Pins(PINS), 1.5, "expected corners, hull, border, or a list"),
+    (Pins(PINS), True, "expected corners, hull, border, or a list"),
 ]
 
 
@@ -247,7 +247,7 @@ def test_a_weight_that_is_no_number_is_stored_as_nothing_and_read_back():
         (Options, {"max_edge": math.inf}, "max_edge is inf: expected a number of more than 0 and no larger than"),
         (Options, {"patch": "back"}, "patch is 'back': expected front$"),
         (Options, {"up": ""}, "up is '': expected an axis"),
-        (Rules, {"pin": {"hull": True}}, "pin is .*: expected corners, hull, or a list"),
+        (Rules, {"pin": {"hull": True}}, "pin is .*: expected corners, hull, border, or a list"),
         (Rules, {"weights": " "}, "weights is ' ': expected the name of an attribute"),
         (Rules, {"weights": np.array(["a"] * 1000)}, "weights is .*: expected a list of numbers, and 'a' is none"),
         (Rules, {"footprint": None}, "footprint is None: expected one of model, hull"),
@@ -273,7 +273,7 @@ def test_defaults_are_read_back_and_missing_settings_have_them():
         ([1], r"\[1\] holds no rules"),
         ({"foot": "hull"}, "'foot' is none of the rules: footprint, outside, pin, weights, measure"),
         ({"footprint": "hul"}, r"footprint is 'hul': unknown \(did you mean 'hull'\?\)"),
-        ({"pin": {}}, "pin is {}: expected corners, hull, or a list"),
+        ({"pin": {}}, "pin is {}: expected corners, hull, border, or a list"),
         ({"weights": 3}, "weights is 3: expected the name of an attribute"),
         ({"footprint": None}, "footprint is None: expected one of model, hull"),
     ],

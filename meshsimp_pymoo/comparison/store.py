@@ -40,15 +40,15 @@ from meshsimp_pymoo.surface.model import OpenModel
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 EXPERIMENT_FILE = "experiment.json"
-# Of the records; another number wherever what they hold is spelled otherwise. 2: rules and options whole.
-FORMAT = 2
+# Of the records; another number wherever what they hold is spelled otherwise. 3: vertices that repeat others.
+FORMAT = 3
 WAY_OUT = "mend that, and the same command does what is missing"
 
 # Hexadecimal digits of a key: 64 bits, where a study has some thousand runs.
 KEY_DIGITS = 16
 
 # What is not stored of a model: results can be shown without its colours and the checks it passed.
-NOT_STORED = ("attributes", "facts", "georeference")
+NOT_STORED = ("attributes", "facts", "georeference", "found")
 
 
 class ExperimentWarning(UserWarning):

@@ -20,7 +20,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.formats.source.scenes import read_scene
 
     _check(path, name)
-    return read_scene(path, name)
+    return read_scene(path, name, repeats="usual")  # it lists the corners of each face
 
 
 def _check(path: Path, name: str) -> None:

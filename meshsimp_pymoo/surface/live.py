@@ -63,8 +63,12 @@ MOST = 48
     N_ADDED,
     N_SITES,
 ) = range(13)
-# Entries of ``amount``.
-COVERED_ERROR, BARE_ERROR = range(2)
+# Entries of ``amount``: running sums, and the largest both together have been since they were last added up anew.
+COVERED_ERROR, BARE_ERROR, PEAK = range(3)
+
+# What large costs that came and went leave in a running sum is rounding of the largest: once the sums have fallen below
+# this share of it, they are added up anew.
+RETAKEN_BELOW = 2.0**-20
 
 
 class Live(NamedTuple):
@@ -710,6 +714,25 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         count[N_FREE_SEGMENTS] += 1
     count[N_DEAD] = 0
     count[N_ADDED] = 0
+    whole = amount[COVERED_ERROR] + amount[BARE_ERROR]
+    if whole > amount[PEAK]:
+        amount[PEAK] = whole
+    elif whole < RETAKEN_BELOW * amount[PEAK]:
+        _retake(live)
+
+
+@inner
+def _retake(live: Live) -> None:
+    """Add up the costs anew: of the emitted triangles, and of the bare vertices."""
+    amount = live.amount
+    amount[COVERED_ERROR] = 0.0
+    amount[BARE_ERROR] = 0.0
+    for r in range(live.tally[END] >> 3):
+        if live.kind[r] & EMITTED:
+            amount[COVERED_ERROR] += live.subtotal[r]
+    for n in range(live.tally[N_BARE]):
+        amount[BARE_ERROR] += live.cost[live.bare[n]]
+    amount[PEAK] = amount[COVERED_ERROR] + amount[BARE_ERROR]
 
 
 @inner(inline=True)
@@ -843,11 +866,20 @@ def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
 def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]:
     before = _total(live)
     n = live.tally[N_EMITTED]
+    amount = live.amount
+    covered, bare, peak = amount[COVERED_ERROR], amount[BARE_ERROR], amount[PEAK]
+    amount[PEAK] = 0.0  # nothing is added up anew for a mere trial
     if not exchange(g, live, v, w):
+        amount[PEAK] = peak
         return np.inf, 0
     change = _total(live) - before
     n = live.tally[N_EMITTED] - n
+    amount[PEAK] = 0.0
     exchange(g, live, w, v)
+    # the sums are what they were, without the rounding of having come and gone
+    amount[COVERED_ERROR] = covered
+    amount[BARE_ERROR] = bare
+    amount[PEAK] = peak
     return change, n
 
 
@@ -1118,6 +1150,7 @@ def _build(
         if live.used[sites[k]] == 0:
             _note_bare(live, sites[k])
     _settle_bare(g, live)
+    live.amount[PEAK] = live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
     return True
 
 
@@ -1296,7 +1329,7 @@ def make_live(n_vertices: int) -> Live:
         forms=np.empty((2 * MOST, 12), np.float64),
         saved=np.empty(10 * MOST, np.uint32),
         tally=np.zeros(13, np.int64),
-        amount=np.zeros(2, np.float64),
+        amount=np.zeros(3, np.float64),
     )
 
 

@@ -15,6 +15,7 @@ from meshsimp_pymoo.surface.live import (
     EMITTED,
     END,
     N_EMITTED,
+    PEAK,
     build,
     exchange_once,
     make_live,
@@ -149,7 +150,7 @@ class LiveTriangulation:
     def _total(self) -> float:
         """Return the sum of the costs."""
         # what rounding may leave below 0 is nothing
-        return max(float(self.live.amount.sum()), 0.0) if self.triangles else np.inf
+        return max(float(self.live.amount[:PEAK].sum()), 0.0) if self.triangles else np.inf
 
     def _measured(self, change: float, triangles: int) -> tuple[float, int]:
         """Turn a change of the sum of costs into one of the error."""

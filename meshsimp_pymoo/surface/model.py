@@ -14,13 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import Csr, FloatArray, IntArray
-from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.errors import ModelError, ModelWarning, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
 from meshsimp_pymoo.surface.orient import Up, check_open_surface, up_direction, upright_rotation
+from meshsimp_pymoo.surface.places import below_others, feet, highest, warn_of_places
 
 # What weights may add up to: their products with squares of deviations are numbers then.
 MOST_WEIGHT = 1e100
@@ -36,8 +37,9 @@ class OpenModel:
     space, a contiguous segment is a patch, and triangulating needs no sorting. The order is a function of the positions
     alone: listing the same vertices otherwise in the file gives the same model but for ``source_index``.
 
-    Vertices that share one (x, y) stay apart: each has a place in the chromosome and a share in the error. Where
-    several of them are kept, the first in vector order (the lowest) carries the surface.
+    Vertices that share one (x, y) stay apart: each has a place in the chromosome and a share in the error, but for the
+    feet of vertical faces, which are no samples of what is seen from above. Where several of them are kept, the first
+    in vector order (the highest) carries the surface.
 
     Attributes
     ----------
@@ -70,6 +72,12 @@ class OpenModel:
         What was found while checking the surface (see :func:`meshsimp_pymoo.surface.orient.check_open_surface`).
     weights : (N,) float array, optional
         How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
+    feet : (K,) int array
+        Vertices below another one at their place that vertical faces alone hold, ascending; their weight is 0.
+    repeats : (R, 2) int array
+        Rows of the file that repeat another one, and the rows that they were merged into.
+    found : dict of str to int
+        How many vertices were merged, lie below others, and are feet, as far as there are any; for run.json.
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says (see
         :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
@@ -91,6 +99,9 @@ class OpenModel:
     facts: Any = field(default=None, repr=False)
     weights: FloatArray | None = None
     georeference: dict[str, Any] = field(default_factory=dict, repr=False)
+    feet: IntArray = field(default_factory=lambda: np.empty(0, np.int64), repr=False)
+    repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64), repr=False)
+    found: dict[str, int] = field(default_factory=dict, repr=False)
 
     @property
     def n_vertices(self) -> int:
@@ -133,8 +144,13 @@ class OpenModel:
 
     @cached_property
     def border(self) -> IntArray:
-        """Vertices at edges of one face only, ascending."""
-        return border_vertices(self.faces)
+        """Vertices on the outline and around holes as seen from above, ascending; the highest where they share a place.
+
+        Ends of edges of one face, once vertices at one place are taken for the highest.
+        """
+        faces = highest(self.xy)[self.faces]
+        whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+        return border_vertices(faces[whole])
 
     @cached_property
     def footprint(self) -> Footprint:
@@ -150,7 +166,8 @@ class OpenModel:
         weights : str or array
             The name of a numeric per-vertex attribute of the file, or one number for each row of the file (a grid's
             rows and columns are accepted too): finite, at least 0, not all of them 0. A weight of 0 means that a vertex
-            does not count; it may be kept all the same.
+            does not count; it may be kept all the same. Feet of vertical faces never count; of rows that repeat a
+            vertex the first one's weight does.
 
         Raises
         ------
@@ -178,11 +195,15 @@ class OpenModel:
             if values.dtype.kind not in "biuf":
                 raise ModelError(f"{self.name}: {label} are of type {values.dtype}; give one number for each vertex")
             values = values.ravel()
-            n_rows = int(self.source_index.max()) + 1
+            n_rows = int(max(self.source_index.max(), self.repeats.max(initial=0))) + 1
             if len(values) < n_rows:
                 raise ModelError(
                     f"{self.name}: there are {len(values)} {label} for {n_rows} rows of the file; give one for each row"
                 )
+            n_others = int((values[self.repeats[:, 0]] != values[self.repeats[:, 1]]).sum())
+            if n_others:
+                warn_of(f"{self.name}: {n_others} {label} of rows that repeat another vertex differ from its own, "
+                "which counts")
             values = values[self.source_index]
         values = np.ascontiguousarray(values, float)
         wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0)))
@@ -191,6 +212,7 @@ class OpenModel:
                 f"{self.name}: {len(wrong)} of {len(values)} {label} are negative or not finite (first: row "
                 f"{self.source_index[wrong[0]]}, {values[wrong[0]]}); give finite numbers of at least 0"
             )
+        values[self.feet] = 0.0
         if not values.any():
             raise ModelError(f"{self.name}: all {len(values)} {label} are 0; nothing would count")
         if not values.sum() <= MOST_WEIGHT:
@@ -289,15 +311,26 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
     offset = upright.min(axis=0)
     points = upright - offset
     unit, xy = unit_square(points)
-    order = vector_order(xy, points[:, 2])
+    order = vector_order(xy, -points[:, 2])  # the highest of a place first
     rows = rows[order]
     place = np.full(len(used), -1, np.int32)
     place[rows] = np.arange(len(rows), dtype=np.int32)
     xy = np.ascontiguousarray(xy[order])
+    points = np.ascontiguousarray(points[order])
+    faces = np.ascontiguousarray(place[faces])
+    below = below_others(xy)
+    ignored = feet(points, faces, below)
+    if below.any():
+        warn_of_places(source.name, source.points[rows], xy, unit, int(below.sum()), len(ignored))
+    weights = None
+    if len(ignored):
+        weights = np.ones(len(rows))
+        weights[ignored] = 0.0
+    found = {"merged": len(source.repeats), "below_others": int(below.sum()), "feet": len(ignored)}
     return OpenModel(
         name=source.name,
-        points=np.ascontiguousarray(points[order]),
-        faces=np.ascontiguousarray(place[faces]),
+        points=points,
+        faces=faces.astype(np.int32, copy=False),
         corners=find_corners(xy),
         source_index=source.rows[rows],
         file_points=source.points[rows],
@@ -309,7 +342,11 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
         xy=xy,
         unit=unit,
         facts=facts,
+        weights=weights,
         georeference=source.georeference,
+        feet=ignored,
+        repeats=source.repeats,
+        found={what: n for what, n in found.items() if n},
     )
 
 

@@ -463,6 +463,7 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
         rows=source.rows[used],
         up=(float(direction[0]), float(direction[1]), float(direction[2])),
         georeference=source.georeference,
+        repeats=source.repeats,
     )
 
 
@@ -504,6 +505,12 @@ def _local_points(source: SourceMesh) -> FloatArray:
 def _area_vectors(points: FloatArray, faces: IntArray) -> FloatArray:
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
     return np.cross(b - a, c - a) / 2
+
+
+def edge_on(points: FloatArray, faces: IntArray) -> npt.NDArray[np.bool_]:
+    """Tell which faces (F, 3) of upright points (V, 3) are seen edge-on from above, to rounding: (F,)."""
+    normals = _area_vectors(points, faces)
+    return np.asarray(np.abs(normals[:, 2]) <= VERTICAL_SHARE * np.linalg.norm(normals, axis=1))
 
 
 def _width_share(xy: FloatArray) -> float:

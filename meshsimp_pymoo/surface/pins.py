@@ -32,8 +32,8 @@ def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | AnyArray | None
             if part not in PINS:
                 names = ", ".join(map(repr, PINS))
                 raise ModelError(f"pin={part!r} is unknown; use {names}, file rows or positions")
-            if part == "hull":
-                pinned[model.hull] = True
+            if part != "corners":
+                pinned[getattr(model, part)] = True
         elif part.ndim == 1:
             pinned[_rows_of_file(model, part)] = True
         else:
@@ -76,16 +76,28 @@ def _rows_of_file(model: OpenModel, rows: AnyArray) -> IntArray:
         raise ModelError(
             f"pin holds {rows[0]!r}, which is no row of the file; give whole numbers, or positions as [x, y, z]"
         )
-    order = np.argsort(model.source_index, kind="stable")
-    place = np.searchsorted(model.source_index[order], rows)
-    found = place < model.n_vertices
-    found[found] = model.source_index[order[place[found]]] == rows[found]
+    repeated, merged_into = model.repeats.T
+    place, found = _looked_up(repeated, rows)
+    rows = rows.copy()
+    rows[found] = merged_into[place[found]]
+    place, found = _looked_up(model.source_index, rows)
     if not found.all():
         raise ModelError(
             f"pin: row {int(rows[~found][0])} of {model.name} is not among the model's {model.n_vertices} vertices; "
             "rows count from 0, and vertices that no face uses are left out"
         )
-    return order[place]
+    return place
+
+
+def _looked_up(among: IntArray, rows: AnyArray) -> tuple[IntArray, BoolArray]:
+    """Return where each row stands in an array, and whether it stands there at all."""
+    order = np.argsort(among, kind="stable")
+    at = np.searchsorted(among[order], rows)
+    found = at < len(among)
+    found[found] = among[order[at[found]]] == rows[found]
+    place = np.full(len(rows), -1, np.int64)
+    place[found] = order[at[found]]
+    return place, found
 
 
 def _vertices_near(model: OpenModel, positions: FloatArray) -> IntArray:

@@ -10,7 +10,7 @@ from meshsimp_pymoo.surface.measures import OBJECTIVES
 
 FOOTPRINTS = ("model", "hull")
 OUTSIDES = ("nearest", "ignore")
-PINS = ("corners", "hull")
+PINS = ("corners", "hull", "border")
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,14 @@ class Rules:
     pin: Any = setting(
         None,
         kind=Pins(PINS),
-        accepts='"corners", "hull", file rows, positions, or a list of these',
-        doc='Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, whole '
+        accepts='"corners", "hull", "border", file rows, positions, or a list of these',
+        doc='Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, '
+        '``"border"`` for all on the outline and around the holes, so that tiles still fit together, whole '
         "numbers for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's "
         "frame.",
-        help="vertices that every mesh keeps beside the corners: the convex hull, or rows of the file, from 0",
-        metavar="hull|I,J,...",
+        help="vertices that every mesh keeps beside the corners: the convex hull, the outline and the holes' rims, or "
+        "rows of the file, from 0",
+        metavar="hull|border|I,J,...",
     )
     weights: Any = setting(
         None,

@@ -149,6 +149,11 @@ class Original(Protocol):
         ...
 
     @property
+    def found(self) -> dict[str, int]:
+        """What was changed or left out when it was read, and how often."""
+        ...
+
+    @property
     def hash(self) -> str:
         """A checksum of all that decides results."""
         ...

@@ -29,7 +29,8 @@ def test_a_scene_of_several_meshes_is_one_mesh_where_its_nodes_put_them(tmp_path
     scene.add_geometry(first, node_name="second", transform=move)
     mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
     scene.add_geometry(first, node_name="third", transform=mirror)
-    source = read_source(write(tmp_path, "scene.glb", scene.export(file_type="glb")))
+    with pytest.warns(ModelWarning, match="1 of 15 vertices repeat the position of another one and were merged"):
+        source = read_source(write(tmp_path, "scene.glb", scene.export(file_type="glb")))
     assert source.points.shape == (14, 3), "vertex 3 lies on the mirror's plane, so it is shared"
     assert source.faces.shape == (12, 3)
     assert sorted({round(x) for x in source.points[:, 0]}) == [-1, 0, 1, 8, 9]

@@ -17,7 +17,7 @@ from meshsimp_pymoo.formats.table import read_source
 
 
 def test_a_trimesh_object_keeps_rows_colours_and_attributes_and_is_not_changed():
-    mesh = trimesh.Trimesh(np.vstack([POINTS, POINTS]), FACES, process=False)
+    mesh = trimesh.Trimesh(np.vstack([POINTS, POINTS + 9.0]), FACES, process=False)
     mesh.visual.vertex_colors = np.vstack([COLORS, COLORS])
     mesh.vertex_attributes["age"] = np.arange(10)
     before = mesh.vertices.copy()
@@ -28,6 +28,45 @@ def test_a_trimesh_object_keeps_rows_colours_and_attributes_and_is_not_changed()
     source.points[0] = 99
     assert_array_equal(mesh.vertices, before)
     assert "color" not in from_trimesh(trimesh.Trimesh(POINTS, FACES)).attributes
+
+
+def soup(faces=FACES):
+    """Every corner a vertex of its own."""
+    corners = np.asarray(faces).ravel()
+    return np.asarray(POINTS, float)[corners], np.arange(len(corners)).reshape(-1, 3), corners
+
+
+def test_vertices_that_repeat_a_position_are_merged_with_their_number():
+    points, faces, corners = soup()
+    n, n_places = len(points), len(np.unique(corners))
+    with pytest.warns(ModelWarning, match=rf"^soup: {n - n_places} of {n} vertices repeat the position of another one"):
+        source = build_source(points, faces, {"age": corners}, name="soup")
+    assert len(source.points) == n_places
+    assert_array_equal(source.attributes["age"][source.faces], FACES)
+    assert_array_equal(source.points[source.faces], np.asarray(POINTS, float)[FACES])
+    assert_array_equal(source.rows, np.sort(np.unique(corners, return_index=True)[1]))
+    assert sorted([*source.rows, *source.repeats[:, 0]]) == list(range(n))
+    assert_array_equal(points[source.repeats[:, 0]], points[source.repeats[:, 1]])
+
+
+def test_of_attributes_that_differ_the_first_ones_stay_with_their_number():
+    points, faces, _ = soup()
+    values = np.arange(len(points), dtype=float)
+    values[points[:, 0] == points[0, 0]] = np.nan
+    with pytest.warns(ModelWarning, match=r"differ in attributes \(age of \d+\) the first one's stay"):
+        source = build_source(points, faces, {"age": values, "same": points}, name="soup")
+    assert_array_equal(source.attributes["age"], values[source.rows])
+    n_lost = int((np.isfinite(values[source.repeats[:, 0]])).sum())
+    with pytest.warns(ModelWarning, match=rf"age of {n_lost}\)"):
+        build_source(points, faces, {"age": values}, name="soup")
+
+
+def test_minus_zero_is_zero_and_fewer_than_four_positions_are_no_mesh():
+    points = [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-0.0, 0, 0]]
+    with pytest.warns(ModelWarning, match="1 of 5 vertices"):
+        assert len(build_source(points, [[0, 1, 2], [4, 2, 3]]).points) == 4
+    with pytest.warns(ModelWarning), pytest.raises(ModelError, match="only 3 different positions among 4 vertices"):
+        build_source([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 0]], [[0, 1, 2]])
 
 
 def test_faces_that_name_a_vertex_twice_are_dropped_with_their_number():

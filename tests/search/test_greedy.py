@@ -2,13 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples import surface
+from samples import stepped_model, surface
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.surface.model import build_model
 
 METHODS = {
     "thinning": thinning,
@@ -107,7 +106,7 @@ def test_other_starts_and_wrong_arguments():
 def test_insertion_leaves_out_vertices_whose_position_is_taken():
     points = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 0], [2, 2, 9.0], [2, 2, 5]]
     source = SourceMesh(np.array(points), np.array([[0, 1, 4], [1, 2, 5], [2, 3, 4], [3, 0, 6]]), {}, "step")
-    model = build_model(source, up="z")
+    model = stepped_model(source)
     for method in METHODS.values():
         front = method(surface(model))
         table = surface(model).evaluate(np.array([front.kept(k) for k in range(len(front))]))

@@ -34,6 +34,7 @@ class Curve:
     name: str = "a circle"
     attributes: dict[str, AnyArray] = field(default_factory=dict)
     georeference: dict[str, Any] = field(default_factory=dict)
+    found: dict[str, int] = field(default_factory=dict)
 
     @property
     def n_vertices(self) -> int:

@@ -10,7 +10,7 @@ import pytest
 from delaunay import faces_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from samples import SMALL, subset, surface
+from samples import SMALL, stepped_model, subset, surface
 
 from meshsimp_pymoo.datasets import load, names
 from meshsimp_pymoo.errors import ModelWarning
@@ -261,15 +261,15 @@ def test_points_1e_15_apart_are_told_apart():
 def test_vertices_at_one_position_all_count_and_the_first_kept_carries_the_surface():
     base = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 5.0], [1, 1, 9.0]], float)
     faces = np.array([[0, 1, 4], [1, 2, 5], [2, 3, 5], [3, 0, 4]])
-    model = build_model(SourceMesh(base, faces, {}, "cliff"), up="z")
+    model = stepped_model(SourceMesh(base, faces, {}, "cliff"))
     low, high = (int(np.flatnonzero(model.points[:, 2] == h)[0]) for h in (5.0, 9.0))
-    assert high == low + 1
+    assert low == high + 1, "the highest of a place comes first"
     kept = np.ones(6, bool)
     assert surface(model).simplify(kept).quality.error == 4.0
-    np.testing.assert_array_equal(surface(model).simplify(kept).deviation[[low, high]], [0, 4])
-    kept[low] = False
     np.testing.assert_array_equal(surface(model).simplify(kept).deviation[[low, high]], [4, 0])
     kept[high] = False
+    np.testing.assert_array_equal(surface(model).simplify(kept).deviation[[low, high]], [0, 4])
+    kept[low] = False
     assert surface(model).simplify(kept).quality.error == 14.0
 
 
@@ -401,7 +401,7 @@ def test_a_hole_is_seen_although_an_overlap_makes_up_for_its_area():
     points = np.vstack([grid.points, grid.points[rows] + [0, 0, 1]])
     patched = SourceMesh(points, np.vstack([grid.faces[~hole], copy]), {}, "patched")
     with pytest.warns(ModelWarning, match="folded over"):
-        model = build_model(patched, up="z")
+        model = stepped_model(patched)
     everything = surface(model).simplify(np.ones(model.n_vertices, bool)).quality
     assert everything.triangles == 2 * 11 * 11 - 2
 

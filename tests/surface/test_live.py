@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
-from samples import holey_grid, surface
+from samples import holey_grid, stepped_model, surface
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -38,9 +40,8 @@ SOURCES = {
     "turned": turned_grid,
     "face": lambda: load("face:150"),
     "horseshoe": lambda: load("horseshoe:120"),
-    "cliff": cliff,
 }
-MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()}
+MODELS = {name: build_model(make(), up="z") for name, make in SOURCES.items()} | {"cliff": stepped_model(cliff())}
 
 
 def assert_as_from_scratch(live, footprint, outside, measure="error"):
@@ -154,6 +155,27 @@ def test_weights_and_squares_count_in_every_operation_tried_or_done(name, measur
             v, w = int(rng.choice(movable)), int(rng.choice(places))
             assert live.try_move(v, w)[0] == pytest.approx(live.move(v, w), rel=1e-6, abs=1e-9 * scale)
     assert_as_from_scratch(live, "model", "nearest", measure)
+
+
+@pytest.mark.parametrize("measure", ["error", "rms_error"])
+def test_spikes_that_come_and_go_leave_nothing_in_the_error(measure):
+    source = SOURCES["terrain"]()
+    rng = np.random.default_rng(3)
+    spikes = rng.choice(len(source.points), 3, replace=False)
+    points = source.points.copy()
+    points[spikes, 2] += [1e9, -1e9, 1e9]
+    near = np.unique(source.faces[np.isin(source.faces, spikes).any(axis=1)])
+    model = build_model(dataclasses.replace(source, points=points), up="z")
+    kept = rng.random(model.n_vertices) < 0.3
+    kept[model.corners] = True
+    kept[np.isin(model.source_index, near)] = True  # what a spike's triangles cover costs as much as a spike
+    live = LiveTriangulation(surface(model, measure=measure), kept)
+    for v in np.flatnonzero(np.isin(model.source_index, spikes)):
+        assert live.remove(int(v)) > 1e6
+        live.insert(int(v))
+    expected = measured(surface(model).evaluate(kept[None]), measure, model.total_weight)[0]
+    assert expected < 1e6
+    assert live.error == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("measure", ["error", "rms_error"])

@@ -14,11 +14,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
+
+# Fewer vertices leave nothing to simplify.
+LEAST_VERTICES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,9 @@ class SourceMesh:
         ``transform``, ``window`` ...; plain data for run.json.
     sort : str
         What it was made of: "mesh", "grid" or "cloud".
+    repeats : (R, 2) int64 array, optional
+        Rows of the file whose vertex repeats another one exactly, and the rows of those that they were merged into:
+        whoever names the former means the latter. Default none.
     """
 
     points: FloatArray
@@ -55,6 +61,7 @@ class SourceMesh:
     up: str | tuple[float, float, float] | None = None
     georeference: dict[str, Any] = field(default_factory=dict)
     sort: str = "mesh"
+    repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64))
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
@@ -73,8 +80,17 @@ def build_source(
     up: str | tuple[float, float, float] | None = None,
     georeference: dict[str, Any] | None = None,
     sort: str = "mesh",
+    repeats: str = "said",
 ) -> SourceMesh:
     """Check arrays and make a :class:`SourceMesh` of them, whose fields the parameters are.
+
+    Vertices at exactly the same position are one: the first stays, with its attributes.
+
+    Parameters
+    ----------
+    repeats : {"said", "usual", "none"}
+        Whether a warning says how many vertices repeat another one, or that is usual (a format that lists the corners
+        of each face), or there are none and they are not looked for.
 
     Raises
     ------
@@ -85,8 +101,8 @@ def build_source(
     Warns
     -----
     ModelWarning
-        If faces that name a vertex twice were dropped; they have no area. If vertices with a NaN that no face names
-        were dropped, as scanners write them where they saw nothing.
+        If vertices were merged, and if faces that then name a vertex twice, which have no area, were dropped. If
+        vertices with a NaN that no face names were dropped, as scanners write them where they saw nothing.
     """
     points, faces, attributes, rows = _without_unseen(points, faces, attributes or {}, rows, name)
     xyz = check_points(points, name, rows)
@@ -107,6 +123,26 @@ def build_source(
             f"{tuple(triangles[first].tolist())}, of {count} vertices); the file is damaged, export it again"
         )
     triangles = triangles.astype(np.int64)
+    kept_attributes = {}
+    for key, values in (attributes or {}).items():
+        array = np.array(values)
+        if array.ndim == 0 or len(array) != count:
+            raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
+        kept_attributes[key] = array
+    merged = np.empty((0, 2), np.int64)
+    if repeats != "none":
+        leader = _leaders(xyz)
+        again = np.flatnonzero(leader != np.arange(count))
+        if len(again):
+            if repeats == "said":
+                _say_repeats(name, leader, again, kept_attributes)
+            own = np.flatnonzero(leader == np.arange(count))
+            place = np.empty(count, np.int64)
+            place[own] = np.arange(len(own))
+            merged = np.column_stack([rows[again], rows[leader[again]]])
+            triangles = place[leader[triangles]]
+            xyz, rows = xyz[own], rows[own]
+            kept_attributes = {key: array[own] for key, array in kept_attributes.items()}
     flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
     if flat.all():
         raise ModelError(
@@ -115,13 +151,12 @@ def build_source(
     if flat.any():
         warn_of(f"{name}: {flat.sum()} of {len(triangles)} faces name a vertex twice and were dropped")
         triangles = triangles[~flat]
-    kept_attributes = {}
-    for key, values in (attributes or {}).items():
-        array = np.array(values)
-        if array.ndim == 0 or len(array) != count:
-            raise ModelError(f"{name}: the attribute {key!r} has the shape {array.shape}; give {count} rows")
-        kept_attributes[key] = array
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), sort)
+    if len(xyz) < LEAST_VERTICES:
+        raise ModelError(
+            f"{name}: has only {len(xyz)} different positions among {count} vertices; at least {LEAST_VERTICES} are "
+            "needed"
+        )
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, dict(georeference or {}), sort, merged)
 
 
 def _without_unseen(
@@ -145,14 +180,40 @@ def _without_unseen(
     return xyz[seen], number[triangles], values, np.flatnonzero(seen) if rows is None else rows[seen]
 
 
+def _leaders(points: FloatArray) -> IntArray:
+    """Return, for each point (V, 3), the first row at exactly its position."""
+    tidy = points + 0.0  # -0.0 and 0.0 are one position
+    order = np.lexsort(tidy.T)  # stable: within a group the rows ascend
+    ordered = tidy[order]
+    starts = np.ones(len(points), bool)
+    starts[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    leader = np.empty(len(points), np.int64)
+    leader[order] = order[starts][np.cumsum(starts) - 1]
+    return leader
+
+
+def _say_repeats(name: str, leader: IntArray, again: IntArray, attributes: Mapping[str, AnyArray]) -> None:
+    others = {key: int(_differ(array[again], array[leader[again]]).sum()) for key, array in attributes.items()}
+    lost = [f"{key} of {n}" for key, n in sorted(others.items()) if n]
+    rest = f"; where they differ in attributes ({', '.join(lost)}) the first one's stay" if lost else ""
+    repeat = f"{len(again)} of {len(leader)} vertices repeat the position of another one"
+    warn_of(f"{name}: {repeat} and were merged with it{rest}")
+
+
+def _differ(a: AnyArray, b: AnyArray) -> BoolArray:
+    """Tell which rows of two arrays differ; no number (NaN) is like no number."""
+    same = ((a == b) | ((a != a) & (b != b))).reshape(len(a), -1)
+    return np.logical_not(same.all(axis=1))
+
+
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:
     """Return vertices (V, 3) as an array of their own, or raise what :func:`build_source` says of them."""
     xyz = np.array(points, dtype=np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise ModelError(f"{name}: vertices have the shape {xyz.shape}; give (V, 3)")
     count = len(xyz)
-    if count < 4:
-        raise ModelError(f"{name}: has {count} vertices; at least 4 are needed")
+    if count < LEAST_VERTICES:
+        raise ModelError(f"{name}: has {count} vertices; at least {LEAST_VERTICES} are needed")
     finite = np.isfinite(xyz).all(axis=1)
     if not finite.all():
         first = int(np.argmin(finite))

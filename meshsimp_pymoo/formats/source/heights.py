@@ -165,7 +165,9 @@ def grid_mesh(
             f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
     numbers = i * file_columns + j
-    return build_source(points, faces, {}, name, rows=numbers, up="z", georeference=georeference, sort="grid")
+    return build_source(
+        points, faces, {}, name, rows=numbers, up="z", georeference=georeference, sort="grid", repeats="none"
+    )
 
 
 # ---------------------------------------------------------------------------------------------------------- by windows

@@ -148,6 +148,7 @@ def cloud_source(
         up="z",
         georeference=facts,
         sort="cloud",
+        repeats="none",
     )
 
 

@@ -41,10 +41,8 @@ def from_trimesh(mesh: trimesh.Trimesh, name: str = "mesh") -> SourceMesh:
     return build_source(points, faces, attributes, name)
 
 
-def read_scene(path: Path, name: str) -> SourceMesh:
-    """Read a file as trimesh does; of vertices at exactly one position the first one's row and attributes stay.
-
-    STL and glTF repeat a vertex for every face or texture seam.
+def read_scene(path: Path, name: str, *, repeats: str = "said") -> SourceMesh:
+    """Read a file as trimesh does; ``repeats`` as in :func:`~meshsimp_pymoo.formats.source.build_source`.
 
     Raises
     ------
@@ -71,15 +69,7 @@ def read_scene(path: Path, name: str) -> SourceMesh:
     if not pieces:
         raise ModelError(f"{name}: holds no triangle mesh; export it with faces")
     points, faces, attributes = _concatenated(pieces, name)
-    if len(faces) == 0:
-        return build_source(points, faces, attributes, name)
-    first, inverse = _equal_points(points)
-    inside = (faces >= 0) & (faces < len(points))
-    if inside.all():
-        points, faces = points[first], inverse[faces]
-        attributes = {key: values[first] for key, values in attributes.items()}
-        return build_source(points, faces, attributes, name, rows=first)
-    return build_source(points, faces, attributes, name)
+    return build_source(points, faces, attributes, name, repeats=repeats)
 
 
 def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
@@ -140,21 +130,6 @@ def _concatenated(
             warn_of(f"{name}: only some of its {len(pieces)} meshes have the attribute {key!r}, which stays behind")
     faces = np.concatenate([piece[1] + offset for piece, offset in zip(pieces, offsets, strict=True)])
     return np.concatenate([piece[0] for piece in pieces]), faces, attributes
-
-
-def _equal_points(points: FloatArray) -> tuple[IntArray, IntArray]:
-    """Group points at exactly one position: the first of each group, in order, and every point's group."""
-    tidy = points + 0.0  # -0.0 and 0.0 are one position
-    order = np.lexsort(tidy.T)  # stable: within a group the rows ascend
-    ordered = tidy[order]
-    starts = np.ones(len(points), bool)
-    starts[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    leader = np.empty(len(points), np.int64)
-    leader[order] = order[starts][np.cumsum(starts) - 1]
-    first = np.flatnonzero(leader == np.arange(len(points)))
-    position = np.empty(len(points), np.int64)
-    position[first] = np.arange(len(first))
-    return first, position[leader]
 
 
 def export(path: Path, mesh: OutMesh, **options: Any) -> None:
