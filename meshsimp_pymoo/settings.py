@@ -62,25 +62,27 @@ class Choice(NamedTuple):
 
 
 class Whole(NamedTuple):
-    """A whole number."""
+    """A whole number, at least and at most these."""
 
     least: int = 0
+    most: int = MOST_WHOLE
 
     def from_text(self, text: str) -> int:
         """Return the number."""
         value = int(text) if re.fullmatch(r"[+-]?\d+", text) else None
-        if value is None or not self.least <= value <= MOST_WHOLE:
+        if value is None or not self.least <= value <= self.most:
             raise ValueError(f"{text!r} is not {self._expected(value)}")
         return value
 
     def from_plain(self, value: Any) -> int:
         """Return the number."""
-        if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= MOST_WHOLE:
+        if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
             raise ValueError(f"expected {self._expected(value)}")
         return value
 
     def _expected(self, value: Any) -> str:
-        most = " and at most 2**53" if isinstance(value, int) and value > MOST_WHOLE else ""
+        limit = "2**53" if self.most == MOST_WHOLE else self.most
+        most = f" and at most {limit}" if isinstance(value, int) and value > self.most else ""
         return f"a whole number of at least {self.least}{most}"
 
 
@@ -119,6 +121,44 @@ class Real(NamedTuple):
 
     def _is_small(self, value: float) -> bool:
         return self.least is not None and (value < self.least or (self.strict and value == self.least))
+
+
+class Column:
+    """A column of a table: its name, or its number from 1."""
+
+    def from_text(self, text: str) -> str | int:
+        """Return the number, or the name."""
+        return Whole(1).from_text(text) if re.fullmatch(r"[+-]?\d+", text) else self.from_plain(text)
+
+    def from_plain(self, value: Any) -> str | int:
+        """Return the number, or the name."""
+        if isinstance(value, str) and value.strip():
+            return value.strip()
+        if isinstance(value, str) or isinstance(value, bool) or not isinstance(value, int):
+            raise ValueError("expected names of columns, or their numbers from 1")
+        return Whole(1).from_plain(value)
+
+
+class Several(NamedTuple):
+    """One or more values of a kind, none twice; with a number, so many."""
+
+    part: Kind
+    number: int = 0
+
+    def from_text(self, text: str) -> tuple[Any, ...]:
+        """Return the values in ``A,B,...``."""
+        return self._checked([self.part.from_text(part.strip()) for part in text.split(",")])
+
+    def from_plain(self, value: Any) -> tuple[Any, ...]:
+        """Return the values of a list; one value is a list of one."""
+        return self._checked([self.part.from_plain(part) for part in (value if isinstance(value, list) else [value])])
+
+    def _checked(self, values: list[Any]) -> tuple[Any, ...]:
+        if not values or (self.number and len(values) != self.number):
+            raise ValueError(f"expected {self.number or 'one or more'} values, not {len(values)}")
+        if len(set(values)) < len(values):
+            raise ValueError(f"{reprlib.repr(values)} names one of them twice")
+        return tuple(values)
 
 
 class Steps:

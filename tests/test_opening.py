@@ -50,7 +50,16 @@ def test_whatever_a_mesh_is_given_as_the_model_is_the_same(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("of_file", "value"), [("spacing", 2.0), ("nodata", -1.0), ("window", (0, 0, 2, 2)), ("band", 1), ("max_edge", 3.0)]
+    ("of_file", "value"),
+    [
+        ("spacing", 2.0),
+        ("nodata", -1.0),
+        ("window", (0, 0, 2, 2)),
+        ("band", 1),
+        ("max_edge", 3.0),
+        ("classes", (2,)),
+        ("columns", ("x", "y", "z")),
+    ],
 )
 def test_what_describes_a_file_is_refused_for_a_mesh_in_memory(of_file, value):
     source = load("face:200")

@@ -185,13 +185,14 @@ class RasterHeights:
         return self._scattered(np.asarray(rows), np.asarray(columns))
 
     def _read(self, top: int, bottom: int, left: int, right: int) -> FloatArray:
+        from meshsimp_pymoo.formats.source.missing import is_nodata
+
         part = (self.corner[1] + left, self.corner[0] + top, right - left, bottom - top)
         with self._lock, _guarded(self.name), _environment():
             height, hidden, missing = _read_part(self._raster, self._band, part, self._nodata)
         values: FloatArray = height.astype(self.dtype)
         if missing is not None:
-            # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
-            hidden |= height == (height.dtype.type(missing) if height.dtype.kind == "f" else missing)
+            hidden |= is_nodata(height, missing)
         values[hidden] = math.nan
         return values
 
@@ -299,7 +300,8 @@ def _read_part(
     from rasterio.enums import MaskFlags
     from rasterio.windows import Window as Part
 
-    kind = np.dtype(raster.dtypes[band - 1])
+    from meshsimp_pymoo.formats.source.missing import is_nodata
+
     window = Part(*part)
     height = raster.read(band, window=window)
     flags = raster.mask_flag_enums[band - 1]
@@ -314,7 +316,7 @@ def _read_part(
     scale, offset = float(raster.scales[band - 1]), float(raster.offsets[band - 1])
     if (scale, offset) != (1.0, 0.0):
         if missing is not None:
-            hidden |= height == (kind.type(missing) if kind.kind == "f" else missing)
+            hidden |= is_nodata(height, missing)
             missing = None
         height = height * scale + offset
     return height, hidden, missing

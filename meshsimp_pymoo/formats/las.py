@@ -11,55 +11,60 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.arrays import AnyArray, FloatArray
+    from meshsimp_pymoo.arrays import AnyArray
     from meshsimp_pymoo.formats.source import SourceMesh
 
 # Points that are unpacked at once.
 CHUNK_POINTS = 1_000_000
-# The numbers of units in the keys of a reference system.
-LINEAR_UNITS = {9001: "metre", 9002: "foot", 9003: "US survey foot"}
 # What a small .laz may unpack to, whatever its packing.
 UNPACKED_FLOOR = 64 << 20
 
+# Of the GeoTIFF specification: the keys of a system and their values.
+MODEL_TYPE, PROJECTED_SYSTEM, GEOGRAPHIC_SYSTEM, LINEAR_UNIT, HEIGHT_UNIT = 1024, 3072, 2048, 3076, 4099
+PROJECTED, GEOGRAPHIC = 1, 2
+SYSTEMS = {PROJECTED: PROJECTED_SYSTEM, GEOGRAPHIC: GEOGRAPHIC_SYSTEM}
+USER_DEFINED = 32767
+LENGTHS = {9001: "metre", 9002: "foot", 9003: "US survey foot"}
+
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    from meshsimp_pymoo.formats.source.points import cloud_source
+    """Read the points of a LAS or LAZ file that are not marked as withheld, their classes, intensities and colours.
 
-    points, attributes, facts = _read_points(path, name)
-    return cloud_source(
-        points,
-        max_edge=options.max_edge,
-        scale=options.scale,
-        attributes=attributes,
-        name=name,
-        georeference=facts,
-    )
+    ``georeference`` holds ``classes``: how many points of each class there are in the file, whichever are taken.
+    """
+    from collections import Counter
 
-
-def _read_points(path: Path, name: str) -> tuple[FloatArray, dict[str, Any], dict[str, Any]]:
-    """Read the points of a LAS or LAZ file that are not marked as withheld, their classes, intensities and colours."""
     import laspy
     import numpy as np
+
+    from meshsimp_pymoo.formats.source.classes import count_classes
+    from meshsimp_pymoo.formats.source.points import read_cloud
 
     with path.open("rb") as stream:
         packed = _check(stream, path.stat().st_size, name)
     if packed and not laspy.LazBackend.Lazrs.is_available():
         raise ModelError(f"{name}: packed points need lazrs; install it by {way_to_install('las')}")
     parts: list[dict[str, Any]] = []
-    withheld = 0
+    counts: Counter[str] = Counter()
+    withheld, row = 0, 0
     try:
         backend = laspy.LazBackend.Lazrs if packed else None
         with laspy.open(str(path), laz_backend=backend) as reader:
             facts = _facts(reader.header)
             for chunk in reader.chunk_iterator(CHUNK_POINTS):
+                classes = np.asarray(chunk["classification"])
                 kept = np.asarray(chunk.withheld) == 0
                 withheld += len(kept) - int(kept.sum())
+                counts.update(count_classes(classes[kept]))
+                if options.classes is not None:
+                    kept &= np.isin(classes, options.classes)
                 names = set(chunk.point_format.dimension_names)
                 part = {axis: np.asarray(chunk[axis], np.float64)[kept] for axis in "xyz"}
-                part |= {key: np.asarray(chunk[key])[kept] for key in ("classification", "intensity")}
+                part |= {"classification": classes[kept], "intensity": np.asarray(chunk["intensity"])[kept]}
                 if {"red", "green", "blue"} <= names:
                     part["color"] = np.column_stack([np.asarray(chunk[key])[kept] for key in ("red", "green", "blue")])
-                parts.append(part)
+                parts.append(part | {"row": row + np.flatnonzero(kept)})
+                row += len(kept)
     except MemoryError:
         raise
     except BaseException as error:  # a damaged file may break the reader anywhere; lazrs panics outside of Exception
@@ -73,11 +78,12 @@ def _read_points(path: Path, name: str) -> tuple[FloatArray, dict[str, Any], dic
         warn_of(f"{name}: {withheld} points are marked as withheld and were left out")
     if not parts:
         raise ModelError(f"{name}: has 0 vertices; at least 4 are needed")
+    facts["classes"] = {number: counts[number] for number in sorted(counts, key=int)}
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     points = np.column_stack([joined.pop(axis) for axis in "xyz"])
     if "color" in joined:
         joined["color"] = _color(joined["color"])
-    return points, joined, facts
+    return read_cloud(points, options, rows=joined.pop("row"), attributes=joined, name=name, georeference=facts)
 
 
 def _check(stream: IO[bytes], size: int, name: str) -> bool:
@@ -154,21 +160,21 @@ def _facts(header: Any) -> dict[str, Any]:
         "scales": [float(value) for value in header.scales],
         "offsets": [float(value) for value in header.offsets],
     }
-    for record in header.vlrs:
+    for record in [*header.vlrs, *(header.evlrs or [])]:
         wkt = getattr(record, "string", None)
         if type(record).__name__ == "WktCoordinateSystemVlr" and wkt:
             facts["crs"] = str(wkt).rstrip("\0")
         elif type(record).__name__ == "GeoKeyDirectoryVlr":
-            # 3072 and 2048: the projected and the geographic system, by EPSG number; 1024: which of both it is
-            # 3076 and 4099: the units of a projected one and of heights
             keys = {key.id: key.value_offset for key in record.geo_keys if key.tiff_tag_location == 0}
-            units = {"unit": keys.get(3076), "height_unit": keys.get(4099)}
-            facts |= {name: LINEAR_UNITS[number] for name, number in units.items() if number in LINEAR_UNITS}
-            if keys.get(1024) == 2:
-                facts["unit"] = "degree"
-            epsg = keys.get(3072) or keys.get(2048)
-            if epsg and epsg < 32767:
+            kind = keys.get(MODEL_TYPE, PROJECTED if PROJECTED_SYSTEM in keys else GEOGRAPHIC)
+            epsg = keys.get(SYSTEMS.get(kind, 0), USER_DEFINED)
+            if 0 < epsg < USER_DEFINED:
                 facts["epsg"] = int(epsg)
+            unit = "degree" if kind == GEOGRAPHIC else LENGTHS.get(keys.get(LINEAR_UNIT, 0))
+            if unit is not None and MODEL_TYPE in keys:
+                facts["unit"] = unit
+            if (unit := LENGTHS.get(keys.get(HEIGHT_UNIT, 0))) is not None:
+                facts["height_unit"] = unit
     return facts
 
 

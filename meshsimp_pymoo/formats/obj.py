@@ -30,6 +30,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
 
     from meshsimp_pymoo.formats.source import build_source
     from meshsimp_pymoo.formats.source.numbers import even_table, fans, parse_numbers, rgba_of, text_lines, whole
+    from meshsimp_pymoo.formats.source.points import bare_cloud
 
     lines = text_lines(path)
     is_vertex = np.array([line.startswith(("v ", "v\t")) for line in lines])
@@ -44,7 +45,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         else:
             warn_of(f"{name}: the numbers behind its vertices are no colours in 0..1 or 0..255 and stay behind")
     if not face_at:
-        return build_source(table[:, :3], np.empty((0, 3), np.int64), attributes, name)
+        return bare_cloud(table[:, :3], attributes, name, options)
     corner_lines = [re.sub(r"/\S*", "", lines[i][2:]) for i in face_at]
     counts = np.array([len(line.split()) for line in corner_lines], dtype=np.int64)
     corners = whole(parse_numbers(" ".join(corner_lines), name), name, "the face index")
@@ -187,4 +188,4 @@ def _word(text: str) -> str:
     return "_".join(text.replace("#", "_").split()) or "material"
 
 
-register(Format("obj", (".obj",), "OBJ", read=_read, write=_write, keeps=("color", "uv")))
+register(Format("obj", (".obj",), "OBJ", bare_points=True, read=_read, write=_write, keeps=("color", "uv")))

@@ -27,6 +27,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
 
     from meshsimp_pymoo.formats.source import build_source
     from meshsimp_pymoo.formats.source.numbers import even_table, fans, parse_numbers, rgba_of, text_lines, whole
+    from meshsimp_pymoo.formats.source.points import bare_cloud
 
     lines = [line for line in text_lines(path) if line]
     begin = lines[0] if lines else ""
@@ -70,7 +71,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         else:
             warn_of(f"{name}: its vertex colours are neither in 0..1 nor in 0..255 and stay behind")
     if n_faces == 0:
-        return build_source(table[:, :3], np.empty((0, 3), np.int64), attributes, name)
+        return bare_cloud(table[:, :3], attributes, name, options)
     face_lines = lines[1 + n_vertices : 1 + n_vertices + n_faces]
     widths = np.array([len(line.split()) for line in face_lines], dtype=np.int64)
     values = parse_numbers(" ".join(face_lines), name)
@@ -93,4 +94,4 @@ def _write(path: Path, mesh: OutMesh) -> None:
     export(path, mesh, digits=EXACT_DIGITS)
 
 
-register(Format("off", (".off",), "OFF", read=_read, write=_write))
+register(Format("off", (".off",), "OFF", bare_points=True, read=_read, write=_write))

@@ -5,7 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-from meshsimp_pymoo.settings import LARGEST, Choice, Direction, Part, Real, Scale, Steps, Whole, setting, settle
+from meshsimp_pymoo.settings import (
+    LARGEST,
+    Choice,
+    Column,
+    Direction,
+    Part,
+    Real,
+    Scale,
+    Several,
+    Steps,
+    Whole,
+    setting,
+    settle,
+)
 
 # The part of a grid to take: column, row, columns, rows.
 Window = tuple[int, int, int, int]
@@ -58,10 +71,11 @@ class Options:
         None,
         kind=Real(most=LARGEST),
         accepts="float, optional",
-        doc="Height that means 'no sample' in a height grid, beside NaN; by default what the file says, else none.",
-        help="height that means no sample in a height grid",
+        doc="Height that means 'no sample' in a height grid or a point cloud, beside NaN; by default what the file "
+        "says, else none.",
+        help="height that means no sample in a height grid or a point cloud",
         metavar="Z",
-        describes=("grid",),
+        describes=("grid", "cloud"),
     )
     window: Window | None = setting(
         None,
@@ -100,6 +114,25 @@ class Options:
         "(default: its convex hull is covered)",
         metavar="L",
         describes=("cloud",),
+    )
+    classes: tuple[int, ...] | None = setting(
+        None,
+        kind=Several(Whole(0, 255)),
+        accepts="int or list of int, optional",
+        doc="Classes of the points of a point cloud that are taken, as LAS numbers them: 2 is ground; by default all.",
+        help="take the points of these classes of a cloud alone: 2 is ground, `meshsimp info` says which there are",
+        metavar="K,...",
+        describes=("cloud",),
+    )
+    columns: tuple[str | int, ...] | None = setting(
+        None,
+        kind=Several(Column(), 3),
+        accepts="list of three str or int, optional",
+        doc="The columns of x, y and z (the height) in a point cloud that is text: names that its header has, or "
+        "numbers from 1; by default the usual names in a header, else the first three columns of numbers.",
+        help="the columns of x, y and height in a cloud of text: names in its header, or numbers from 1",
+        metavar="X,Y,Z",
+        describes=("xyz",),
     )
 
     scale: str | tuple[float, float] | None = setting(

@@ -27,10 +27,6 @@ TYPES_READ = {
     "int64": "i8", "uint64": "u8", "float": "f4", "double": "f8", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-COLOR_NAMES = (
-    ("red", "green", "blue", "alpha"),
-    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
-)
 # Where a vertex lies on the image; the first pair is written.
 UV_NAMES = (("s", "t"), ("texture_u", "texture_v"))
 # PLY has no 64-bit integers, no half floats and no booleans: such attributes are written in the next type that holds
@@ -39,14 +35,22 @@ TYPES_WRITTEN = {
     "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort",
     "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
 }  # fmt: skip
+CHANNELS = ("red", "green", "blue", "alpha")
 WIDER = {"b1": "u1", "f2": "f4", "i8": "f8", "u8": "f8"}
 
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
+    """Read vertices and what connects them: polygons, triangle strips, or the cells of a range scan.
+
+    Of a range scan (``range_grid``) each cell of four neighbours becomes two triangles along its shorter diagonal, one
+    of three one triangle, as usual for such scans; none is left out for its length, since seen from the scanner steps
+    in depth are steep, but hide nothing.
+    """
     import numpy as np
 
     from meshsimp_pymoo.formats.source import build_source
     from meshsimp_pymoo.formats.source.numbers import without_mark
+    from meshsimp_pymoo.formats.source.points import bare_cloud
     from meshsimp_pymoo.formats.source.rows import binary_columns, text_columns
 
     data = without_mark(path.read_bytes())
@@ -54,20 +58,23 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     named = {element.name: element for element in elements}
     if "vertex" not in named:
         raise ModelError(f"{name}: declares no element 'vertex' (but {sorted(named)}); export it as a triangle mesh")
-    last = max(i for i, element in enumerate(elements) if element.name in ("vertex", "face"))
+    last = max(i for i, element in enumerate(elements) if element.name in ("vertex", *SURFACES))
     columns = (text_columns if order == "" else binary_columns)(data, start, elements[: last + 1], name)
     vertex = columns["vertex"]
     scalars = {key for key, value in vertex.items() if isinstance(value, np.ndarray) and value.ndim == 1}
     if missing := sorted(set("xyz") - scalars):
         raise ModelError(f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again")
     points = np.column_stack([vertex[axis].astype(np.float64) for axis in "xyz"])
-    faces = _faces(columns.get("face", {}), name)
     attributes = _attributes(vertex, name)
     _say_left_behind(elements, columns.get("face", {}), name)
+    where = _georeference(data[:start])
+    found = [make(columns[kind], points, data[:start], name) for kind, make in SURFACES.items() if kind in columns]
+    faces = np.concatenate([np.empty((0, 3), np.int64), *found])
+    if not len(faces):
+        return bare_cloud(points, attributes, name, options, georeference=where)
     if (uv := _uv_of_faces(columns.get("face", {}), len(points), name)) is not None:
         attributes.setdefault("uv", uv)
     material = _material(path, data[:start], attributes, name)
-    where = _georeference(data[:start])
     return build_source(points, faces, attributes, name, georeference=where, material=material)
 
 
@@ -76,7 +83,7 @@ def _say_left_behind(elements: list[PlyElement], face: dict[str, Any], name: str
     others = [
         f"{element.count} of {element.name!r}"
         for element in elements
-        if element.count and element.name not in ("vertex", "face")
+        if element.count and element.name not in ("vertex", *SURFACES)
     ]
     known = (_vertex_list(face), "texcoord", "texnumber")
     count = next((element.count for element in elements if element.name == "face"), 0)
@@ -207,10 +214,10 @@ def _check_size(elements: list[PlyElement], order: str, size: int, name: str) ->
         )
 
 
-def _faces(columns: dict[str, Any], name: str) -> IntArray:
+def _corners(columns: dict[str, Any], name: str) -> tuple[IntArray, IntArray] | None:
+    """Return the vertices that the rows of an element name, one row after the other, and their number in each."""
     import numpy as np
 
-    from meshsimp_pymoo.formats.source.numbers import fans
     from meshsimp_pymoo.formats.source.rows import Ragged
 
     lists = _lists(columns)
@@ -222,11 +229,73 @@ def _faces(columns: dict[str, Any], name: str) -> IntArray:
             raise ModelError(
                 f"{name}: none of the face lists {sorted(lists)} is called vertex_indices; export it again"
             )
-        return np.empty((0, 3), np.int64)
+        return None
     column = columns[key]
     if isinstance(column, Ragged):
-        return fans(_integers(column.values, name), column.counts)
-    return fans(_integers(column.ravel(), name), np.full(len(column), column.shape[1]))
+        return _integers(column.values, name), column.counts
+    return _integers(column.ravel(), name), np.full(len(column), column.shape[1])
+
+
+def _polygons(columns: dict[str, Any], points: FloatArray, header: bytes, name: str) -> IntArray:
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.numbers import fans
+
+    corners = _corners(columns, name)
+    return np.empty((0, 3), np.int64) if corners is None else fans(*corners)
+
+
+def _strips(columns: dict[str, Any], points: FloatArray, header: bytes, name: str) -> IntArray:
+    """Cut triangle strips, which -1 ends, into triangles of one winding; corners named twice only join strips."""
+    import numpy as np
+
+    corners = _corners(columns, name)
+    if corners is None:
+        return np.empty((0, 3), np.int64)
+    values, counts = corners
+    values = np.insert(values, np.cumsum(counts), -1)  # a row ends a strip, too
+    at = np.arange(len(values))
+    start = np.maximum.accumulate(np.where(values == -1, at + 1, 0))
+    i = at[:-2]
+    triangles = np.column_stack([values[:-2], values[1:-1], values[2:]])
+    odd = (i - start[:-2]) % 2 == 1
+    triangles[odd] = triangles[odd][:, [1, 0, 2]]
+    joins = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    return triangles[~joins & ~(triangles == -1).any(axis=1)]
+
+
+def _range_cells(columns: dict[str, Any], points: FloatArray, header: bytes, name: str) -> IntArray:
+    """Triangulate a range scan: rows of cells that hold one vertex or none."""
+    import numpy as np
+
+    corners = _corners(columns, name)
+    if corners is None:
+        return np.empty((0, 3), np.int64)
+    values, counts = corners
+    width, height = (
+        int(found[1]) if (found := re.search(rb"obj_info[ \t]+" + key + rb"[ \t]+(\d{1,9})\b", header)) else 0
+        for key in (b"num_cols", b"num_rows")
+    )
+    if width * height != len(counts):
+        raise ModelError(
+            f"{name}: its range grid has {len(counts)} cells, but its header says num_cols {width} and num_rows "
+            f"{height}; export it again"
+        )
+    if counts.max(initial=0) > 1 or (len(values) and not 0 <= values.min() <= values.max() < len(points)):
+        raise ModelError(
+            f"{name}: a cell of its range grid names more than one vertex, or one that does not exist (of "
+            f"{len(points)}); the file is damaged, export it again"
+        )
+    cell = np.full(len(counts), -1, np.int64)
+    cell[counts == 1] = values
+    grid = cell.reshape(height, width)
+    around = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    n_corners = (around >= 0).sum(axis=1)
+    whole, three = around[n_corners == 4], around[n_corners == 3]
+    a, b, c, d = points[whole].transpose(1, 0, 2)
+    turned = ((b - d) ** 2).sum(axis=1) < ((a - c) ** 2).sum(axis=1)
+    whole[turned] = np.roll(whole[turned], -1, axis=1)
+    return np.concatenate([whole[:, [0, 1, 2]], whole[:, [0, 2, 3]], three[three >= 0].reshape(-1, 3)])
 
 
 def _lists(columns: dict[str, Any]) -> list[str]:
@@ -254,29 +323,21 @@ def _attributes(vertex: dict[str, Any], name: str) -> dict[str, AnyArray]:
     """Everything a vertex has beside its position and normal, colours as one array."""
     import numpy as np
 
-    from meshsimp_pymoo.formats.source.numbers import rgba_of
+    from meshsimp_pymoo.formats.source.numbers import with_color
     from meshsimp_pymoo.formats.source.rows import Ragged
 
-    rest = {key: value for key, value in vertex.items() if key not in ("x", "y", "z", "nx", "ny", "nz")}
     attributes: dict[str, AnyArray] = {}
-    for names in COLOR_NAMES:
-        found = [rest[key] for key in names if key in rest]
-        channels = [value for value in found if isinstance(value, np.ndarray) and value.ndim == 1]
-        if len(channels) >= 3 and "color" not in rest and (color := rgba_of(channels)) is not None:
-            attributes["color"] = color
-            rest = {key: value for key, value in rest.items() if key not in names}
-            break
-    for both in UV_NAMES:
-        pair = [rest[key] for key in both if key in rest]
-        if len(pair) == 2 and "uv" not in rest and all(isinstance(x, np.ndarray) and x.dtype.kind == "f" for x in pair):
-            attributes["uv"] = np.column_stack(pair)
-            rest = {key: value for key, value in rest.items() if key not in both}
-    for key, value in rest.items():
+    for key, value in vertex.items():
         if isinstance(value, Ragged):
             warn_of(f"{name}: the per-vertex lists {key!r} differ in length and stay behind")
-        else:
+        elif key not in ("x", "y", "z", "nx", "ny", "nz"):
             attributes[key] = value
-    return attributes
+    for names in UV_NAMES:
+        pair = [attributes[key] for key in names if key in attributes]
+        if len(pair) == 2 and "uv" not in attributes and all(x.ndim == 1 and x.dtype.kind == "f" for x in pair):
+            rest = {key: value for key, value in attributes.items() if key not in names}
+            attributes = {"uv": np.column_stack(pair)} | rest
+    return with_color(attributes)
 
 
 def _write(path: Path, mesh: OutMesh) -> None:
@@ -294,9 +355,9 @@ def _write(path: Path, mesh: OutMesh) -> None:
             )
         table = values.astype(kind).reshape(len(values), -1)
         for k in range(table.shape[1]):
-            spelled = name if values.ndim == 1 else f"{name}_{k}"
-            if name == "color" or (name == "uv" and mesh.uv is not None):
-                spelled = (COLOR_NAMES if name == "color" else UV_NAMES)[0][k]
+            spelled = CHANNELS[k] if name == "color" else name if values.ndim == 1 else f"{name}_{k}"
+            if name == "uv" and mesh.uv is not None:
+                spelled = UV_NAMES[0][k]
             columns.append((spelled, table[:, k]))
     names = ["_".join(name.split()) for name, _ in columns]
     record = np.empty(len(vertices), dtype=[(f"c{k}", f"<{c.dtype.str[1:]}") for k, (_, c) in enumerate(columns)])
@@ -345,4 +406,7 @@ def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
     return [f"comment crs {wkt}"] if wkt else []
 
 
-register(Format("ply", (".ply",), "PLY", read=_read, write=_write, keeps=None))
+# What connects vertices, and the triangles that it means.
+SURFACES = {"face": _polygons, "tristrips": _strips, "range_grid": _range_cells}
+
+register(Format("ply", (".ply",), "PLY", bare_points=True, read=_read, write=_write, keeps=None))

@@ -94,6 +94,8 @@ class Format(NamedTuple):
         What people call it.
     sort : str
         What it holds: "mesh", "grid" or "cloud".
+    bare_points : bool
+        Whether its files may hold points without faces, which are read as a point cloud.
     read : callable, optional
         ``read(path, name, options)`` returns the model that a file holds; ``name`` is what messages call it, and the
         file is there and not empty. None: it is not read.
@@ -121,6 +123,7 @@ class Format(NamedTuple):
     suffixes: tuple[str, ...]
     title: str
     sort: str = "mesh"
+    bare_points: bool = False
     read: Callable[[Path, str, Options], SourceMesh] | None = None
     write: Callable[[Path, OutMesh], None] | None = None
     extra: str = ""
@@ -287,8 +290,8 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     -----
     ModelWarning
         If faces that name a vertex twice were dropped, per-vertex data could not be kept, a usual "no data" value
-        stands among the heights of a grid, points of a cloud share their place in the plane, or coordinates are
-        degrees.
+        stands among the heights of a grid or a cloud, points of a cloud share their place in the plane or have no
+        height, points without faces are read as a cloud, or coordinates are degrees.
     """
     path = Path(path)
     name = str(path)
@@ -296,9 +299,10 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     kind = format_of_input(path)
     if kind is None or kind.read is None:
         raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; {_way_out(path)}")
-    refuse_foreign(name, options, kind.name, kind.sort)
+    refuse_foreign(name, options, kind.name, kind.sort, *(["cloud"] if kind.bare_points else []))
     with guarded(kind, name):
         source = kind.read(path, name, options)
+    refuse_foreign(name, options, kind.name, source.sort)
     # clouds had to know before they were triangulated
     return source if "scale" in source.georeference else source.in_frame(options.scale)
 

@@ -17,6 +17,7 @@ from meshsimp_pymoo.errors import ModelError, NoFullGrid
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source.heights import Heights, PlacedHeights, placed_heights
 from meshsimp_pymoo.formats.source.metric import in_metric_frame
+from meshsimp_pymoo.formats.source.missing import is_nodata
 from meshsimp_pymoo.formats.table import format_of_input, guarded, refuse_foreign
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -190,10 +191,7 @@ class HeightGrid:
     def _check(self, values: FloatArray, rows: Any, columns: Any) -> None:
         missing = ~np.isfinite(values)
         if self.nodata is not None:
-            # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
-            own = self.heights.dtype
-            with np.errstate(over="ignore"):
-                missing |= values == (float(own.type(self.nodata)) if own.kind == "f" else self.nodata)
+            missing |= is_nodata(values.astype(self.heights.dtype), self.nodata)
         if missing.any():
             i, j = np.argwhere(missing)[0]
             row = int(rows[i]) if np.ndim(rows) else rows + int(i)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from clouds import as_sets, scattered
 from numpy.testing import assert_array_equal
 
+from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.points import cloud_source
 from meshsimp_pymoo.formats.table import read_source
 
@@ -39,7 +42,9 @@ def test_las_and_laz_keep_coordinates_classes_and_colours(las, name, kind, versi
     points = np.round(scattered(), 3)
     n = len(points)
     fields = {"classification": np.arange(n) % 9, "intensity": np.arange(n), "red": np.arange(n) * 100}
-    source = read_source(las(name, points, kind=kind, version=version, fields=fields))
+    path = las(name, points, kind=kind, version=version, fields=fields)
+    with pytest.warns(ModelWarning, match="45 of its points are ground"):
+        source = read_source(path)
     np.testing.assert_allclose(source.points, points, rtol=0, atol=1e-9)
     assert_array_equal(source.attributes["classification"], fields["classification"])
     assert_array_equal(source.attributes["intensity"], fields["intensity"])
@@ -64,6 +69,67 @@ def test_the_reference_system_of_a_las_is_kept(las):
     keys = GeoKeyDirectoryVlr()
     keys.parse_record_data(struct.pack("<8H", 1, 1, 0, 1, 3072, 0, 1, 25832))
     assert read_source(las("b.las", scattered(9), records=[keys])).georeference["epsg"] == 25832
+
+
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_of_a_laser_scan_the_ground_is_taken_by_its_class(las, monkeypatch, name):
+    from meshsimp_pymoo.formats import las as reader
+    from meshsimp_pymoo.formats.source import points as clouds
+
+    points = np.round(scattered(100), 3)
+    ground = np.arange(100) % 4 == 0
+    points[~ground, 2] += 20
+    fields = {"classification": np.where(ground, 2, 5), "withheld": np.arange(100) == 8}
+    path = las(name, points, fields=fields)
+    monkeypatch.setattr(reader, "CHUNK_POINTS", 33)
+    expected = np.flatnonzero(ground & (np.arange(100) != 8))
+    with pytest.warns(ModelWarning, match="1 points are marked as withheld") as caught:
+        source = read_source(path, Options(classes=[2]))
+    assert len(caught) == 1
+    np.testing.assert_allclose(source.points, points[expected], rtol=0, atol=1e-9)
+    assert_array_equal(source.rows, expected)
+    assert source.georeference["classes"] == {"2": 24, "5": 75}
+    held = []
+    with monkeypatch.context() as patch:
+        patch.setattr(clouds, "read_cloud", lambda found, *_, **facts: held.append(len(found)) or source)
+        with pytest.warns(ModelWarning, match="withheld"):
+            read_source(path, Options(classes=[2]))
+    assert held == [24]  # the others were never held together
+    absent = r"has no points of class 9, but of 2 ground \(24\), 5 high vegetation \(75\); take some of these classes"
+    with pytest.warns(ModelWarning), pytest.raises(ModelError, match=absent):
+        read_source(path, Options(classes=9))
+
+
+def test_info_says_which_classes_a_laser_scan_has(las, capsys):
+    points = scattered(1300)
+    path = las("a.las", points, fields={"classification": np.repeat([2, 9], [1200, 100])})
+    assert main(["info", str(path), "--classes", "2"]) == 0
+    assert "classes         2 ground (1,200), 9 water (100)\n" in capsys.readouterr().out
+    assert main(["info", str(path), "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["classes"] == {"2": 1200, "9": 100}
+    assert "1,200 of its points are ground, others 9 water (100); all of them become surface" in said.err
+
+
+@pytest.mark.parametrize(
+    ("keys", "facts"),
+    [
+        ({1024: 2, 2048: 4326}, {"epsg": 4326, "unit": "degree"}),
+        ({1024: 1, 2048: 4269, 3072: 2994, 3076: 9002}, {"epsg": 2994, "unit": "foot"}),
+        ({1024: 1, 2048: 4326, 3072: 32767, 3076: 9001}, {"unit": "metre"}),  # its ellipsoid is no system of it
+        ({1024: 3, 2048: 4326}, {}),
+        ({2048: 4326}, {"epsg": 4326}),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*no latitudes in degrees")
+def test_the_reference_system_of_a_las_says_its_unit(las, keys, facts):
+    from laspy.vlrs.known import GeoKeyDirectoryVlr
+
+    record = GeoKeyDirectoryVlr()
+    entries = [part for key, value in keys.items() for part in (key, 0, 1, value)]
+    record.parse_record_data(struct.pack(f"<{4 + len(entries)}H", 1, 1, 0, len(keys), *entries))
+    found = read_source(las("a.las", scattered(9), records=[record])).georeference
+    assert {key: found[key] for key in ("epsg", "unit") if key in found} == facts
 
 
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])

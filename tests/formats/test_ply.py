@@ -319,7 +319,91 @@ def test_texture_coordinates_of_corners_are_those_of_vertices_without_seams(tmp_
     assert source.attributes == {}
 
 
-def test_other_elements_are_said_with_their_number(tmp_path):
-    text = ascii_ply().replace("end_header", "element edge 1\nproperty int vertex1\nend_header") + "0\n"
-    with pytest.warns(ModelWarning, match="1 of 'edge' are not read"):
-        assert len(read_source(write(tmp_path, "a.ply", text)).faces) == 4
+# ------------------------------------------------------------------------------------------- what connects vertices
+
+
+def connected(tmp_path, points, element, rows, order="ascii", info=()):
+    """Write a PLY whose vertices an element of this name connects by lists."""
+    name = {"ascii": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = ["ply", f"format {name} 1.0", *(f"obj_info {line}" for line in info), f"element vertex {len(points)}"]
+    head += [f"property float {axis}" for axis in "xyz"]
+    head += [f"element {element} {len(rows)}", "property list int int vertex_indices", "end_header\n"]
+    if order == "ascii":
+        body = "".join(
+            " ".join(map(str, row)) + "\n" for row in [*np.asarray(points).tolist(), *([len(r), *r] for r in rows)]
+        )
+        return write(tmp_path, f"{element}.ply", "\n".join(head) + body)
+    lists = b"".join(struct.pack(f"{order}{1 + len(row)}i", len(row), *row) for row in rows)
+    return write(
+        tmp_path, f"{element}.ply", "\n".join(head).encode() + np.asarray(points, f"{order}f4").tobytes() + lists
+    )
+
+
+def up_and_down(columns=5):
+    """Return a band of two rows of vertices, and the strip over it."""
+    points = [(x, y, x * y) for x in range(columns) for y in (0, 1)]
+    return np.array(points, float), list(range(2 * columns))
+
+
+@pytest.mark.parametrize("order", ["ascii", "<", ">"])
+def test_triangle_strips_alternate_their_winding_and_end_at_minus_one(tmp_path, order):
+    points, strip = up_and_down()
+    expected = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5], [4, 5, 6], [6, 5, 7], [6, 7, 8], [8, 7, 9]]
+    for rows in (
+        [strip],
+        [[*strip, -1]],
+        [[*strip[:6], -1, *strip[4:]]],
+        [strip[:6], [-1, *strip[4:], -1, -1]],
+        expected,  # a row ends a strip, too
+        [[*strip[:6], 5, 5, 4, 4, *strip[4:]]],  # joined by faces without an area
+    ):
+        source = read_source(connected(tmp_path, points, "tristrips", rows, order))
+        assert_array_equal(source.points, points)
+        turned = {tuple(np.roll(face, -int(np.argmin(face)))) for face in source.faces.tolist()}
+        assert turned == {tuple(np.roll(face, -int(np.argmin(face)))) for face in expected}
+
+
+def test_a_strip_that_names_no_vertex_is_refused(tmp_path):
+    points, strip = up_and_down()
+    assert "name vertices that do not exist" in refusal(connected(tmp_path, points, "tristrips", [[*strip, 10]]))
+    assert "name vertices that do not exist" in refusal(connected(tmp_path, points, "tristrips", [[*strip, -2]]))
+
+
+@pytest.mark.parametrize("order", ["ascii", "<", ">"])
+def test_a_range_scan_becomes_triangles_between_its_cells(tmp_path, order):
+    x, y = np.meshgrid(np.arange(4.0), np.arange(3.0))
+    z = np.where((x == 1) & (y == 1), 5.0, 0.0)  # a peak: diagonals avoid it
+    seen = np.arange(12) != 3  # but for a corner, whose cell becomes one triangle
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])[seen]
+    number = np.cumsum(seen) - 1
+    cells = [[int(number[k])] if seen[k] else [] for k in range(12)]
+    info = ["is_mesh 0", "num_cols 4", "num_rows 3"]
+    source = read_source(connected(tmp_path, points, "range_grid", cells, order, info))
+    assert_array_equal(source.points, points)
+    found = {frozenset(face) for face in source.faces.tolist()}
+    assert {frozenset(int(number[k]) for k in face) for face in [(0, 1, 4), (1, 2, 6), (4, 8, 9), (6, 9, 10)]} <= found
+    assert len(source.faces) == 11
+    a, b, c = (source.points[source.faces[:, k], :2] for k in range(3))
+    areas = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    assert_array_equal(areas, 0.5)
+
+
+def test_a_range_scan_whose_cells_do_not_fit_is_refused(tmp_path):
+    points = up_and_down(3)[0]
+    cells = [[k] for k in range(6)]
+    info = ["num_cols 2", "num_rows 3"]
+    assert len(read_source(connected(tmp_path, points, "range_grid", cells, info=info)).faces) == 4
+    assert "has 6 cells, but its header says num_cols 2 and num_rows 0" in refusal(
+        connected(tmp_path, points, "range_grid", cells, info=info[:1])
+    )
+    for wrong in ([6], [-1], [0, 1]):
+        said = refusal(connected(tmp_path, points, "range_grid", [*cells[:-1], wrong], info=info))
+        assert "names more than one vertex, or one that does not exist (of 6)" in said
+
+
+def test_elements_that_are_not_read_are_named(tmp_path):
+    head, rest = ascii_ply().split("end_header\n")
+    edges = "element edge 2\nproperty int vertex1\nproperty int vertex2\n"
+    text = f"{head}{edges}element nothing 0\nproperty int x\nend_header\n{rest}0 1\n1 2\n"
+    with pytest.warns(ModelWarning, match=r"a\.ply: 2 of 'edge' are not read and stay behind$"):
+        assert_array_equal(read_source(write(tmp_path, "a.ply", text)).faces, FACES)

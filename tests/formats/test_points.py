@@ -52,6 +52,42 @@ def test_of_points_at_one_place_the_lowest_stays_and_the_rest_is_counted():
     assert source.georeference["same_place"] == 3
 
 
+def test_points_without_a_height_or_of_other_classes_are_left_out_and_rows_stay_those_of_the_file():
+    points = scattered(60)
+    classes = np.arange(60) % 3 * 2.0
+    rows = np.arange(60) * 10
+    missing = np.arange(60) % 12 == 2
+    named = {"scalar_Classification": classes, "tag": np.arange(60)}
+    expected = np.flatnonzero((classes == 4) & ~missing)
+    points[missing, 2] = np.nan
+    with pytest.warns(ModelWarning, match="a: 5 of 60 points lack a coordinate") as caught:
+        source = cloud_source(points, name="a", classes=(4,), attributes=named, rows=rows)
+    assert len(caught) == 1
+    assert_array_equal(source.points, points[expected])
+    assert_array_equal(source.rows, rows[expected])
+    assert_array_equal(source.attributes["tag"], expected)
+    assert source.georeference["classes"] == {"0": 20, "2": 20, "4": 20}
+    points[missing, 2] = 17.25
+    with pytest.warns(ModelWarning, match="has no points of class 9, but of 0 never classified"):
+        source = cloud_source(points, nodata=17.25, classes=(4, 9), attributes=named)
+    assert_array_equal(source.rows, expected)
+
+
+def test_without_a_choice_of_classes_ground_beside_others_is_warned_of():
+    points, classes = scattered(50), np.repeat([2, 5, 200], [10, 38, 2])
+    said = (
+        r"a: 10 of its points are ground, others 5 high vegetation \(38\), 200 of the user \(2\); all of them become "
+    )
+    with pytest.warns(ModelWarning, match=f"{said}surface: .* classes=2 .--classes 2."):
+        cloud_source(points, name="a", attributes={"classification": classes})
+    for all_of_it in (classes[:10], classes[10:]):
+        cloud_source(points[: len(all_of_it)], attributes={"classification": all_of_it})
+    with pytest.raises(
+        ModelError, match=r"a: has no points of class 3, 4, but of 2 ground \(10\), 5 high .*; take some"
+    ):
+        cloud_source(points, name="a", classes=(3, 4), attributes={"classification": classes})
+
+
 def test_long_edges_bridge_bays_and_holes_only_without_a_limit():
     for name in ("horseshoe:900", "ring:900"):
         outline = load(name)
@@ -72,7 +108,12 @@ def test_clouds_that_span_no_surface_are_refused():
         (line, {}, "6 different places lie on one line"),
         (np.tile([1.0, 2.0, 3.0], (5, 1)), {}, "share one"),
         (scattered(3), {}, "at least 4"),
-        (scattered(9) * [1, 1, np.nan], {}, "NaN"),
+        (
+            scattered() * [1, 1, np.inf],
+            {},
+            r"400 of 400 points have infinite coordinates \(first: point 0, from 0, at ",
+        ),
+        (scattered(), {"classes": (2,)}, "does not say the classes of its points; leave classes out"),
         (scattered(), {"max_edge": 1e-3}, "longer than 0.001 .*--max-edge"),
         (scattered(), {"max_edge": 0.0}, "positive"),
         (scattered(), {"max_edge": float("nan")}, "positive"),

@@ -9,8 +9,11 @@ from numpy.testing import assert_array_equal
 from pyramid import COLORS, FACES, POINTS, ascii_ply, refusal, write
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source.points import cloud_source
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
+from meshsimp_pymoo.formats.table import read_source
 
 
 def test_a_trimesh_object_keeps_rows_colours_and_attributes_and_is_not_changed():
@@ -112,14 +115,50 @@ def test_faces_that_name_missing_vertices_are_refused(tmp_path, index, where):
 def test_too_few_vertices_and_no_faces_are_refused(tmp_path):
     triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     assert "3 vertices" in refusal(write(tmp_path, "three.obj", triangle))
-    assert "no faces" in refusal(write(tmp_path, "cloud.obj", "v 0 0 0\n" * 5))
-    assert "no faces" in refusal(write(tmp_path, "cloud.off", "OFF\n5 0 0\n" + "0 0 0\n" * 5))
-    cloud = ascii_ply().replace("element face 4", "element face 0").split("3 0 1 4")[0]
-    assert "no faces" in refusal(write(tmp_path, "cloud.ply", cloud))
-    head, rest = ascii_ply().split("element face 4\nproperty list uchar int vertex_indices\n")
-    assert "no faces" in refusal(write(tmp_path, "faceless.ply", head + rest.split("3 0 1 4")[0]))
+    with pytest.raises(ModelError, match="mesh: has 5 vertices but no faces"):
+        build_source(POINTS, np.empty((0, 3), np.int64))
     with pytest.raises(ModelError, match="all 1 faces"):
         build_source(POINTS, [[1, 1, 1]])
+
+
+FACE_LINES = "element face 4\nproperty list uchar int vertex_indices\n"
+ROWS = [(*map(str, point), *color[:3]) for point, color in zip(POINTS.tolist(), COLORS.tolist(), strict=True)]
+CLOUDS = {
+    "cloud.obj": "".join(f"v {x} {y} {z} {r / 255} {g / 255} {b / 255}\n" for x, y, z, r, g, b in ROWS),
+    "cloud.off": "COFF\n5 0 0\n" + "".join(f"{x} {y} {z} {r} {g} {b} 255\n" for x, y, z, r, g, b in ROWS),
+    "no_faces.ply": ascii_ply().replace("element face 4", "element face 0").split("3 0 1 4")[0],
+    "no_element.ply": ascii_ply().replace(FACE_LINES, "").split("3 0 1 4")[0],
+}
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_points_without_faces_are_a_cloud_whatever_file_holds_them(tmp_path, name):
+    path = write(tmp_path, name, CLOUDS[name])
+    with pytest.warns(ModelWarning, match="has 5 vertices and no faces, so it is read as a point cloud") as caught:
+        source = read_source(path, Options(max_edge=1e3, nodata=-9999))
+    assert len(caught) == 1
+    expected = cloud_source(POINTS)
+    assert_array_equal(source.points, expected.points)
+    assert_array_equal(source.faces, expected.faces)
+    assert_array_equal(source.attributes["color"][:, :3], COLORS[:, :3])
+    assert (source.sort, source.up) == ("cloud", "z")
+    with pytest.warns(ModelWarning), pytest.raises(ModelError, match=r"an edge longer than 0\.001 .*--max-edge"):
+        read_source(path, Options(max_edge=1e-3))
+    with pytest.raises(ModelError, match="window describe height grids"):
+        read_source(path, Options(window=(0, 0, 2, 2)))
+
+
+def test_vertices_without_a_place_that_no_face_names_are_dropped_with_their_count(tmp_path):
+    points = np.insert(POINTS, [0, 3], np.nan, axis=0)
+    number = np.flatnonzero(~np.isnan(points[:, 0]))
+    with pytest.warns(ModelWarning, match="mesh: 2 of 7 vertices have NaN coordinates and no faces, and were dropped"):
+        source = build_source(points, number[FACES], {"tag": np.arange(7)})
+    assert_array_equal(source.points, POINTS)
+    assert_array_equal(source.faces, FACES)
+    assert_array_equal(source.rows, number)
+    assert_array_equal(source.attributes["tag"], number)
+    with pytest.raises(ModelError, match="2 of 7 vertices have NaN or infinite"):
+        build_source(points, np.arange(6).reshape(2, 3))
 
 
 def test_arrays_of_another_shape_or_size_are_refused():

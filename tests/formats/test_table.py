@@ -64,6 +64,10 @@ def test_half_of_what_a_format_writes_is_refused_in_one_line(tmp_path, name):
     write_mesh(path, POINTS, FACES)
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
+    if name == "obj":  # which declares nothing: it may as well hold points alone
+        with pytest.warns(ModelWarning, match="no faces, so it is read as a point cloud"):
+            assert len(read_source(path).points) <= len(POINTS)
+        return
     refusal(path)
 
 
@@ -76,9 +80,12 @@ def test_nonsense_is_refused_in_one_line_or_read_as_nothing(tmp_path, name):
 
 def test_a_setting_describes_a_sort_of_model_that_there_is():
     of_one_sort = {name: known.describes for name, known in settings_of(Options).items() if known.describes}
-    assert {model for models in of_one_sort.values() for model in models} <= {*SORTS, *(f.name for f in all_formats())}
+    models = {*SORTS, *(kind.name for kind in all_formats())}
+    assert {model for models in of_one_sort.values() for model in models} <= models
     assert described() == list(of_one_sort)
-    assert described("grid") == ["spacing", "nodata", "window"]
+    assert {"spacing", "nodata", "window"} <= set(described("grid"))
+    assert described("cloud") == ["nodata", "max_edge", "classes"]
+    assert described("cloud", "xyz") == ["nodata", "max_edge", "classes", "columns"]
 
 
 # ---------------------------------------------------------------------------------------------- a new one is one file
@@ -110,7 +117,7 @@ import meshsimp_pymoo.formats
 meshsimp_pymoo.formats.__path__.append("more")
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.table import read_source, write_mesh
 
 roof = load("roof:5")
@@ -219,7 +226,7 @@ def test_reading_is_silent(tmp_path):
 
 SILENT = """
 from pathlib import Path
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.table import read_source
 for path in sorted(Path(".").glob("*.*")):
     try:
@@ -358,13 +365,20 @@ def test_a_missing_library_is_named_with_the_way_to_install_it(tmp_path, monkeyp
         read_source(tmp_path / f"a.{suffix}")
 
 
-def test_the_limit_on_edges_is_for_clouds_alone(tmp_path):
+def test_settings_are_for_the_models_that_they_describe_alone(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((3, 3)))
-    with pytest.raises(ModelError, match="max_edge describes point clouds"):
+    with pytest.raises(ModelError, match="max_edge and classes describe point clouds"):
         read_source(tmp_path / "a.npy", Options(max_edge=2.0))
     (tmp_path / "a.xyz").write_text("0 0 0\n1 0 0\n0 1 0\n1 1 1\n")
-    with pytest.raises(ModelError, match="describe height grids"):
+    with pytest.raises(ModelError, match=r"spacing.* describe height grids"):
         read_source(tmp_path / "a.xyz", Options(window=(0, 0, 2, 2)))
+    write(tmp_path, "a.ply", ascii_ply())
+    for options, said in [
+        ({"max_edge": 2.0}, r"nodata, max_edge and classes describe point clouds \(.*\.las"),
+        ({"nodata": 2.0}, r"spacing, nodata.* describe height grids"),
+        ({"columns": ("x", "y", "z")}, r"columns describes text of x y z \(\.xyz \.pts \.txt \.csv\); leave it out"),
+    ]:
+        assert re.search(said, refusal(tmp_path / "a.ply", **options))
 
 
 @pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)

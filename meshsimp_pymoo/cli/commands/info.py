@@ -59,6 +59,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
 
     from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.errors import ModelError
+    from meshsimp_pymoo.formats.source.classes import classes_in_words
     from meshsimp_pymoo.opening import mended_source
     from meshsimp_pymoo.surface.orient import seen_upright
     from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
@@ -95,6 +96,9 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         rows["vertices"] += f" ({len(source.repeats):,} that repeated others are merged with them)"
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
+    if classes := source.georeference.get("classes"):
+        content["classes"] = classes
+        rows["classes"] = classes_in_words(classes)
     try:
         up, facts = seen_upright(measured, options.up)
     except ModelError as problem:

@@ -21,8 +21,8 @@ examples:
       the smallest that deviates nowhere by more than 0.1
   meshsimp simplify grid.npy --spacing 30 --nodata=-9999
       a height grid
-  meshsimp simplify scan.laz --max-edge 5 --format landxml
-      a point cloud with bays and holes, as a TIN for GIS programs
+  meshsimp simplify scan.laz --classes 2 --max-edge 5 --format landxml
+      the ground of a point cloud with bays and holes, as a TIN for GIS programs
   meshsimp simplify huge.npy --tile 512 --triangles 200000
       a height grid that is too big for one piece
 """

@@ -52,6 +52,8 @@ class SourceMesh:
     georeference : dict
         Where on Earth it is and how it was read, as far as the file says: ``crs`` (WKT), ``epsg``, ``unit``,
         ``transform``, ``window`` ..., and ``scale`` (see `metric`); plain data for run.json.
+    sort : str
+        What it was made of: "mesh", "grid" or "cloud".
     repeats : (R, 2) int64 array, optional
         Rows of the file whose vertex repeats another one exactly, and the rows of those that they were merged into:
         whoever names the former means the latter. Default none.
@@ -66,6 +68,7 @@ class SourceMesh:
     rows: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     up: str | tuple[float, float, float] | None = None
     georeference: dict[str, Any] = field(default_factory=dict)
+    sort: str = "mesh"
     repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64))
     material: Material | None = None
 
@@ -103,6 +106,7 @@ def build_source(
     rows: IntArray | None = None,
     up: str | tuple[float, float, float] | None = None,
     georeference: dict[str, Any] | None = None,
+    sort: str = "mesh",
     repeats: str = "said",
     material: Material | None = None,
 ) -> SourceMesh:
@@ -126,8 +130,10 @@ def build_source(
     Warns
     -----
     ModelWarning
-        If vertices were merged, and if faces that then name a vertex twice, which have no area, were dropped.
+        If vertices were merged, and if faces that then name a vertex twice, which have no area, were dropped. If
+        vertices with a NaN that no face names were dropped, as scanners write them where they saw nothing.
     """
+    points, faces, attributes, rows = _without_unseen(points, faces, attributes or {}, rows, name)
     xyz = check_points(points, name, rows)
     count = len(xyz)
     rows = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
@@ -184,7 +190,28 @@ def build_source(
     if material is not None and material.image and "uv" not in kept_attributes:
         material = None
     facts = dict(georeference or {})
-    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, facts, found, material)
+    return SourceMesh(xyz, triangles, kept_attributes, name, rows, up, facts, sort, found, material)
+
+
+def _without_unseen(
+    points: npt.ArrayLike,
+    faces: npt.ArrayLike,
+    attributes: Mapping[str, npt.ArrayLike],
+    rows: IntArray | None,
+    name: str,
+) -> tuple[npt.ArrayLike, npt.ArrayLike, Mapping[str, npt.ArrayLike], IntArray | None]:
+    """Drop vertices with a NaN that no face names, if arrays have the right shapes."""
+    xyz, triangles = np.asarray(points, dtype=np.float64), np.asarray(faces)
+    missing = np.asarray(np.isnan(xyz).any(axis=-1))
+    if xyz.ndim != 2 or not missing.any() or triangles.dtype.kind not in "iu":
+        return points, faces, attributes, rows
+    if not triangles.size or triangles.min() < 0 or triangles.max() >= len(xyz) or missing[triangles].any():
+        return points, faces, attributes, rows
+    warn_of(f"{name}: {missing.sum()} of {len(xyz)} vertices have NaN coordinates and no faces, and were dropped")
+    seen = ~missing
+    number = np.cumsum(seen) - 1
+    values = {key: np.asarray(value)[seen] for key, value in attributes.items()}
+    return xyz[seen], number[triangles], values, np.flatnonzero(seen) if rows is None else rows[seen]
 
 
 def _leaders(points: FloatArray) -> IntArray:

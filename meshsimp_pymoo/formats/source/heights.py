@@ -10,14 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray
-from meshsimp_pymoo.errors import ModelError, NoFullGrid, warn_of
+from meshsimp_pymoo.errors import ModelError, NoFullGrid
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source.missing import is_nodata, warn_of_nodata
 from meshsimp_pymoo.memory import check_free
 
-# Values that programs write where a grid has no sample; and from this size on a height is none.
-NODATA_HABITS = (-9999.0, 9999.0, -99999.0, -999.0, -10000.0, -32768.0, -32767.0, 32767.0, 65535.0)
-NODATA_SIZE = 1e30
 # What a sample takes while a mesh is made of it: measured, rounded down.
 MESH_SAMPLE_BYTES = 300
 
@@ -257,9 +255,7 @@ def grid_mesh(
         See :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
     """
     if nodata is not None:
-        # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
-        with np.errstate(over="ignore", invalid="ignore"):
-            hidden = hidden | (height == (height.dtype.type(nodata) if height.dtype.kind == "f" else nodata))
+        hidden = hidden | is_nodata(height, nodata)
     hidden = hidden | np.isnan(height)
     with np.errstate(invalid="ignore"):  # some kinds of NaN complain
         z = height.astype(np.float64)
@@ -269,7 +265,7 @@ def grid_mesh(
             f"{name}: {infinite.sum()} of {z.size} heights are infinite (first: row {corner[0] + row}, column "
             f"{corner[1] + col}); set them to NaN or name the value with nodata"
         )
-    _warn_of_nodata(z[~hidden], name)
+    warn_of_nodata(z[~hidden], name)
     rows = np.flatnonzero(~hidden)
     vertex = np.full(z.shape, -1, np.int64)
     vertex.flat[rows] = np.arange(len(rows))
@@ -291,23 +287,9 @@ def grid_mesh(
             f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
     numbers = i * file_columns + j
-    return build_source(points, faces, {}, name, rows=numbers, up="z", georeference=georeference, repeats="none")
-
-
-def _warn_of_nodata(z: FloatArray, name: str) -> None:
-    """Warn of a usual "no data" value among the heights (S,) that is farther from all others than these are apart."""
-    for value in (float(z.min(initial=np.inf)), float(z.max(initial=-np.inf))):
-        if value not in NODATA_HABITS and not NODATA_SIZE <= abs(value) < np.inf:
-            continue
-        others = z[z != value]
-        if not len(others):
-            continue
-        low, high = float(others.min()), float(others.max())
-        if max(low - value, value - high) > high - low:
-            warn_of(
-                f"{name}: {len(z) - len(others)} of {len(z)} heights are {value:.9g}, far from all others ({low:g} to "
-                f"{high:g}); if that means 'no sample', say nodata={value:.9g} (--nodata={value:.9g})"
-            )
+    return build_source(
+        points, faces, {}, name, rows=numbers, up="z", georeference=georeference, sort="grid", repeats="none"
+    )
 
 
 # ---------------------------------------------------------------------------------------------------------- by windows

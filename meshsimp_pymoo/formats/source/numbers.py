@@ -16,6 +16,14 @@ from meshsimp_pymoo.memory import check_free
 # What a byte of a text takes at least, as bytes and as text.
 TEXT_BYTES = 2
 
+# What the channels of a colour are called.
+COLOR_NAMES = (
+    ("red", "green", "blue", "alpha"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("r", "g", "b", "a"),
+    ("rf", "gf", "bf", "af"),
+)
+
 
 def parse_numbers(text: str, name: str) -> FloatArray:
     """Parse white-space separated numbers; NaN and infinity are numbers, anything else names its place."""
@@ -92,6 +100,18 @@ def read_text(path: Path, name: str) -> str:
     size = path.stat().st_size
     check_free(TEXT_BYTES * size, f"{name}: its {size} bytes of text", "take a part of it")
     return without_mark(path.read_bytes()).decode("utf-8", errors="replace")
+
+
+def with_color(columns: dict[str, AnyArray]) -> dict[str, AnyArray]:
+    """Return per-vertex columns with the channels of a colour, whatever they are called, as one: ``"color"``."""
+    for names in COLOR_NAMES:
+        found = {key: value for key, value in columns.items() if key.lower() in names and value.ndim == 1}
+        channels = {key.lower(): value for key, value in found.items()}
+        if "color" in columns or not set(names[:3]) <= set(channels):
+            continue
+        if (color := rgba_of([channels[name] for name in names if name in channels])) is not None:
+            return {"color": color} | {key: value for key, value in columns.items() if key not in found}
+    return columns
 
 
 def text_lines(path: Path) -> list[str]:

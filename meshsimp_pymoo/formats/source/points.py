@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh, build_source, check_points
+from meshsimp_pymoo.formats.source.classes import check_classes, classes_of, count_classes
 from meshsimp_pymoo.formats.source.metric import in_metric_frame
+from meshsimp_pymoo.formats.source.missing import is_nodata, warn_of_nodata
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -26,8 +29,11 @@ def cloud_source(
     points: npt.ArrayLike,
     *,
     max_edge: float | None = None,
+    nodata: float | None = None,
+    classes: tuple[int, ...] | None = None,
     attributes: Mapping[str, npt.ArrayLike] | None = None,
     name: str = "points",
+    rows: IntArray | None = None,
     georeference: dict[str, Any] | None = None,
     scale: str | tuple[float, float] | None = None,
 ) -> SourceMesh:
@@ -36,15 +42,21 @@ def cloud_source(
     Parameters
     ----------
     points : (P, 3) array
-        Points; z is the height [units].
+        Points; z is the height [units]. One with a NaN is none.
     max_edge : float, optional
         A triangle with an edge longer than this in the plane is left out [units]. Without it the triangulation covers
         the convex hull of the points, and bridges every bay of their outline and every hole; about three times the
         usual distance of neighbours keeps both open. Of degrees: metres, as all lengths.
+    nodata : float, optional
+        Height of points that are none.
+    classes : tuple of int, optional
+        The classes that are taken, by the attribute "classification"; by default all.
     attributes : mapping of str to arrays of P rows, optional
         Per-point data.
     name : str
         What messages call it.
+    rows : (P,) int array, optional
+        Row of each point in the file; by default 0, 1, 2, ...
     georeference : dict, optional
         See :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
     scale : "degrees", (float, float) or None
@@ -53,17 +65,19 @@ def cloud_source(
     Returns
     -------
     SourceMesh
-        Of points with one (x, y) the lowest stays; ``rows`` holds the rows of ``points`` that stay.
+        Of points with one (x, y) the lowest stays; ``rows`` holds the file rows of the points that stay.
 
     Raises
     ------
     ModelError
-        If there are fewer than 4 different places, all on one line, or no triangle has short enough edges.
+        If there are fewer than 4 different places, all on one line, infinite coordinates, no points of these classes,
+        or no triangle with short enough edges.
 
     Warns
     -----
     ModelWarning
-        If points share their place in the plane, with their number.
+        With their number: if points have no place or height, look like "no data", are of other classes than ground, or
+        share their place in the plane.
 
     Examples
     --------
@@ -77,10 +91,27 @@ def cloud_source(
     >>> len(source.faces), source.points[-1].tolist()
     (4, [0.5, 0.5, 1.0])
     """
-    xyz = check_points(points, name)
+    facts = dict(georeference or {})
+    values = {key: np.asarray(value) for key, value in (attributes or {}).items()}
+    xyz = np.asarray(points, dtype=np.float64)
+    numbers = np.arange(len(xyz)) if rows is None else rows
+    if xyz.ndim == 2 and xyz.shape[1] == 3:
+        taken = _samples(xyz, numbers, nodata, name)
+        found = classes_of(values)
+        if found is not None:
+            facts.setdefault("classes", count_classes(found))
+            check_classes(facts["classes"], classes, name)
+            if classes is not None:
+                taken &= np.isin(found, classes)
+        elif classes is not None:
+            raise ModelError(f"{name}: does not say the classes of its points; leave classes out")
+        if not taken.all():
+            xyz, numbers = xyz[taken], numbers[taken]
+            values = {key: value[taken] for key, value in values.items()}
+    xyz = check_points(xyz, name)
     if max_edge is not None and not (np.isfinite(max_edge) and max_edge > 0):
         raise ModelError(f"{name}: max_edge is {max_edge}; give a positive length")
-    facts = in_metric_frame(georeference or {}, xyz.min(axis=0), xyz.max(axis=0), scale=scale, name=name)
+    facts = in_metric_frame(facts, xyz.min(axis=0), xyz.max(axis=0), scale=scale, name=name)
     local = xyz * [*facts.get("scale", (1.0, 1.0)), 1.0]
     local -= local.min(axis=0)
     if not np.ptp(local[:, :2], axis=0).any():
@@ -110,12 +141,57 @@ def cloud_source(
                 f"{name}: all {len(longest)} triangles have an edge longer than {max_edge:g} (half of them one longer "
                 f"than {np.median(longest):.4g}); give a larger --max-edge"
             )
-    rows = np.sort(order)
+    stay = np.sort(order)
     place = np.full(len(xyz), -1, np.int64)
-    place[rows] = np.arange(len(rows))
-    values = {key: np.asarray(value)[rows] for key, value in (attributes or {}).items()}
+    place[stay] = np.arange(len(stay))
     facts |= {"points": len(xyz), "same_place": n_twins, "max_edge": max_edge}
-    return build_source(xyz[rows], place[faces], values, name, rows=rows, up="z", georeference=facts, repeats="none")
+    return build_source(
+        xyz[stay],
+        place[faces],
+        {key: value[stay] for key, value in values.items()},
+        name,
+        rows=numbers[stay],
+        up="z",
+        georeference=facts,
+        sort="cloud",
+        repeats="none",
+    )
+
+
+def read_cloud(points: npt.ArrayLike, options: Options, **facts: Any) -> SourceMesh:
+    """Triangulate the points of a file; see :func:`cloud_source` for the facts beside what the user says."""
+    said = {name: getattr(options, name) for name in ("max_edge", "nodata", "classes", "scale")}
+    return cloud_source(points, **said, **facts)
+
+
+def bare_cloud(
+    points: npt.ArrayLike, attributes: Mapping[str, npt.ArrayLike], name: str, options: Options, **facts: Any
+) -> SourceMesh:
+    """Triangulate the points of a mesh's file that has no faces, and say so; see :func:`read_cloud` for the facts."""
+    warn_of(
+        f"{name}: has {len(np.asarray(points))} vertices and no faces, so it is read as a point cloud, whose Delaunay "
+        "triangulation in the plane of x and y is the original"
+    )
+    return read_cloud(points, options, attributes=attributes, name=name, **facts)
+
+
+def _samples(xyz: FloatArray, rows: IntArray, nodata: float | None, name: str) -> BoolArray:
+    """Return which points (P, 3) have a place and a height, and say what is left out or looks like it."""
+    missing = np.asarray(np.isnan(xyz).any(axis=1))
+    if missing.any():
+        warn_of(f"{name}: {missing.sum()} of {len(xyz)} points lack a coordinate (NaN or empty) and were left out")
+    infinite = np.isinf(xyz).any(axis=1) & ~missing
+    if infinite.any():
+        first = int(np.argmax(infinite))
+        where = ", ".join(f"{value:g}" for value in xyz[first])
+        raise ModelError(
+            f"{name}: {infinite.sum()} of {len(xyz)} points have infinite coordinates (first: point {rows[first]}, "
+            f"from 0, at {where}); set them to NaN or leave them out"
+        )
+    if nodata is not None:
+        missing |= is_nodata(xyz[:, 2], nodata)
+    warn_of_nodata(xyz[~missing, 2], name)
+    return ~missing
 
 
 def _delaunay(xy: FloatArray) -> IntArray:
