@@ -155,7 +155,7 @@ def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):
         process.send_signal(number)
         out, err = process.communicate(timeout=60)
     assert process.returncode == code, err
-    assert err.startswith("meshsimp: interrupted after ")
+    assert err.startswith("meshsimp: stopping: the front so far is written next\nmeshsimp: interrupted after ")
     assert json.loads(out)["solutions"] == len(read_front(tmp_path / "out").F) > 10
     assert json.loads((tmp_path / "out" / "run.json").read_text())["interrupted"]
 
