@@ -23,8 +23,10 @@ import json
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -32,11 +34,15 @@ import pytest
 from pymoo.algorithms.moo.nsga2 import NSGA2
 
 from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.cli.terminal import answering, interrupted_code, interruptible, is_interrupted
 from meshsimp_pymoo.comparison import runner
 from meshsimp_pymoo.comparison.config import read_experiment_file
+from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.search import checkpoint
 from meshsimp_pymoo.storage import CHECKPOINT, read_front
+from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.tiles.grid import open_grid
 
 sys.path.insert(0, str(Path(__file__).parent))
 from forker import Forker
@@ -309,6 +315,141 @@ def test_ctrl_c_while_writing_keeps_the_search(tmp_path, whole, monkeypatch, cap
     assert "the same command goes on from the checkpoint" in one_line(capsys)
     assert simplify(out) == 0
     assert reproducible(out) == whole
+
+
+# ------------------------------------------------------------------------------------------------ signals at any moment
+
+GRID = ("--tile", "64", "--triangles", "200", "--meshes", "2", "--jobs", "1", "--threads", "1", "--quiet")
+ENDINGS = {"killed": [signal.SIGKILL], "terminated": [signal.SIGTERM], "interrupted": [signal.SIGINT]}
+ENDINGS["interrupted twice"] = [signal.SIGINT, signal.SIGINT]
+
+
+@pytest.fixture(scope="module")
+def commands(tmp_path_factory):
+    """Return what is done at random moments, each small, by name: the arguments but for the folder."""
+    folder = tmp_path_factory.mktemp("models")
+    heights = open_grid(build_model(load("jacksboro:2"))).heights[:20, :100].astype(np.float32)
+    np.save(folder / "relief.npy", heights)
+    (folder / "tiny.yaml").write_text(CONFIG.replace("seeds: [1, 2]", "seeds: [1]"), encoding="utf-8")
+    often = ("--checkpoint", "0.02s")
+    return {
+        "simplify": ("simplify", *SEARCH, *PLAIN, "--evaluations", "2000", *often),
+        "tiles": ("simplify", folder / "relief.npy", *GRID),
+        "run": ("run", folder / "tiny.yaml", "--quiet", "--jobs", "1", *often),
+    }
+
+
+def same_bytes(folder):
+    """Return what does not depend on the time that anything took."""
+    found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+    varies = ("run.json", "times.csv", "times.md", "report.html")
+    kept = {name: path.read_bytes() for name, path in found.items() if name not in varies}
+    for name in [name for name in kept if name.startswith("runs/") and name.endswith(".json")]:
+        record = json.loads(kept[name])
+        kept[name] = tuple(record[key] for key in ("generations", "evaluations", "arrays_sha256", "description"))
+    return kept
+
+
+@pytest.mark.parametrize("trials", [5, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["simplify", "tiles", "run"])
+def test_signals_at_random_moments_change_no_byte_and_leave_nothing(tmp_path, forker, commands, name, trials):
+    command, moments = commands[name], random.Random(13)
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    undisturbed = forker.run(*command, "-o", whole)
+    assert undisturbed.code == 0, undisturbed.stderr
+    kinds = list(ENDINGS) * (trials if trials > 5 else 2)
+    for kind in kinds[1 if trials == 5 else 0 :][: trials * (4 if trials > 5 else 1)]:
+        moment = moments.uniform(0.0, 1.0) * undisturbed.seconds
+        signals = [(moment + moments.uniform(0.0, 0.2) * k, number) for k, number in enumerate(ENDINGS[kind])]
+        ended = forker.run(*command, "-o", out, signals=signals)
+        expected = {"killed": -9, "terminated": 143}.get(kind, 130)
+        assert ended.code in (0, expected, -signals[0][1]), (kind, ended)  # it may be over, or not have begun
+        assert "Traceback" not in ended.stderr
+        assert ended.left == 0
+        if kind != "killed":
+            assert {entry.name for entry in tmp_path.iterdir()} <= {"out", "whole"}
+        if name == "simplify" and (out / "run.json").exists() and kind != "killed":
+            # a front so far is whole, and of another budget than the undisturbed one
+            assert read_front(out).run["interrupted"] == (ended.code != 0) or not (out / "front.png").exists()
+            if read_front(out).run["interrupted"]:
+                shutil.rmtree(out)
+        if ended.code == 0:
+            assert same_bytes(out) == same_bytes(whole)
+            shutil.rmtree(out)
+    last = forker.run(*command, "-o", out)
+    assert last.code == 0, last.stderr
+    assert same_bytes(out) == same_bytes(whole)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "whole"]
+
+
+@pytest.mark.parametrize("kind", ["terminated", "killed"])
+def test_an_experiment_that_is_ended_leaves_no_process(tmp_path, forker, kind):
+    config = tmp_path / "long.yaml"
+    config.write_text(CONFIG.replace("generations: 20", "generations: 20000"), encoding="utf-8")
+    command = ("run", config, "--quiet", "--jobs", "2")
+    ended = forker.run(*command, "-o", tmp_path / "out", signals=[(3.0, number) for number in ENDINGS[kind]])
+    assert ended.code == {"terminated": 143, "killed": -9}[kind], ended.stderr
+    assert ended.left == 0
+    if kind == "terminated":
+        assert ended.stderr.startswith("meshsimp: stopping")
+
+
+@pytest.mark.parametrize("name", ["simplify", "tiles"])
+def test_a_second_search_for_a_folder_is_refused_before_it_begins(tmp_path, commands, capsys, monkeypatch, name):
+    monkeypatch.setattr("meshsimp_pymoo.cli.searching.MeshProblem", None)
+    monkeypatch.setattr("meshsimp_pymoo.cli.tiling.open_grid", None)
+    with locked(tmp_path / "deep" / "out"):
+        assert run(*commands[name], "-o", tmp_path / "deep" / "out") == 2
+    said = one_line(capsys)
+    assert "out: another process is at work there; wait for it or name another folder" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_is_answered_while_a_kernel_runs(tmp_path):
+    """The word comes at once, from another thread; what it asks for comes when the kernel is done."""
+    code = """if True:
+        import os, signal, threading, time
+        import numba
+        import numpy as np
+        from meshsimp_pymoo.cli.terminal import answering, interruptible
+        from meshsimp_pymoo.compiling.functions import OPTIONS
+
+        @numba.njit(**OPTIONS)
+        def kernel(number, state):
+            for k in range(number):
+                state[0] = (state[0] * 6364136223846793005 + k) % 1000003
+        kernel(1, np.ones(1, np.int64))
+        state = np.ones(1, np.int64)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        try:
+            with interruptible(), answering("stopping soon"):
+                kernel(100_000_000, state)
+                time.sleep(0)
+        except KeyboardInterrupt:
+            print("stopped", flush=True)
+    """
+    call = [sys.executable, "-c", code]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+        assert process.stderr.readline() == "meshsimp: stopping soon\n"
+        answered = time.perf_counter()
+        assert process.stdout.readline() == "stopped\n"
+        assert time.perf_counter() - answered > 0.2  # the kernel was still at work
+
+
+def test_signals_are_answered_in_turn_and_the_last_answer_stops():
+    with interruptible():
+        with answering("first", "second", "stop"):
+            for _ in range(2):
+                signal.raise_signal(signal.SIGINT)
+            assert is_interrupted()
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)  # what ends can end
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGTERM)
+        assert not is_interrupted()
+        assert interrupted_code() == 130
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 # -------------------------------------------------------------------------------------------- disk and folder: simplify

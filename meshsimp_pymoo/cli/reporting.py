@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.terminal import OK, bar, tell, there
+from meshsimp_pymoo.cli.terminal import OK, bar, place_for_matplotlib, tell, there
 from meshsimp_pymoo.comparison.report import write_report
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.storage import PICTURES
@@ -15,7 +15,8 @@ from meshsimp_pymoo.storage import PICTURES
 def report_on_front(out: Path, model: str | None, *, quiet: bool, as_json: bool) -> int:
     """Make the picture and the page of a front anew; return the exit code."""
     front = Front.load(out, model=model)
-    front.draw()
+    with place_for_matplotlib(out):
+        front.draw()
     if as_json:
         tell(json.dumps({"page": str(out / "report.html"), "solutions": len(front)}, indent=2))
     elif not quiet:
@@ -25,7 +26,7 @@ def report_on_front(out: Path, model: str | None, *, quiet: bool, as_json: bool)
 
 def report_on_experiment(out: Path, facts: dict[str, Any], *, quiet: bool, as_json: bool) -> int:
     """Make the report of an experiment anew; return the exit code."""
-    with bar(quiet, "report") as show:
+    with bar(quiet, "report") as show, place_for_matplotlib(out):
         study = write_report(out, progress=lambda done, total, text: show(done / max(total, 1), text))
     if as_json:
         summary = {"folder": str(out), **facts, "runs": len(study.all_runs), "missing": len(study.missing)}

@@ -29,6 +29,7 @@ from meshsimp_pymoo.cli.terminal import (
     described,
     front_in_words,
     is_interrupted,
+    place_for_matplotlib,
     say,
     stop_if_interrupted,
     tell,
@@ -396,7 +397,7 @@ def _hand_over(found: _Found, keeper: Keeper, shown: Stages) -> int:
         try:
             stop_if_interrupted()
             if not undrawn:
-                with shown.stage("writing", "drawing"):
+                with shown.stage("writing", "drawing"), place_for_matplotlib(folder):
                     Front.load(folder, model=keeper.problem.surface).draw(page=output.page, missing=True)
         except KeyboardInterrupt:
             undrawn = True

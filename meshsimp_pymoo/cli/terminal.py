@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
+import shutil
 import signal
 import sys
+import tempfile
 import threading
 import time
 import warnings
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BAD_INPUT",
     "DRAWING",
+    "ENDING",
     "INTERRUPTED",
     "OK",
     "TARGET_MISSED",
@@ -43,6 +47,8 @@ __all__ = [
     "interrupted_code",
     "interruptible",
     "is_interrupted",
+    "matplotlib_silent",
+    "place_for_matplotlib",
     "say",
     "stop_if_interrupted",
     "tell",
@@ -299,6 +305,38 @@ def warnings_as_lines() -> Iterator[None]:
         warnings.showwarning = show
         warnings.filterwarnings("always", module=r"meshsimp_pymoo(\.|$)")
         yield
+
+
+@contextmanager
+def matplotlib_silent() -> Iterator[None]:
+    """Keep to itself what matplotlib says of a home that cannot be written, and of its fonts."""
+    log = logging.getLogger("matplotlib")
+    before = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+
+
+@contextmanager
+def place_for_matplotlib(folder: Path) -> Iterator[None]:
+    """Let matplotlib keep its cache in a folder while it draws, where there is no place for temporary files."""
+    try:
+        tempfile.gettempdir()
+        is_needed = False
+    except OSError:
+        is_needed = "matplotlib" not in sys.modules and "MPLCONFIGDIR" not in os.environ
+    if not is_needed:
+        yield
+        return
+    own = folder / ".matplotlib"
+    os.environ["MPLCONFIGDIR"] = str(own.resolve())
+    try:
+        yield
+    finally:
+        del os.environ["MPLCONFIGDIR"]
+        shutil.rmtree(own, ignore_errors=True)
 
 
 def described(quality: Quality) -> str:

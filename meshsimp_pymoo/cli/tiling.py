@@ -23,6 +23,7 @@ from meshsimp_pymoo.cli.terminal import (
     answering,
     described,
     is_interrupted,
+    place_for_matplotlib,
     say,
     stop_if_interrupted,
     tell,
@@ -185,7 +186,7 @@ def _hand_over(
         try:
             stop_if_interrupted()
             if not undrawn:
-                with shown.stage("writing", "drawing"):
+                with shown.stage("writing", "drawing"), place_for_matplotlib(out):
                     draw_into(out, {PICTURES[0]: lambda path: _draw(front, chosen, path)})
         except KeyboardInterrupt:
             undrawn = True
@@ -204,7 +205,8 @@ def report_on_tiled(out: Path, model: str | None, *, quiet: bool, as_json: bool)
     """Make the picture of a tiled front anew; return the exit code."""
     stored, options = stored_model(out)
     front, chosen = _stored(out, open_grid(model or stored, options))
-    draw_into(out, {PICTURES[0]: lambda path: _draw(front, chosen, path)})
+    with place_for_matplotlib(out):
+        draw_into(out, {PICTURES[0]: lambda path: _draw(front, chosen, path)})
     if as_json:
         tell(json.dumps({"picture": str(out / PICTURES[0]), "solutions": len(front)}, indent=2))
     elif not quiet:

@@ -20,7 +20,7 @@ from scipy.spatial import Delaunay
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import PictureWarning, ResultError
 from meshsimp_pymoo.formats.table import read_source, write_mesh
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.report import page as page_module
