@@ -5,6 +5,8 @@ what happens                       what follows
 ================================== =====================================================================================
 killed at random moments           the same command goes on, to the same bytes (simplify, run)
 killed while results are written   the same command goes on from the end of the search; nothing is left besides
+killed while they are drawn        the results are in place; the same command draws what is missing
+SIGTERM, Ctrl-C at random moments  answered at once; the same command ends with the same bytes; no process is left
 disk full                          one warning, the search goes on; where results do not fit: one line, exit code 2, the
                                    checkpoint stays, the same command completes
 folder gone in mid-run             it is made again

@@ -6,11 +6,10 @@ import errno
 import os
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 
 import pytest
 
+from meshsimp_pymoo import files
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, put_back, put_text
 
@@ -261,21 +260,20 @@ def test_a_lock_ends_with_its_process_and_is_not_left(tmp_path, inside):
 
 
 @needs_locks
-def test_of_many_processes_one_at_a_time_holds_a_folder(tmp_path):
-    (tmp_path / "log").touch()
-    with ThreadPoolExecutor(8) as pool:
+def test_a_lock_that_its_holder_removed_before_it_was_held_is_none(tmp_path, monkeypatch):
+    flock, left = files.fcntl.flock, [tmp_path / ".out.lock"]
 
-        def hold(number):
-            held = 0
-            for _ in range(200):
-                with suppress(ResultError), locked(tmp_path / "out"):
-                    os.mkdir(tmp_path / "held")  # noqa: PTH102 - fails where there are two
-                    os.rmdir(tmp_path / "held")  # noqa: PTH106
-                    held += 1
-            return held
+    def late(*args):
+        if left:
+            left.pop().unlink()  # its holder has ended
+        flock(*args)
 
-        assert sum(pool.map(hold, range(8))) > 8
-    assert entries(tmp_path) == ["log"]
+    monkeypatch.setattr(files.fcntl, "flock", late)
+    with locked(tmp_path / "out"):
+        assert (tmp_path / ".out.lock").exists()
+        with pytest.raises(ResultError, match="another process"), locked(tmp_path / "out"):
+            pass
+    assert entries(tmp_path) == []
 
 
 def test_only_a_folder_s_own_remains_are_touched(tmp_path):
