@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import logging
 import math
 import os
@@ -84,6 +85,8 @@ class _Signals:
     answers: tuple[str, ...] = ()
     #: How many of them have been answered.
     answered = 0
+    #: How many more are no new ones.
+    repeated = 0
 
 
 @contextmanager
@@ -101,6 +104,7 @@ def interruptible() -> Iterator[None]:
     os.set_blocking(hand, False)
     woken = signal.set_wakeup_fd(hand, warn_on_full_buffer=False)
     before = {number: signal.signal(number, _note) for number in ENDING}
+    unraisable, sys.unraisablehook = sys.unraisablehook, _raise_again
     answering_thread = threading.Thread(target=_answer, args=(bell,), name="meshsimp-answers", daemon=True)
     answering_thread.start()
     try:
@@ -109,6 +113,7 @@ def interruptible() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        sys.unraisablehook = unraisable
         signal.set_wakeup_fd(woken)
         os.close(hand)
         answering_thread.join()
@@ -137,10 +142,22 @@ def _note(signum: int, frame: Any) -> None:
         raise KeyboardInterrupt
 
 
+def _raise_again(lost: Any) -> None:
+    """Raise KeyboardInterrupt a moment later where it met what can raise nothing, such as the end of an object."""
+    if lost.exc_type is not KeyboardInterrupt or _Signals.first is None:
+        sys.__unraisablehook__(lost)
+        return
+    _Signals.came -= 1
+    _Signals.repeated += 1
+    threading.Timer(0.05, _thread.interrupt_main, (int(_Signals.first),)).start()
+
+
 def _answer(bell: int) -> None:
     """Say a word whenever a signal came, until the other end is closed."""
     while number := os.read(bell, 1):
-        if number[0] in ENDING and (answers := _Signals.answers):
+        if _Signals.repeated:
+            _Signals.repeated -= 1
+        elif number[0] in ENDING and (answers := _Signals.answers):
             word = answers[min(_Signals.answered, len(answers) - 1)]
             _Signals.answered += 1
             with suppress(OSError, ValueError):  # nobody is there to hear it

@@ -150,7 +150,7 @@ while killed < moments:
     time.sleep(rng.random() * length)
     os.kill(pid, signal.SIGKILL)
     killed += os.WIFSIGNALED(os.waitpid(pid, 0)[1])
-    finished = (out / "front.csv").exists()
+    finished = (out / "front.png").exists()
     print(number, "killed", len(list((out / "tiles").glob("*.npz"))))
     if finished or killed == moments:
         # a finished folder is not made anew, but cleared up beside
