@@ -1,8 +1,6 @@
 """``python -m meshsimp_pymoo`` is the shell command ``meshsimp``."""
 
-import sys
-
-from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.cli import program
 
 if __name__ == "__main__":
-    sys.exit(main())
+    program()

@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, reason_of
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 
@@ -157,8 +157,10 @@ def _topobathy(stride: int = 1, vertices: int = 0, seed: int = 1) -> SourceMesh:
 
 
 def _sample_data(file: str) -> Path:
-    from matplotlib.cbook import get_sample_data
-
+    try:
+        from matplotlib.cbook import get_sample_data
+    except OSError as problem:  # it has no place for its cache
+        raise ModelError(f"{file}: is sample data of matplotlib, which cannot be used ({reason_of(problem)})") from None
     path = Path(get_sample_data(file, asfileobj=False))
     if not path.is_file():
         raise ModelError(

@@ -19,6 +19,11 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
 from meshsimp_pymoo.arrays import AnyArray
 from meshsimp_pymoo.errors import ModelError, PictureWarning, ResultError, raise_if_memory, reason_of
 from meshsimp_pymoo.memory import check_free
@@ -50,8 +55,10 @@ def new_file(path: Path, *, way_out: str = "name another file", flush: bool = Tr
     ResultError
         If it cannot be written.
     """
-    partial = _hidden(path, f"partial{path.suffix}", path.stem)
+    partial = _hidden(path, "partial")
+    alive = -1
     try:
+        alive = _mark_alive(partial, os.O_CREAT | os.O_RDWR)
         yield partial
         if flush:
             _flush(partial)
@@ -59,6 +66,8 @@ def new_file(path: Path, *, way_out: str = "name another file", flush: bool = Tr
     except OSError as problem:
         raise ResultError(f"{path}: cannot be written ({reason_of(problem)}); {way_out}") from None
     finally:
+        if alive >= 0:
+            os.close(alive)
         with suppress(OSError):  # whatever stands in the way of that was said already
             partial.unlink(missing_ok=True)
 
@@ -90,9 +99,11 @@ def new_folder(
         If it cannot be written.
     """
     target = Path(folder).resolve()
+    alive = -1
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         partial = partial_folder(target)
+        alive = _mark_alive(partial, os.O_RDONLY)
     except OSError as problem:
         raise ResultError(f"{folder}: cannot be made ({reason_of(problem)}); {way_out}") from None
     try:
@@ -100,59 +111,62 @@ def new_folder(
         for path in [*partial.rglob("*"), partial] if flush else ():
             _flush(path)
         _put_in_place(partial, target, folder, replace)
-    except BaseException as problem:
-        shutil.rmtree(partial, ignore_errors=True)
-        if isinstance(problem, OSError):
-            raise ResultError(f"{folder}: cannot be written ({reason_of(problem)}); {way_out}") from None
-        raise
+    except OSError as problem:
+        raise ResultError(f"{folder}: cannot be written ({reason_of(problem)}); {way_out}") from None
+    finally:
+        if alive >= 0:
+            os.close(alive)
+        if not _turned(partial, "old").exists():
+            shutil.rmtree(partial, ignore_errors=True)
+        put_back(target)
 
 
 def partial_folder(target: Path) -> Path:
     """Make a hidden folder beside the target, with the permissions that the user's folders usually get."""
-    partial = _hidden(target, "partial", target.name)
+    partial = _hidden(target, "partial")
     partial.mkdir()
     return partial
 
 
 def _put_in_place(partial: Path, target: Path, folder: str | os.PathLike[str], replace: bool) -> None:
-    old = None
-    if replace and target.exists():
-        old = _hidden(target, "old", target.name)
-        target.rename(old)
+    """Give a folder its name, in place of an old one, which has that of the partial one until it is removed."""
+    old = _turned(partial, "old")
     try:
+        if replace and target.exists():
+            target.rename(old)
         partial.rename(target)
-    except OSError as problem:
-        if old is not None:
+    except BaseException as problem:  # also what comes between the two
+        if old.exists() and not target.exists():
             old.rename(target)
-        raise ResultError(f"{folder}: cannot be put in place ({reason_of(problem)}); name another folder") from None
+        if isinstance(problem, OSError):
+            raise ResultError(f"{folder}: cannot be put in place ({reason_of(problem)}); name another folder") from None
+        raise
     _flush(target.parent)
-    if old is not None:
-        shutil.rmtree(old)
 
 
-def put_back(folder: str | os.PathLike[str], *, tidy: bool = False, replaced: bool = False) -> None:
-    """Mend what a process left that was killed while it put a folder in place.
+def put_back(path: str | os.PathLike[str]) -> None:
+    """Mend what processes left that were killed while they wrote this file, or put this folder in place.
 
-    Parameters
-    ----------
-    folder : path
-        The folder. If it is gone, and what it held before stands aside, that becomes the folder again.
-    tidy : bool
-        Remove unfinished folders beside it too; only for who holds the folder.
-    replaced : bool
-        Remove what still stands aside, too; only where all that it held is made anew.
+    A folder that was replaced stands aside as *old* for a moment, under the mark of the one that was to come. If there
+    is nothing in its place, it is put back. If there is, and no *partial* one of its mark, then that one has taken the
+    place, and the old one is removed. *Partial* ones are removed where no living process is at work in them.
     """
-    target = Path(folder).resolve()
-    if not target.exists() and (old := left_beside(target, "old")):
-        old[0].rename(target)
-    for kind, unwanted in (("partial", tidy), ("old", replaced)):
-        for left in left_beside(target, kind) if unwanted else ():
-            shutil.rmtree(left, ignore_errors=True)
+    target = Path(path).resolve()
+    with suppress(OSError):  # whoever writes there will say what is wrong
+        for old in left_beside(target, "old"):
+            if not target.exists():
+                old.rename(target)
+            elif not _turned(old, "partial").exists():
+                shutil.rmtree(old, ignore_errors=True)
+        for partial in left_beside(target, "partial"):
+            if not _turned(partial, "old").exists() and _is_abandoned(partial):
+                shutil.rmtree(partial, ignore_errors=True) if partial.is_dir() else partial.unlink(missing_ok=True)
 
 
 def left_beside(target: Path, kind: str) -> list[Path]:
-    """Return the hidden folders, "partial" or "old", that killed processes left beside a folder."""
-    return sorted(target.parent.glob(f".{glob.escape(target.name)}.{'[0-9a-f]' * 8}.{kind}"))
+    """Return the hidden files or folders, "partial" or "old", that were not removed beside a file or folder."""
+    any_mark = "[0-9a-f]" * 8
+    return sorted(target.parent.glob(f".{glob.escape(target.stem)}.{any_mark}.{kind}{glob.escape(target.suffix)}"))
 
 
 def put_text(path: Path, text: str, *, way_out: str = "name another file", flush: bool = False) -> None:
@@ -161,8 +175,14 @@ def put_text(path: Path, text: str, *, way_out: str = "name another file", flush
         partial.write_bytes(text.encode("utf-8"))
 
 
-def _hidden(path: Path, kind: str, stem: str) -> Path:
-    return path.with_name(f".{stem}.{secrets.token_hex(4)}.{kind}")
+def _hidden(path: Path, kind: str) -> Path:
+    return path.with_name(f".{path.stem}.{secrets.token_hex(4)}.{kind}{path.suffix}")
+
+
+def _turned(hidden: Path, kind: str) -> Path:
+    """Return the name of the other kind with the same mark."""
+    head, _, suffix = hidden.name.rpartition(".partial" if kind == "old" else ".old")
+    return hidden.with_name(f"{head}.{kind}{suffix}")
 
 
 def _flush(path: Path) -> None:
@@ -175,32 +195,93 @@ def _flush(path: Path) -> None:
         os.close(handle)
 
 
+# --------------------------------------------------------------------------------------------------------------- locks
+
+
+def _mark_alive(partial: Path, flags: int) -> int:
+    """Open and lock what is being written, as a sign of life that ends with the process; -1 where there is no such."""
+    if fcntl is None:
+        return -1
+    handle = os.open(partial, flags, 0o666)
+    with suppress(OSError):  # a file system without locks
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return handle
+
+
+def _is_abandoned(partial: Path) -> bool:
+    """Tell whether what was being written has no process any more, where that can be known."""
+    if fcntl is None:
+        return False
+    try:
+        handle = os.open(partial, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    else:
+        return True
+    finally:
+        os.close(handle)
+
+
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def locked(folder: str | os.PathLike[str], *, inside: bool = False) -> Iterator[None]:
     """Hold the folder for this process alone, as far as the system can do that.
 
-    The lock ends with the process, however it ends.
+    The lock is a hidden file beside the folder, or inside, which is removed at the end, with parents of the folder that
+    were made for it and are empty. It ends with the process, however it ends; what is left of it then holds nobody up.
+
+    Parameters
+    ----------
+    folder : path
+        The folder, which need not be there.
+    inside : bool
+        Whether the folder is there to stay, and what is beside it perhaps somebody else's.
 
     Raises
     ------
     ResultError
         If another process holds it.
     """
+    target = Path(folder).resolve()
+    path = target / ".lock" if inside else target.with_name(f".{target.name}.lock")
+    made = [parent for parent in path.parents if not is_there(parent)]
+    handle = None
     try:
-        import fcntl
-    except ImportError:  # Windows
+        with suppress(OSError):  # whoever writes there will say what is wrong
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle = _only_holder(path, folder)
         yield
-        return
-    with (folder / ".lock").open("w") as file:
+    finally:
+        with suppress(OSError):
+            if handle is not None:
+                path.unlink()  # while it is held: whoever opens it from now on makes another
+                os.close(handle)
+            for parent in made:
+                parent.rmdir()
+
+
+def _only_holder(path: Path, folder: str | os.PathLike[str]) -> int | None:
+    """Open and lock a file; None where there are no locks."""
+    if fcntl is None:
+        return None
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), path.stat()):
+                    return handle
+            os.close(handle)  # its holder removed it before it was locked here
         except BlockingIOError:
+            os.close(handle)
             raise ResultError(
                 f"{folder}: another process is at work there; wait for it or name another folder"
             ) from None
         except OSError:  # a file system without locks
-            pass
-        yield
+            return handle
 
 
 # --------------------------------------------------------------------------------------------------------------- names
@@ -232,6 +313,7 @@ def claim_file(path: str | os.PathLike[str], suffixes: Sequence[str], *, overwri
         If its suffix is another, it exists, or its folder does not.
     """
     path = Path(path)
+    put_back(path)
     if path.suffix.lower() not in suffixes:
         known = ", ".join(suffixes)
         raise ResultError(f"{path}: the suffix {path.suffix!r} says no format that can be written; use one of {known}")
@@ -288,15 +370,17 @@ def write_csv(path: Path, columns: Sequence[str], rows: Sequence[Sequence[str]])
 
 
 def draw_into(folder: Path, drawings: Mapping[str, Callable[[Path], object]]) -> None:
-    """Make pictures and pages in a folder of results; what fails is a warning and costs none of the results."""
+    """Make pictures and pages in a folder of results, each whole; what fails is a warning, and costs no results."""
     for name, draw in drawings.items():
+        put_back(folder / name)
         try:
-            draw(folder / name)
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            with new_file(folder / name, flush=False) as partial:
+                draw(partial)
         except Exception as problem:  # whatever a library may not like about a name, a font or the memory
-            with suppress(OSError):
-                (folder / name).unlink(missing_ok=True)
+            cause = problem.__context__ if isinstance(problem.__context__, OSError) else problem
             warnings.warn(
-                f"{name} could not be made ({reason_of(problem)}); the rest of the results is complete",
+                f"{name} could not be made ({reason_of(cause)}); the rest of the results is complete",
                 PictureWarning,
                 stacklevel=3,
             )

@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError, way_to_install
-from meshsimp_pymoo.files import claim_file, new_file
+from meshsimp_pymoo.files import claim_file, draw_into, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
@@ -39,6 +39,7 @@ from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
+    PICTURES,
     even_selection,
     read_front,
     write_front,
@@ -509,10 +510,11 @@ class Front(Sequence[FrontSolution]):
         mesh_format: str = "ply",
         chosen: int | FrontSolution | None = None,
         refit: bool | Mapping[int, Refitted] = False,
+        pictures: bool = True,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
     ) -> Path:
-        """Write the front as ``meshsimp simplify`` does: numbers, pictures, the page, the record and meshes.
+        """Write the front as ``meshsimp simplify`` does: numbers, the record and meshes; then pictures and the page.
 
         Parameters
         ----------
@@ -529,8 +531,10 @@ class Front(Sequence[FrontSolution]):
         refit : bool or mapping
             Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
             :func:`~meshsimp_pymoo.surface.height.refit_heights`. Or only those of these solutions, found already.
+        pictures : bool
+            Go on to :meth:`draw`, once all else is in place.
         page : bool
-            Write ``report.html``, the page on which to look at the solutions and choose one.
+            With the page on which to look at the solutions and choose one.
         run : mapping, optional
             What else to record in run.json.
 
@@ -551,34 +555,13 @@ class Front(Sequence[FrontSolution]):
         def fitted(solution: int) -> Refitted | None:
             return self[solution].refitted if refit is True else refit.get(solution) if refit else None
 
-        def draw_front(path: Path) -> None:
-            from meshsimp_pymoo.report.figures import front_figure, panel_rows
-
-            F = self.F
-            shown = panel_rows([q.triangles for q in self.quality], row, knee(F))
-            figure = front_figure(
-                problem.surface,
-                F[:, [0, -1]],
-                [(solution, faces(solution)) for solution in shown],
-                knee=knee(F),
-                chosen=row,
-                measure=self.objectives[0],
-                series=self.series,
-            )
-            figure.savefig(path)
-
-        def draw_page(path: Path) -> None:
-            from meshsimp_pymoo.report.page import write_page
-
-            write_page(read_front(path.parent), problem, folder=folder, knee=knee(self.F))
-
         record = self.run | dict(run or {})
         record |= {
             "options": plain(problem.options),
             "rules": plain(problem.surface.rules),
             "objectives": list(problem.objectives),
         }
-        return write_front(
+        path = write_front(
             folder,
             problem.surface,
             self.quality,
@@ -590,9 +573,60 @@ class Front(Sequence[FrontSolution]):
             refit=fitted if refit is not False else None,
             series=self.series,
             run=record,
-            drawings={"front.png": draw_front} | ({"report.html": draw_page} if page else {}),
             overwrite=overwrite,
         )
+        if pictures:
+            Front.load(folder, model=problem.surface).draw(page=page)
+        return path
+
+    def draw(self, *, page: bool = True, missing: bool = False) -> None:
+        """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
+
+        Parameters
+        ----------
+        page : bool
+            Whether the page is made too.
+        missing : bool
+            Make only what is not there.
+
+        Raises
+        ------
+        ResultError
+            If the front is not stored, or its model is not where the record says.
+
+        Warns
+        -----
+        PictureWarning
+            If one of them cannot be made.
+        """
+        stored = self.folder
+        if stored is None:
+            raise ResultError("the front is not stored; save() it, which draws it too")
+        problem, F, chosen = self.problem, self.F, self.run.get("chosen")
+
+        def draw_front(path: Path) -> None:
+            from meshsimp_pymoo.report.figures import front_figure, panel_rows
+
+            figure = front_figure(
+                problem.surface,
+                F[:, [0, -1]],
+                [(row, self[row].faces) for row in panel_rows([q.triangles for q in self.quality], chosen, knee(F))],
+                knee=knee(F),
+                chosen=chosen,
+                measure=self.objectives[0],
+                series=self.series,
+            )
+            figure.savefig(path)
+
+        def draw_page(path: Path) -> None:
+            from meshsimp_pymoo.report.page import simplification_page
+
+            content = simplification_page(read_front(stored), problem, folder=stored, knee=knee(F))
+            path.write_bytes(content.encode("utf-8"))
+
+        drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
+        wanted = PICTURES if page else PICTURES[:1]
+        draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
 
     def stored_mesh(self, solution: int) -> Path | None:
         """Return the file of a solution's mesh in the front's folder; None if it was not written."""

@@ -39,7 +39,6 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
-    draw_into,
     new_folder,
     partial_folder,
     path_from,
@@ -68,10 +67,11 @@ SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", *COUNTED)
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
+PICTURES = ("front.png", "report.html")  # made once all else is in place
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 OWN_ENTRIES = (
-    "front.csv", "front.npz", "front.png", "run.json", "meshes",
-    "report.html", "tables", "figures", "times.csv", "refitted",
+    "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
+    "tables", "figures", "times.csv", "refitted",
     "nested.npz", "tiles", "series.csv",
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
@@ -177,7 +177,7 @@ def is_unfinished(folder: str | os.PathLike[str]) -> bool:
 
 def _of_unfinished(name: str) -> bool:
     stem = Path(CHECKPOINT).stem
-    return name in (CHECKPOINT, ".lock") or (name.startswith(f".{stem}.") and ".partial" in name)
+    return name == CHECKPOINT or (name.startswith(f".{stem}.") and ".partial" in name)
 
 
 def write_front(
@@ -193,10 +193,9 @@ def write_front(
     refit: Callable[[int], Refitted | None] | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
-    drawings: Mapping[str, Callable[[Path], object]] | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Write a front, its meshes and the record of its run to a new folder, all or nothing.
+    """Write a front, its meshes and the record of its run to a new folder, all or nothing, without pictures.
 
     Parameters
     ----------
@@ -229,9 +228,6 @@ def write_front(
         written to ``series.csv``.
     run : mapping, optional
         What to record in run.json beside the package versions and the model.
-    drawings : mapping of str to callable, optional
-        Pictures and pages by name, made once all else is written: called with the file to make. What fails is a
-        warning and costs none of the results.
     overwrite : bool
         Replace results that exist.
 
@@ -325,7 +321,6 @@ def write_front(
         (partial / "run.json").write_text(
             json.dumps(record, indent=2, default=_plain, allow_nan=False) + "\n", encoding="utf-8"
         )
-        draw_into(partial, drawings or {})
     return folder
 
 

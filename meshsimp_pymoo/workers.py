@@ -34,6 +34,9 @@ CONNECT_SECONDS = 30
 # Libraries that would start threads of their own beside the processes.
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
+# What a process that is starting does not hear: a terminal sends Ctrl-C to all, and the parent decides.
+HELD = (signal.SIGINT,)
+
 # Called as work(task, shared).
 Work = Callable[[Any, Any], Any]
 
@@ -191,19 +194,20 @@ class Processes:
 
     def close(self, *, give_up: bool = False) -> None:
         """End the processes; with ``give_up`` in the middle of what they do."""
-        pool, self._pool, self._shared = self._pool, None, None
+        pool = self._pool
         if pool is None:
             return
         if give_up:
             for process in list((pool._processes or {}).values()):
                 process.terminate()
+        self._pool, self._shared = None, None
         pool.shutdown(wait=True, cancel_futures=True)
 
     def __enter__(self) -> Processes:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, *error: object) -> None:
+        self.close(give_up=any(error))
 
     def _ready(self, shared: Any) -> ProcessPoolExecutor:
         """Return processes that know ``shared``."""
@@ -219,7 +223,8 @@ class Processes:
             )
             self._shared = shared
             # they are started by their first tasks, and inherit what is set now
-            started = [self._pool.submit(os.getpid) for _ in range(self.jobs)]
+            with _signals_held():
+                started = [self._pool.submit(os.getpid) for _ in range(self.jobs)]
             try:
                 wait(started)
                 started[0].result()
@@ -339,6 +344,8 @@ def _begin(shared: Any) -> None:
     global _shared
     _shared = shared
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, HELD)
     parent = multiprocessing.parent_process()
     if parent is not None:
         # a killed parent says nothing, and the pool's processes would wait for work for ever
@@ -354,6 +361,19 @@ def _end_with(sentinel: int) -> None:
 
 def _do(work: Work, task: Any) -> Any:
     return work(task, _shared)
+
+
+@contextlib.contextmanager
+def _signals_held() -> Iterator[None]:
+    """Have processes that are started in here begin with signals held back; this one gets them a moment later."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, HELD)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager

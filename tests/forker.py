@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,11 +24,16 @@ LONGEST = 100.0
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: its exit code, or minus the signal that ended it; what it said; the seconds it took."""
+    """How a command ended.
+
+    Its exit code, or minus the signal that ended it; what it said; the seconds it took; how many of its processes
+    outlived it.
+    """
 
     code: int
     stderr: str
     seconds: float
+    left: int
 
 
 class Forker:
@@ -43,10 +49,20 @@ class Forker:
         )
 
     def run(
-        self, *args: Any, kill_after: float | None = None, memory: int | None = None, die_in: str | None = None
+        self,
+        *args: Any,
+        kill_after: float | None = None,
+        signals: Sequence[tuple[float, int]] = (),
+        memory: int | None = None,
+        die_in: str | None = None,
     ) -> Ended:
-        """Run ``meshsimp ARGS``; kill it after some seconds, allow it so much more memory, or let it die in a call."""
-        request = {"args": [str(arg) for arg in args], "kill_after": kill_after, "memory": memory, "die_in": die_in}
+        """Run ``meshsimp ARGS``, with what is to happen to it.
+
+        It is killed or gets other signals after some seconds, is allowed so much more memory, or dies in a call.
+        """
+        if kill_after is not None:
+            signals = [(kill_after, signal.SIGKILL)]
+        request = {"args": [str(arg) for arg in args], "signals": list(signals), "memory": memory, "die_in": die_in}
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.process.stdin.write(json.dumps(request) + "\n")
@@ -89,17 +105,31 @@ def answer(request: dict[str, Any], said: Path) -> dict[str, Any]:
     child = os.fork()
     if child == 0:
         become(request, said)
-    limit = LONGEST if request["kill_after"] is None else request["kill_after"]
+    waiting = [*sorted(request["signals"]), (LONGEST, signal.SIGKILL)]
     done, status = 0, 0
-    while not done and time.perf_counter() - start < limit:
+    while not done:
         time.sleep(0.002)
         done, status = os.waitpid(child, os.WNOHANG)
-    if not done:
-        os.kill(child, signal.SIGKILL)
-        _, status = os.waitpid(child, 0)
+        if not done and time.perf_counter() - start >= waiting[0][0]:
+            os.kill(child, waiting.pop(0)[1])
     code = os.waitstatus_to_exitcode(status)
     seconds = time.perf_counter() - start
-    return {"code": code, "stderr": said.read_text() if said.exists() else "", "seconds": seconds}
+    text = said.read_text() if said.exists() else ""
+    return {"code": code, "stderr": text, "seconds": seconds, "left": left_of(child)}
+
+
+def left_of(group: int, patience: float = 20.0) -> int:
+    """Return how many processes of a group there still are after some seconds at most."""
+    until = time.perf_counter() + patience
+    while True:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return 0
+        if time.perf_counter() > until:
+            found = subprocess.run(["ps", "-eo", "pgid="], capture_output=True, text=True, check=True).stdout
+            return found.split().count(str(group))
+        time.sleep(0.02)
 
 
 def die(*_: Any, **__: Any) -> None:
@@ -109,6 +139,7 @@ def die(*_: Any, **__: Any) -> None:
 def become(request: dict[str, Any], said: Path) -> None:
     import traceback
 
+    os.setsid()
     with said.open("w") as file:
         os.dup2(file.fileno(), 2)
     sys.stderr = open(2, "w", buffering=1, closefd=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -143,7 +144,61 @@ def test_results_do_not_depend_on_the_standard_streams(tmp_path, streams, code):
         assert done.stderr.startswith("meshsimp: the results are in place, but cannot be printed (")
 
 
+# ------------------------------------------------------------------------------------------------ a bare container
+
+
+def test_in_a_container_where_nothing_but_the_results_folder_can_be_written(tmp_path, roof):
+    """All is read-only but one folder: no home, no temporary files, no cache; closed streams; the C locale."""
+    work = tmp_path / "work"
+    work.mkdir()
+    read_only = 'mount --bind "$0" "$0" && mount -o remount,ro,bind / && cd / && exec "$@"'
+    jail = ["unshare", "--user", "--map-root-user", "--mount", "bash", "-c", read_only, str(work)]
+    if shutil.which("unshare") is None or subprocess.run([*jail, "true"], capture_output=True).returncode:
+        pytest.skip("needs the right to make what is mounted read-only")
+    environment = {"PATH": os.environ["PATH"], "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    environment |= {"HOME": "/nowhere", "TMPDIR": "/nowhere"}
+
+    def run(*args, streams=""):
+        command = f"exec '{sys.executable}' -m meshsimp_pymoo {shlex.join(map(str, args))} {streams}"
+        call = [*jail, "bash", "-c", command]
+        return subprocess.run(call, capture_output=True, text=True, env=environment, timeout=120)
+
+    path = roof.with_name("roofs = 1.ply")
+    roof.rename(path)
+    told = run("info", path, streams="<&-")
+    assert (told.returncode, told.stderr) == (0, "")
+    assert "usable: an open height field" in told.stdout
+    done = run("simplify", path, "-o", work / "out", *QUICK, streams="<&- >&-")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("\n") <= 1, done.stderr
+    assert main(["simplify", str(path), "-o", str(tmp_path / "usual"), *QUICK, "--quiet"]) == 0
+    for name in ("front.csv", "front.npz", "front.png"):
+        assert (work / "out" / name).read_bytes() == (tmp_path / "usual" / name).read_bytes()
+    assert (work / "out" / "report.html").is_file()
+    assert [entry.name for entry in work.iterdir()] == ["out"]
+    assert not [entry for entry in (work / "out").iterdir() if entry.name.startswith(".")]
+
+
 # ------------------------------------------------------------------------------------------------ signals
+
+
+@needs_posix
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_signal_while_compiling_is_answered_at_once_and_leaves_nothing(tmp_path, number, code):
+    command = [*PROGRAM, "simplify", "roof:5", "-o", str(tmp_path / "out")]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    how = {"stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    with subprocess.Popen(command, env=environment, **how) as process:
+        assert process.stderr.readline().startswith("meshsimp: compiling once for this machine")
+        time.sleep(0.5)
+        process.send_signal(number)
+        assert process.stderr.readline() == "meshsimp: stopping\n"
+        assert process.stderr.read() == "meshsimp: interrupted; nothing is written\n"
+    assert process.returncode == code
+    with pytest.raises(ProcessLookupError):  # the second process, which compiles too, has ended
+        os.killpg(process.pid, 0)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["cache"]
+
 
 
 @needs_posix
@@ -155,7 +210,7 @@ def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):
         process.send_signal(number)
         out, err = process.communicate(timeout=60)
     assert process.returncode == code, err
-    assert err.startswith("meshsimp: interrupted after ")
+    assert err.startswith("meshsimp: stopping: the front so far is written next\nmeshsimp: interrupted after ")
     assert json.loads(out)["solutions"] == len(read_front(tmp_path / "out").F) > 10
     assert json.loads((tmp_path / "out" / "run.json").read_text())["interrupted"]
 

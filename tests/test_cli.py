@@ -416,7 +416,7 @@ def test_a_terminal_sees_progress_in_short_lines(tmp_path, monkeypatch):
     assert run("simplify", deep / "roof.ply", "-o", tmp_path / "out", *QUICK, *PAPERS) == 0
     shown = re.sub(r"\x1b\[[0-9;]*m", "", sys.stderr.getvalue())
     lines = [line.strip() for line in re.split(r"\x1b|[\r\n]", shown) if "left" in line]
-    assert re.fullmatch(r"\[2Kroof\.ply \S+ +\d+ % \d+ s left; writing", lines[-1])
+    assert re.fullmatch(r"\[2Kroof\.ply \S+ +\d+ % \d+ s left; drawing", lines[-1])
     assert "a_folder_with_a_long_name" not in shown
 
 
@@ -475,14 +475,29 @@ def test_a_run_interrupted_before_its_first_generation_writes_nothing(tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_interruption_while_writing_leaves_nothing_half_written(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("place", ["storage.write_npz", "report.figures.front_figure"])
+def test_an_interruption_while_writing_leaves_nothing_half_written(tmp_path, monkeypatch, capsys, place):
     def interrupt(*args, **kwargs):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("meshsimp_pymoo.report.figures.front_figure", interrupt)
-    assert run("simplify", "roof:9", "-o", tmp_path / "out", *QUICK) == 130
-    assert "nothing is written" in one_line(capsys)
-    assert list(tmp_path.iterdir()) == []
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        patch.setattr(f"meshsimp_pymoo.{place}", interrupt)
+        assert run("simplify", "roof:9", "-o", out, *QUICK) == 130
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    if "write" in place:
+        assert "nothing is written" in said
+        assert list(tmp_path.iterdir()) == []
+        return
+    assert f"interrupted while it was drawn; {out} holds the results: meshsimp report {out}" in said
+    assert len(read_front(out).F) > 1
+    assert not (out / "front.png").exists()
+    assert run("simplify", "roof:9", "-o", out, *QUICK, "--seed", "3") == 2  # another search
+    assert "exists already" in one_line(capsys)
+    assert run("simplify", "roof:9", "-o", out, *QUICK) == 0
+    assert "holds the results of this search; making the pictures that are missing" in capsys.readouterr().err
+    assert {"front.png", "report.html"} < {path.name for path in out.iterdir()}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to one process")

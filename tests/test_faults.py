@@ -5,6 +5,8 @@ what happens                       what follows
 ================================== =====================================================================================
 killed at random moments           the same command goes on, to the same bytes (simplify, run)
 killed while results are written   the same command goes on from the end of the search; nothing is left besides
+killed while they are drawn        the results are in place; the same command draws what is missing
+SIGTERM, Ctrl-C at random moments  answered at once; the same command ends with the same bytes; no process is left
 disk full                          one warning, the search goes on; where results do not fit: one line, exit code 2, the
                                    checkpoint stays, the same command completes
 folder gone in mid-run             it is made again
@@ -23,8 +25,11 @@ import json
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import sys
+import time
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -32,11 +37,15 @@ import pytest
 from pymoo.algorithms.moo.nsga2 import NSGA2
 
 from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.cli.terminal import answering, interrupted_code, interruptible, is_interrupted
 from meshsimp_pymoo.comparison import runner
 from meshsimp_pymoo.comparison.config import read_experiment_file
+from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.search import checkpoint
 from meshsimp_pymoo.storage import CHECKPOINT, read_front
+from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.tiles.grid import open_grid
 
 sys.path.insert(0, str(Path(__file__).parent))
 from forker import Forker
@@ -187,7 +196,7 @@ def test_ten_kills_at_random_moments_change_no_byte(tmp_path, forker):
     out, kills, continued = tmp_path / "out", 0, 0
     moments = random.Random(6)
     while kills < 10:
-        found = (out / CHECKPOINT).exists()
+        found = (out / CHECKPOINT).exists() or (out / "front.csv").exists()
         ended = forker.run(*options, "-o", out, kill_after=moments.uniform(0.03, 0.6) * undisturbed.seconds)
         assert ended.code in (0, -9), ended.stderr
         kills += ended.code == -9
@@ -208,7 +217,8 @@ def test_killed_while_the_results_are_written(tmp_path, forker, whole, monkeypat
     options = ("simplify", *SEARCH, *PLAIN, *BUDGET, "-o", out)
     dead = forker.run(*options, die_in=f"meshsimp_pymoo.{place}")
     assert dead.code == -9, dead.stderr
-    assert not (out / "front.csv").exists()
+    assert (out / "front.csv").exists() == ("figure" in place)  # results come before pictures
+    assert (out / CHECKPOINT).exists() != ("figure" in place)
     assert forker.run(*options).code == 0
     assert reproducible(out) == whole
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
@@ -222,17 +232,17 @@ def test_killed_between_moving_the_old_folder_away_and_the_new_one_in(tmp_path, 
     options = ("--overwrite",) if results else ()
     stopped(out, monkeypatch, 6, *options)
     out.rename(tmp_path / ".out.0123abcd.old")
-    (tmp_path / ".out.4567abcd.partial").mkdir()
+    (tmp_path / ".out.0123abcd.partial").mkdir()
     assert simplify(out, *options) == 0
     assert reproducible(out) == whole
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
 def test_a_folder_that_is_there_is_not_replaced_by_what_stands_aside(tmp_path):
-    (tmp_path / "out").mkdir()
-    (tmp_path / ".out.0123abcd.old").mkdir()
-    put_back(tmp_path / "out", tidy=True)
-    assert sorted(entry.name for entry in tmp_path.iterdir()) == [".out.0123abcd.old", "out"]
+    for name in ("out", ".out.0123abcd.old", ".out.0123abcd.partial"):
+        (tmp_path / name).mkdir()
+    put_back(tmp_path / "out")
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_old_results_stay_until_the_new_ones_are_there(tmp_path, whole, monkeypatch, capsys):
@@ -310,6 +320,157 @@ def test_ctrl_c_while_writing_keeps_the_search(tmp_path, whole, monkeypatch, cap
     assert reproducible(out) == whole
 
 
+# ------------------------------------------------------------------------------------------------ signals at any moment
+
+GRID = ("--tile", "64", "--triangles", "200", "--meshes", "2", "--jobs", "1", "--threads", "1", "--quiet")
+ENDINGS = {"killed": [signal.SIGKILL], "terminated": [signal.SIGTERM], "interrupted": [signal.SIGINT]}
+ENDINGS["interrupted twice"] = [signal.SIGINT, signal.SIGINT]
+
+
+@pytest.fixture(scope="module")
+def commands(tmp_path_factory):
+    """Return what is done at random moments, each small, by name: the arguments but for the folder."""
+    folder = tmp_path_factory.mktemp("models")
+    heights = open_grid(build_model(load("jacksboro:2"))).heights[:20, :100].astype(np.float32)
+    np.save(folder / "relief.npy", heights)
+    (folder / "tiny.yaml").write_text(CONFIG.replace("seeds: [1, 2]", "seeds: [1]"), encoding="utf-8")
+    often = ("--checkpoint", "0.02s")
+    return {
+        "simplify": ("simplify", *SEARCH, *PLAIN, "--evaluations", "2000", *often),
+        "tiles": ("simplify", folder / "relief.npy", *GRID),
+        "run": ("run", folder / "tiny.yaml", "--quiet", "--jobs", "1", *often),
+    }
+
+
+def same_bytes(folder):
+    """Return what does not depend on the time that anything took."""
+    found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+    varies = ("run.json", "times.csv", "times.md", "report.html")
+    kept = {name: path.read_bytes() for name, path in found.items() if name not in varies}
+    for name in [name for name in kept if name.startswith("runs/") and name.endswith(".json")]:
+        record = json.loads(kept[name])
+        kept[name] = tuple(record[key] for key in ("generations", "evaluations", "arrays_sha256", "description"))
+    return kept
+
+
+@pytest.mark.parametrize("trials", [5, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["simplify", "tiles", "run"])
+def test_signals_at_random_moments_change_no_byte_and_leave_nothing(tmp_path, forker, commands, name, trials):
+    command, moments = commands[name], random.Random(13)
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    undisturbed = forker.run(*command, "-o", whole)
+    assert undisturbed.code == 0, undisturbed.stderr
+    kinds = list(ENDINGS) * (trials if trials > 5 else 2)
+    for kind in kinds[1 if trials == 5 else 0 :][: trials * (4 if trials > 5 else 1)]:
+        moment = moments.uniform(0.0, 1.0) * undisturbed.seconds
+        signals = [(moment + moments.uniform(0.0, 0.2) * k, number) for k, number in enumerate(ENDINGS[kind])]
+        ended = forker.run(*command, "-o", out, signals=signals)
+        expected = {"killed": -9, "terminated": 143}.get(kind, 130)
+        assert ended.code in (0, expected, -signals[0][1]), (kind, ended)  # it may be over, or not have begun
+        assert "Traceback" not in ended.stderr
+        assert ended.left == 0
+        if kind != "killed":
+            assert {entry.name for entry in tmp_path.iterdir()} <= {"out", "whole"}
+        if name == "simplify" and (out / "run.json").exists() and kind != "killed":
+            # a front so far is whole, and of another budget than the undisturbed one
+            assert read_front(out).run["interrupted"] == (ended.code != 0) or not (out / "front.png").exists()
+            if read_front(out).run["interrupted"]:
+                shutil.rmtree(out)
+        # all may be done before the signal was heard; then the folder is whole, and no other call begins in it
+        is_whole = name != "run" and ended.code != 2 and (out / "front.png").exists()
+        if ended.code == 0 or is_whole:
+            assert same_bytes(out) == same_bytes(whole)
+            shutil.rmtree(out)
+    last = forker.run(*command, "-o", out)
+    assert last.code == 0, last.stderr
+    assert same_bytes(out) == same_bytes(whole)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["out", "whole"]
+
+
+@pytest.mark.parametrize("kind", ["terminated", "killed"])
+def test_an_experiment_that_is_ended_leaves_no_process(tmp_path, forker, kind):
+    config = tmp_path / "long.yaml"
+    config.write_text(CONFIG.replace("generations: 20", "generations: 20000"), encoding="utf-8")
+    command = ("run", config, "--quiet", "--jobs", "2")
+    ended = forker.run(*command, "-o", tmp_path / "out", signals=[(3.0, number) for number in ENDINGS[kind]])
+    assert ended.code == {"terminated": 143, "killed": -9}[kind], ended.stderr
+    assert ended.left == 0
+    if kind == "terminated":
+        assert ended.stderr.startswith("meshsimp: stopping")
+
+
+@pytest.mark.parametrize("name", ["simplify", "tiles"])
+def test_a_second_search_for_a_folder_is_refused_before_it_begins(tmp_path, commands, capsys, monkeypatch, name):
+    monkeypatch.setattr("meshsimp_pymoo.cli.searching.MeshProblem", None)
+    monkeypatch.setattr("meshsimp_pymoo.cli.tiling.open_grid", None)
+    with locked(tmp_path / "deep" / "out"):
+        assert run(*commands[name], "-o", tmp_path / "deep" / "out") == 2
+    said = one_line(capsys)
+    assert "out: another process is at work there; wait for it or name another folder" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_is_answered_while_a_kernel_runs(tmp_path):
+    """The word comes at once, from another thread; what it asks for comes when the kernel is done."""
+    code = """if True:
+        import os, signal, threading, time
+        import numba
+        import numpy as np
+        from meshsimp_pymoo.cli.terminal import answering, interruptible
+        from meshsimp_pymoo.compiling.functions import OPTIONS
+
+        @numba.njit(**OPTIONS)
+        def kernel(number, state):
+            for k in range(number):
+                state[0] = (state[0] * 6364136223846793005 + k) % 1000003
+        kernel(1, np.ones(1, np.int64))
+        state = np.ones(1, np.int64)
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
+        try:
+            with interruptible(), answering("stopping soon"):
+                kernel(400_000_000, state)
+                time.sleep(0)
+        except KeyboardInterrupt:
+            print("stopped", flush=True)
+    """
+    call = [sys.executable, "-c", code]
+    with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
+        assert process.stderr.readline() == "meshsimp: stopping soon\n"
+        answered = time.perf_counter()
+        assert process.stdout.readline() == "stopped\n"
+        assert time.perf_counter() - answered > 0.2  # the kernel was still at work
+
+
+def test_a_signal_that_meets_a_place_that_can_raise_nothing_is_raised_after_it(capsys):
+    class Thing:
+        pass
+
+    thing = Thing()
+    _held = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+    with interruptible():
+        del thing
+        with pytest.raises(KeyboardInterrupt):
+            time.sleep(5.0)
+        assert interrupted_code() == 130
+    assert capsys.readouterr().err == "meshsimp: stopping\n"
+
+
+def test_signals_are_answered_in_turn_and_the_last_answer_stops():
+    with interruptible():
+        with answering("first", "second", "stop"):
+            for _ in range(2):
+                signal.raise_signal(signal.SIGINT)
+            assert is_interrupted()
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)  # what ends can end
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGTERM)
+        assert not is_interrupted()
+        assert interrupted_code() == 130
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 # -------------------------------------------------------------------------------------------- disk and folder: simplify
 
 
@@ -339,7 +500,7 @@ def test_disk_full_while_writing_is_one_line_and_the_rerun_completes(tmp_path, w
     said = one_line(capsys)
     assert "out: cannot be written (File too large); make room" in said
     assert "the same command goes on from the checkpoint" in said
-    assert sorted(entry.name for entry in out.iterdir()) == [".lock", CHECKPOINT]
+    assert [entry.name for entry in out.iterdir()] == [CHECKPOINT]
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
     assert simplify(out) == 0
     assert reproducible(out) == whole

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import errno
 import os
+import subprocess
+import sys
 
 import pytest
 
+from meshsimp_pymoo import files
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.files import left_beside, new_file, new_folder, put_back, put_text
+from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, put_back, put_text
 
 
 def entries(folder):
@@ -31,6 +34,7 @@ def full():
     return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+needs_locks = pytest.mark.skipif(sys.platform == "win32", reason="no locks, by which a dead process is known")
 TROUBLES = [ValueError("no"), KeyboardInterrupt(), SystemExit(1)]
 
 
@@ -67,7 +71,7 @@ def test_a_file_that_cannot_be_written_is_one_line_with_the_way_out(tmp_path):
     with pytest.raises(ResultError, match=r"mesh\.ply: cannot be written \([^\n]*\); name another file$"):
         write(new_file(path), full())
     with pytest.raises(ResultError, match=r"cannot be written \(.*\); make room$"), new_file(path, way_out="make room"):
-        pass  # nothing was written
+        raise full()
     with pytest.raises(ResultError, match=r"no/mesh\.ply: cannot be written"):
         write(new_file(tmp_path / "no" / "mesh.ply"))
     (tmp_path / "folder").mkdir()
@@ -155,31 +159,128 @@ def test_a_failed_change_of_places_puts_the_old_folder_back(tmp_path, monkeypatc
 def test_the_old_folder_comes_back_where_a_process_was_killed_between_two_renames(tmp_path):
     (tmp_path / ".out.0123abcd.old").mkdir()
     (tmp_path / ".out.0123abcd.old" / "front.csv").touch()
-    (tmp_path / ".out.4567abcd.partial").mkdir()
-    assert [path.name for path in left_beside(tmp_path / "out", "old")] == [".out.0123abcd.old"]
+    (tmp_path / ".out.0123abcd.partial").mkdir()
     put_back(tmp_path / "out")
-    assert entries(tmp_path) == [".out.4567abcd.partial", "out", "out/front.csv"]
-    put_back(tmp_path / "out", tidy=True)
     assert entries(tmp_path) == ["out", "out/front.csv"]
-    put_back(tmp_path / "other", tidy=True)  # nothing to do
+    put_back(tmp_path / "other")  # nothing to do
     assert entries(tmp_path) == ["out", "out/front.csv"]
 
 
-def test_what_a_folder_replaced_before_its_process_was_killed_is_removed_where_it_is_made_anew(tmp_path):
+def test_an_old_folder_is_removed_where_the_new_one_took_its_place_and_there_alone(tmp_path):
     (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "new").touch()
-    (tmp_path / ".out.0123abcd.old" / "tables").mkdir(parents=True)
-    put_back(tmp_path / "out", tidy=True)
-    assert len(left_beside(tmp_path / "out", "old")) == 1  # perhaps nobody has these results elsewhere
-    put_back(tmp_path / "out", tidy=True, replaced=True)
-    assert entries(tmp_path) == ["out", "out/new"]
+    (tmp_path / "out" / "mine").touch()
+    (tmp_path / ".out.0123abcd.old").mkdir()
+    (tmp_path / ".out.0123abcd.partial").mkdir()
+    put_back(tmp_path / "out")  # somebody made that folder meanwhile
+    assert entries(tmp_path) == [".out.0123abcd.old", ".out.0123abcd.partial", "out", "out/mine"]
+    (tmp_path / ".out.0123abcd.partial").rmdir()
+    put_back(tmp_path / "out")
+    assert entries(tmp_path) == ["out", "out/mine"]
+
+
+@pytest.mark.parametrize("name", ["out", "out.v1", "mesh.ply"])
+@needs_locks
+def test_what_dead_processes_left_is_removed_and_what_living_ones_write_is_not(tmp_path, name):
+    new, path = (new_file, tmp_path / name) if name.endswith("ply") else (new_folder, tmp_path / name)
+    with new(path) as partial:
+        if new is new_file:
+            partial.write_text("new")
+        dead = partial.with_name(partial.name.replace(partial.name.split(".")[2], "0123abcd"))
+        assert dead != partial
+        dead.mkdir() if new is new_folder else dead.touch()
+        assert sorted(left_beside(path, "partial")) == sorted([partial, dead])
+        put_back(path)
+        assert left_beside(path, "partial") == [partial]
+    assert entries(tmp_path) == [name]
+
+
+DIE = """
+import os, signal, sys
+from pathlib import Path
+from meshsimp_pymoo import files
+out, number, calls, rename = Path(sys.argv[1]), int(sys.argv[2]), [], os.rename
+def act(kind):
+    def acted(*args, **kwargs):
+        calls.append(kind)
+        if len(calls) == number:
+            os.kill(os.getpid(), getattr(signal, sys.argv[3]))
+        return kind(*args, **kwargs)
+    return acted
+for place, name in ((Path, "rename"), (files, "_flush"), (files.shutil, "rmtree"), (Path, "replace"), (Path, "unlink")):
+    setattr(place, name, act(getattr(place, name)))
+with files.new_folder(out, replace=True) as partial:
+    (partial / "new").touch()
+with files.new_file(out / "text") as partial:
+    partial.write_text("new")
+"""
+
+
+@needs_locks
+@pytest.mark.parametrize("kind", ["SIGKILL", "SIGINT"])
+def test_whatever_moment_a_process_is_killed_at_there_is_a_whole_folder_and_then_nothing_beside(tmp_path, kind):
+    found = set()
+    for number in range(1, 30):
+        out = tmp_path / str(number) / "out"
+        out.mkdir(parents=True)
+        (out / "old").touch()
+        done = subprocess.run([sys.executable, "-c", DIE, out, str(number), kind], stderr=subprocess.DEVNULL)
+        if kind == "SIGINT":
+            assert out.is_dir()  # it could put back what was there
+        put_back(out)
+        put_back(out / "text")
+        assert [path.name for path in out.parent.iterdir()] == ["out"]
+        found.add(tuple(entries(out)))
+        if done.returncode == 0:
+            break
+    assert done.returncode == 0
+    assert found == {("old",), ("new",), ("new", "text")}
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_lock_ends_with_its_process_and_is_not_left(tmp_path, inside):
+    out = tmp_path / "results" / "out"
+    if inside:
+        out.mkdir(parents=True)
+    before = entries(tmp_path)
+    with locked(out, inside=inside):
+        if sys.platform != "win32":
+            assert len([name for name in entries(tmp_path) if name.endswith(".lock")]) == 1
+            with (
+                pytest.raises(ResultError, match="out: another process is at work there; wait for it"),
+                locked(out, inside=inside),
+            ):
+                pass
+    assert entries(tmp_path) == before
+    (out if inside else out.parent).mkdir(parents=True, exist_ok=True)
+    left = out / ".lock" if inside else out.with_name(".out.lock")
+    left.touch()  # of a killed process
+    with locked(out, inside=inside):
+        pass
+    assert not left.exists()
+
+
+@needs_locks
+def test_a_lock_that_its_holder_removed_before_it_was_held_is_none(tmp_path, monkeypatch):
+    flock, left = files.fcntl.flock, [tmp_path / ".out.lock"]
+
+    def late(*args):
+        if left:
+            left.pop().unlink()  # its holder has ended
+        flock(*args)
+
+    monkeypatch.setattr(files.fcntl, "flock", late)
+    with locked(tmp_path / "out"):
+        assert (tmp_path / ".out.lock").exists()
+        with pytest.raises(ResultError, match="another process"), locked(tmp_path / "out"):
+            pass
+    assert entries(tmp_path) == []
 
 
 def test_only_a_folder_s_own_remains_are_touched(tmp_path):
     others = [".out.2.0123abcd.partial", ".outer.0123abcd.partial", ".out.0123abc.partial", ".out.0123abcg.partial"]
     for name in others:
         (tmp_path / name).mkdir()
-    put_back(tmp_path / "out", tidy=True)
+    put_back(tmp_path / "out")
     assert entries(tmp_path) == sorted(others)
     (tmp_path / ".[ab].0123abcd.old").mkdir()
     put_back(tmp_path / "a")  # the name is no pattern

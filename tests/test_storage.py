@@ -147,16 +147,17 @@ def test_foreign_files_are_never_deleted(tmp_path, model, solutions):
     assert files(folder) == before
 
 
-def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_path, model, solutions):
+def test_an_old_result_survives_a_failure_while_its_successor_is_written(tmp_path, model, solutions, monkeypatch):
     folder = write_solutions(tmp_path / "out", model, solutions)
     before = files(folder)
 
-    def fail(picture):
-        assert picture.with_name("front.csv").exists()
+    def fail(path, **_):
+        assert path.with_name("front.csv").exists()
         raise KeyboardInterrupt
 
+    monkeypatch.setattr("meshsimp_pymoo.storage.write_npz", fail)
     with pytest.raises(KeyboardInterrupt):
-        write_solutions(folder, model, solutions, drawings={"front.png": fail}, overwrite=True)
+        write_solutions(folder, model, solutions, overwrite=True)
     assert files(folder) == before
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 

@@ -18,24 +18,28 @@ is quick.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import NoReturn
 
 from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
+    ENDING,
     INTERRUPTED,
     OK,
     interrupted_code,
     interruptible,
+    matplotlib_silent,
     say,
     warnings_as_lines,
 )
 from meshsimp_pymoo.errors import InputError
 
-__all__ = ["main"]
+__all__ = ["main", "program"]
 
 NO_MEMORY = "the work does not fit into memory; take a part of the model, a smaller population, or tiles (--tile)"
 # What Python says where there is no room for the stack of another thread.
@@ -58,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     _open_streams()
     try:
         args = make_parser().parse_args(argv)
-        with warnings_as_lines(), interruptible():
+        with warnings_as_lines(), matplotlib_silent(), interruptible():
             code = int(args.command(args))
             sys.stdout.flush()
             return interrupted_code() if code == INTERRUPTED else code
@@ -80,6 +84,14 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         say(" ".join(str(problem).split()))
         return BAD_INPUT
+
+
+def program() -> NoReturn:
+    """Be the shell command: once :func:`main` is done, no signal changes what came of it."""
+    code = main()
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    sys.exit(code)
 
 
 def _open_streams() -> None:

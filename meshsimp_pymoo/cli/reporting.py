@@ -6,34 +6,33 @@ import json
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.terminal import OK, bar, tell
+from meshsimp_pymoo.cli.terminal import OK, bar, place_for_matplotlib, tell, there
 from meshsimp_pymoo.comparison.report import write_report
 from meshsimp_pymoo.front import Front
-from meshsimp_pymoo.indicators import knee
-from meshsimp_pymoo.report.page import write_page
-from meshsimp_pymoo.storage import read_front
+from meshsimp_pymoo.storage import PICTURES
 
 
 def report_on_front(out: Path, model: str | None, *, quiet: bool, as_json: bool) -> int:
-    """Make the page of a front anew; return the exit code."""
+    """Make the picture and the page of a front anew; return the exit code."""
     front = Front.load(out, model=model)
-    path = write_page(read_front(out), front.problem, folder=out, knee=knee(front.F))
+    with place_for_matplotlib(out):
+        front.draw()
     if as_json:
-        tell(json.dumps({"page": str(path), "solutions": len(front)}, indent=2))
+        tell(json.dumps({"page": str(out / "report.html"), "solutions": len(front)}, indent=2))
     elif not quiet:
-        tell(f"written: {path} ({len(front)} solutions)")
+        tell(f"written: {out}: {there(out, *PICTURES)} ({len(front)} solutions)")
     return OK
 
 
 def report_on_experiment(out: Path, facts: dict[str, Any], *, quiet: bool, as_json: bool) -> int:
     """Make the report of an experiment anew; return the exit code."""
-    with bar(quiet, "report") as show:
+    with bar(quiet, "report") as show, place_for_matplotlib(out):
         study = write_report(out, progress=lambda done, total, text: show(done / max(total, 1), text))
     if as_json:
         summary = {"folder": str(out), **facts, "runs": len(study.all_runs), "missing": len(study.missing)}
         tell(json.dumps(summary, indent=2))
     elif not quiet:
         left_out = f", {len(study.missing)} runs are missing" if study.missing else ""
-        files = "report.html, findings.md, tables, figures, times.csv"
+        files = there(out, "report.html", "findings.md", "times.csv") + ", tables, figures"
         tell(f"written: {out}: {files} ({len(study.all_runs):,} runs{left_out})")
     return OK

@@ -6,7 +6,6 @@ import json
 import re
 import time
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -20,13 +19,18 @@ from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
+    DRAWING,
     INTERRUPTED,
     OK,
     TARGET_MISSED,
+    WRITING,
     Stages,
+    answering,
     described,
     front_in_words,
     in_unit,
+    is_interrupted,
+    place_for_matplotlib,
     say,
     stop_if_interrupted,
     tell,
@@ -50,7 +54,15 @@ from meshsimp_pymoo.search.memetic import sweep_generations
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
 from meshsimp_pymoo.search.time_limit import WholeGenerations, spread
 from meshsimp_pymoo.settings import plain
-from meshsimp_pymoo.storage import CHECKPOINT, claim_output, even_selection, is_unfinished, package_versions
+from meshsimp_pymoo.storage import (
+    CHECKPOINT,
+    PICTURES,
+    claim_output,
+    even_selection,
+    is_unfinished,
+    package_versions,
+    read_front,
+)
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.surface.units import known_units, reference_system
@@ -63,7 +75,14 @@ WRITING_SECONDS = (1.4, 0.02)
 
 
 def simplify(request: Request, shown: Stages) -> int:
-    """Search the front of a model and write it to a new folder; return the exit code."""
+    """Search the front of a model and write it to a new folder, which is held meanwhile; return the exit code."""
+    folder = request.output.folder
+    with locked(folder):
+        put_back(folder)
+        return _simplify(request, shown)
+
+
+def _simplify(request: Request, shown: Stages) -> int:
     search, output = request.search, request.output
     if wants_tiles(request):
         try:
@@ -77,7 +96,9 @@ def simplify(request: Request, shown: Stages) -> int:
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     else:
         refuse_alone(request.tiling)
-    _claim(output, search)
+    is_drawn_only = _lacks_pictures(request)
+    if not is_drawn_only:
+        _claim(output, search)
     measure = OBJECTIVES[request.rules.measure]
     if PRESETS[search.algorithm].sums_only and not measure.is_sum:
         others = [name for name, preset in PRESETS.items() if preset.whole_front and not preset.sums_only]
@@ -95,7 +116,10 @@ def simplify(request: Request, shown: Stages) -> int:
         compiled.finish()
         _refuse_impossible(problem, request.wish)
     shown.expect("writing", WRITING_SECONDS[0] + WRITING_SECONDS[1] * problem.n_var**0.5)
-    with Keeper(problem, request, {"read_seconds": read_seconds, "compile_seconds": compiled.seconds}) as keeper:
+    keeper = Keeper(problem, request, {"read_seconds": read_seconds, "compile_seconds": compiled.seconds})
+    if is_drawn_only:
+        return _hand_over(_stored(keeper), keeper, shown)
+    with answering(*WRITING):
         found = _search(problem, keeper, shown)
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
@@ -103,9 +127,22 @@ def simplify(request: Request, shown: Stages) -> int:
         return _write(found, keeper, shown)
 
 
+def _lacks_pictures(request: Request) -> bool:
+    """Tell whether the folder holds the results of this very search, but not all pictures: they were not finished."""
+    folder, output = request.output.folder, request.output
+    wanted = PICTURES if output.page else PICTURES[:1]
+    if output.overwrite or not (folder / "front.csv").is_file() or all((folder / name).exists() for name in wanted):
+        return False
+    try:
+        run = read_front(folder).run
+    except ResultError:
+        return False
+    what = {"settings": request.recorded | budget(request.search), "seed": request.search.seed, "interrupted": False}
+    return not difference({name: run.get(name) for name in what}, what)
+
+
 def _claim(output: Output, search: Search) -> None:
     """Check the folder to make: a new one, one with a checkpoint, or with ``--overwrite`` one with old results."""
-    put_back(output.folder)
     goes_on = search.checkpoint is not None or not (output.folder / CHECKPOINT).exists()
     if not (is_unfinished(output.folder) and goes_on):
         claim_output(output.folder, overwrite=output.overwrite)
@@ -175,11 +212,12 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
 def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | None:
     """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
     timed = keeper.request.search.time is not None
-    with shown.stage("searching", "searching") as show:
-        algorithm, before = keeper.begin()
-        start = time.perf_counter()
-        found, generations, interrupted = algorithm.opt, (algorithm.n_iter or 1) - 1, False
-        try:
+    found, generations, interrupted = None, 0, False
+    try:
+        with answering("stopping: the front so far is written next"), shown.stage("searching", "searching") as show:
+            algorithm, before = keeper.begin()
+            start = time.perf_counter()
+            found, generations = algorithm.opt, (algorithm.n_iter or 1) - 1
             while algorithm.has_next():
                 stop_if_interrupted()
                 algorithm.next()
@@ -188,11 +226,12 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
                 show(0.0 if timed else algorithm.termination.perc, words)  # the clock knows better
                 keeper.keep()
             keeper.keep(last=True)
-        except KeyboardInterrupt:
-            interrupted = True
-        seconds = before + time.perf_counter() - start
+            stop_if_interrupted()
+    except KeyboardInterrupt:
+        interrupted = True
     if found is None:
         return None
+    seconds = before + time.perf_counter() - start
     try:
         # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
         front = Front.from_subsets(problem, np.asarray(found.get("X"), dtype=bool), ends=True)
@@ -206,7 +245,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
 
 
 class Keeper:
-    """The checkpoints of a search, in the folder of its results; it holds the folder as long as there is one.
+    """The checkpoints of a search, in the folder of its results.
 
     Parameters
     ----------
@@ -225,16 +264,10 @@ class Keeper:
         self.output = request.output
         self.before = before
         self.path = self.output.folder / CHECKPOINT
-        self.is_held = False
+        #: Whether the folder holds a checkpoint of this search.
+        self.is_kept = False
         self._checkpoints: Checkpoints | None = None
-        self._until_done = ExitStack()
         self._warned = False
-
-    def __enter__(self) -> Keeper:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._until_done.close()
 
     @property
     def what(self) -> dict[str, Any]:
@@ -257,9 +290,9 @@ class Keeper:
         if interval is None:
             return algorithm, before
         if self.path.exists():
-            self._hold()
             try:
                 before = self._go_on(algorithm)
+                self.is_kept = True
             except CheckpointError as problem:
                 if not self.output.overwrite:
                     raise ResultError(
@@ -288,11 +321,11 @@ class Keeper:
     def keep(self, *, last: bool = False) -> None:
         """Save the state if it is time; at the end of the search, if it was long enough to be worth it."""
         checkpoints = self._checkpoints
-        if checkpoints is None or not (checkpoints.due() or (last and self.is_held)):
+        if checkpoints is None or not (checkpoints.due() or (last and self.is_kept)):
             return
         try:
-            self._hold()
             checkpoints.save()
+            self.is_kept = True
         except (CheckpointError, NotResumable, OSError) as problem:
             self._warn(problem)
 
@@ -302,15 +335,6 @@ class Keeper:
             say(f"warning: {problem}; the search goes on without a checkpoint")
         self._warned = True
 
-    def _hold(self) -> None:
-        """Make the folder, if need be, and keep other processes away from it."""
-        if not self.is_held:
-            folder = self.output.folder
-            folder.mkdir(parents=True, exist_ok=True)
-            self._until_done.enter_context(locked(folder))
-            self.is_held = True
-            put_back(folder, tidy=True)
-
 
 # ---------------------------------------------------------------------------------------------------------- the results
 
@@ -319,7 +343,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
     """Write what was found, say so, and return the exit code."""
     request, search, output = keeper.request, keeper.search, keeper.output
     folder, front = output.folder, found.front
-    chosen, missed = request.wish.of(front)
+    chosen, _ = request.wish.of(front)
     try:
         fitted = _refit(found, chosen, request, shown) if output.refit else None
         run = {
@@ -336,24 +360,56 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
             front.save(
                 folder,
                 # the folder of our own checkpoint gives way to the results
-                overwrite=output.overwrite or keeper.is_held or (is_unfinished(folder) and not keeper.path.exists()),
+                overwrite=output.overwrite or keeper.is_kept or (is_unfinished(folder) and not keeper.path.exists()),
                 meshes=output.meshes,
                 mesh_format=output.format,
                 chosen=chosen,
                 refit=fitted or output.refit,
-                page=output.page,
+                pictures=False,
                 run=run,
             )
     except (ResultError, KeyboardInterrupt) as stop:
-        if not (keeper.is_held and keeper.path.exists()):
+        if not (keeper.is_kept and keeper.path.exists()):
             raise
         reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
         say(f"{reason}; the same command goes on from the checkpoint in {folder}")
         return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
+    return _hand_over(found, keeper, shown)
+
+
+def _stored(keeper: Keeper) -> _Found:
+    """Return what a search came back with whose results are in place."""
+    folder = keeper.output.folder
+    try:
+        front = Front.load(folder, model=keeper.problem.surface)
+    except ResultError:
+        claim_output(folder)  # of another model, or by other rules: it is refused
+        raise
+    if not keeper.output.quiet:
+        say(f"{folder} holds the results of this search; making the pictures that are missing")
+    return _Found(front, *(front.run[name] for name in ("generations", "evaluations", "seconds", "interrupted")))
+
+
+def _hand_over(found: _Found, keeper: Keeper, shown: Stages) -> int:
+    """Draw what is in place, as far as that is missing, say what there is, and return the exit code."""
+    output, folder = keeper.output, keeper.output.folder
+    chosen, missed = keeper.request.wish.of(found.front)
+    undrawn = is_interrupted()
+    with answering(*DRAWING):
+        try:
+            stop_if_interrupted()
+            if not undrawn:
+                with shown.stage("writing", "drawing"), place_for_matplotlib(folder):
+                    Front.load(folder, model=keeper.problem.surface).draw(page=output.page, missing=True)
+        except KeyboardInterrupt:
+            undrawn = True
     shown.close()
-    _summarise(found, keeper, chosen, fitted)
+    _summarise(found, keeper, chosen)
     if found.interrupted:
         say(f"interrupted after {found.generations} generations; {folder} holds the front so far")
+    if undrawn:
+        say(f"interrupted while it was drawn; {folder} holds the results: meshsimp report {as_argument(folder)}")
+    if found.interrupted or undrawn:
         return INTERRUPTED
     if missed:
         say(f"{folder} holds a front, but no chosen mesh: {missed}; search longer (--generations, --time)")
@@ -378,6 +434,8 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
             begun = time.perf_counter()
             if until is not None and fitted and begun + longest > until:
                 break
+            if is_interrupted() and fitted:
+                break
             fitted[row] = front[row].refit(until=until)
             longest = max(longest, time.perf_counter() - begun)
             show(len(fitted) / len(order), f"refitted {len(fitted)} of {len(order)} meshes")
@@ -389,7 +447,7 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
     return fitted
 
 
-def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitted: dict[int, Refitted] | None) -> None:
+def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None) -> None:
     search, output = keeper.search, keeper.output
     front, folder = found.front, output.folder
     model, quality = front.model, front.quality
@@ -434,9 +492,9 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None, fitt
     )
     if chosen is not None:
         tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality, unit)}")
-    written, n_raised = (len(list(folder.glob(f"{place}/*{kind.suffix}"))) for place in ("meshes", "refitted"))
-    raised = "" if fitted is None or not written else f", {n_raised} in refitted"
-    files = there(folder, "front.csv", "front.png", "report.html")
+    written, refitted = (len(list(folder.glob(f"{place}/*{kind.suffix}"))) for place in ("meshes", "refitted"))
+    raised = f", {refitted} in refitted" if refitted else ""
+    files = there(folder, "front.csv", *PICTURES)
     tell(f"written: {folder}: {files}" + (f", {written} in meshes" if written else "") + raised)
     if (compiled := keeper.before["compile_seconds"]) >= 1.0:
         tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import _thread
+import logging
 import math
 import os
+import shutil
 import signal
 import sys
+import tempfile
 import threading
 import time
 import warnings
@@ -29,17 +33,24 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BAD_INPUT",
+    "DRAWING",
+    "ENDING",
     "INTERRUPTED",
     "OK",
     "TARGET_MISSED",
     "TERMINATED",
+    "WRITING",
     "Stages",
+    "answering",
     "bar",
     "described",
     "front_in_words",
     "in_unit",
     "interrupted_code",
     "interruptible",
+    "is_interrupted",
+    "matplotlib_silent",
+    "place_for_matplotlib",
     "say",
     "stop_if_interrupted",
     "tell",
@@ -49,47 +60,124 @@ __all__ = [
 
 OK, TARGET_MISSED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
+# What is said to signals while results are written that may have taken hours, and while they are drawn.
+WRITING = (
+    "stopping as soon as the results are written, without pictures",
+    "still writing the results; once more ends it at once, without them",
+    "stopping without results",
+)
+DRAWING = ("stopping without all pictures; the results are in place",)
+
+# Signals that ask a program to end.
+ENDING = (signal.SIGINT, signal.SIGTERM)
+
 # Of the name before the progress bar; the front so far is to fit beside it into 80 columns.
 LONGEST_NAME = 18
 
 
-class _Interrupt:
-    """Remembers a signal: some libraries swallow the exception while they are imported."""
+class _Signals:
+    """What came of Ctrl-C and SIGTERM, and what is to be done about it."""
 
-    seen: int | None = None
+    #: The first that came, which decides the exit code.
+    first: int | None = None
+    #: How many came in this part of the work. Libraries may swallow the exception, while they are imported, say.
+    came = 0
+    #: What is said to the first one, the second one ... in this part; the last words are for all others.
+    answers: tuple[str, ...] = ()
+    #: How many of them have been answered.
+    answered = 0
+    #: How many more are no new ones.
+    repeated = 0
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Note Ctrl-C and SIGTERM besides raising KeyboardInterrupt; see :func:`stop_if_interrupted`.
+    """Answer Ctrl-C and SIGTERM at once, in a word, and raise KeyboardInterrupt; see :func:`answering`.
 
-    Schedulers and containers end a program by SIGTERM: what is found so far is written then too.
+    Schedulers and containers end a program by SIGTERM: what is found so far is written then too. Python acts upon a
+    signal when the main thread comes back to it, perhaps seconds later; so the word is that of another thread.
     """
-
-    def note(signum: int, frame: Any) -> None:
-        _Interrupt.seen = signum
-        raise KeyboardInterrupt
-
-    _Interrupt.seen = None
+    _Signals.first = None
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    bell, hand = os.pipe()
+    os.set_blocking(hand, False)
+    woken = signal.set_wakeup_fd(hand, warn_on_full_buffer=False)
+    before = {number: signal.signal(number, _note) for number in ENDING}
+    unraisable, sys.unraisablehook = sys.unraisablehook, _raise_again
+    answering_thread = threading.Thread(target=_answer, args=(bell,), name="meshsimp-answers", daemon=True)
+    answering_thread.start()
     try:
-        yield
+        with answering("stopping"):
+            yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        sys.unraisablehook = unraisable
+        signal.set_wakeup_fd(woken)
+        os.close(hand)
+        answering_thread.join()
+        os.close(bell)
+
+
+@contextmanager
+def answering(*answers: str) -> Iterator[None]:
+    """Set what is said to the signals that come in a part of the work; what came before is past.
+
+    With the last of the answers KeyboardInterrupt is raised. The signal after that is only answered, so that what ends
+    now can end; if there are still more, it is raised again.
+    """
+    before = _Signals.answers
+    _Signals.came, _Signals.answered, _Signals.answers = 0, 0, answers
+    try:
+        yield
+    finally:
+        _Signals.came, _Signals.answered, _Signals.answers = 0, 0, before
+
+
+def _note(signum: int, frame: Any) -> None:
+    _Signals.first = _Signals.first or signum
+    _Signals.came += 1
+    if _Signals.came >= len(_Signals.answers) and _Signals.came != len(_Signals.answers) + 1:
+        raise KeyboardInterrupt
+
+
+def _raise_again(lost: Any) -> None:
+    """Raise KeyboardInterrupt a moment later where it met what can raise nothing, such as the end of an object."""
+    if lost.exc_type is not KeyboardInterrupt or _Signals.first is None:
+        sys.__unraisablehook__(lost)
+        return
+    _Signals.came -= 1
+    _Signals.repeated += 1
+    threading.Timer(0.05, _thread.interrupt_main, (int(_Signals.first),)).start()
+
+
+def _answer(bell: int) -> None:
+    """Say a word whenever a signal came, until the other end is closed."""
+    while number := os.read(bell, 1):
+        if _Signals.repeated:
+            _Signals.repeated -= 1
+        elif number[0] in ENDING and (answers := _Signals.answers):
+            word = answers[min(_Signals.answered, len(answers) - 1)]
+            _Signals.answered += 1
+            with suppress(OSError, ValueError):  # nobody is there to hear it
+                say(word)
 
 
 def interrupted_code() -> int:
     """Return the exit code of what was interrupted: as the shell has it for the signal that came."""
-    return TERMINATED if _Interrupt.seen == signal.SIGTERM else INTERRUPTED
+    return TERMINATED if _Signals.first == signal.SIGTERM else INTERRUPTED
+
+
+def is_interrupted() -> bool:
+    """Tell whether Ctrl-C or SIGTERM came in this part of the work."""
+    return _Signals.came > 0
 
 
 def stop_if_interrupted() -> None:
-    """Raise KeyboardInterrupt if Ctrl-C or SIGTERM came, even if a library swallowed it."""
-    if _Interrupt.seen is not None:
+    """Raise KeyboardInterrupt if Ctrl-C or SIGTERM came in this part of the work, even if a library swallowed it."""
+    if is_interrupted():
         raise KeyboardInterrupt
 
 
@@ -239,6 +327,38 @@ def warnings_as_lines() -> Iterator[None]:
         warnings.showwarning = show
         warnings.filterwarnings("always", module=r"meshsimp_pymoo(\.|$)")
         yield
+
+
+@contextmanager
+def matplotlib_silent() -> Iterator[None]:
+    """Keep to itself what matplotlib says of a home that cannot be written, and of its fonts."""
+    log = logging.getLogger("matplotlib")
+    before = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(before)
+
+
+@contextmanager
+def place_for_matplotlib(folder: Path) -> Iterator[None]:
+    """Let matplotlib keep its cache in a folder while it draws, where there is no place for temporary files."""
+    try:
+        tempfile.gettempdir()
+        is_needed = False
+    except OSError:
+        is_needed = "matplotlib" not in sys.modules and "MPLCONFIGDIR" not in os.environ
+    if not is_needed:
+        yield
+        return
+    own = folder / ".matplotlib"
+    os.environ["MPLCONFIGDIR"] = str(own.resolve())
+    try:
+        yield
+    finally:
+        del os.environ["MPLCONFIGDIR"]
+        shutil.rmtree(own, ignore_errors=True)
 
 
 def described(quality: Quality, unit: str = LENGTH) -> str:

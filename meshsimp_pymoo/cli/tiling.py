@@ -13,25 +13,42 @@ from typing import Any
 from meshsimp_pymoo.cli.arguments import numbered
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling, Wish
-from meshsimp_pymoo.cli.terminal import INTERRUPTED, OK, TARGET_MISSED, Stages, described, in_unit, say, tell, there
+from meshsimp_pymoo.cli.terminal import (
+    DRAWING,
+    INTERRUPTED,
+    OK,
+    TARGET_MISSED,
+    WRITING,
+    Stages,
+    answering,
+    described,
+    in_unit,
+    is_interrupted,
+    place_for_matplotlib,
+    say,
+    stop_if_interrupted,
+    tell,
+    there,
+)
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, printable, reason_of
-from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.files import as_argument, draw_into
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.indicators import knee
+from meshsimp_pymoo.search.checkpoint import difference
 from meshsimp_pymoo.settings import plain
-from meshsimp_pymoo.storage import claim_output
+from meshsimp_pymoo.storage import PICTURES, claim_output
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, TiledFront, settings, tiled_front, usual_most
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
+from meshsimp_pymoo.tiles.grid import HeightGrid, count_samples, open_grid
 from meshsimp_pymoo.tiles.memory import check_memory
 from meshsimp_pymoo.tiles.output import (
     WORK,
-    clear_up,
+    is_tiled,
     read_tiled_front,
-    restore,
+    record_of,
     stored_model,
     write_tiled_front,
     write_welded,
@@ -71,8 +88,9 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     _refuse_unknown(request)
     wish, output, tiling = request.wish, request.output, request.tiling
     out = output.folder
-    restore(out)
-    _claim(output)
+    is_drawn_only = is_tiled(out) and not output.overwrite and not (out / PICTURES[0]).exists()
+    if not is_drawn_only:
+        _claim(output)
     with compiling((*SEARCH, "tiles"), shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             grid = open_grid(request.model, request.options)
@@ -91,22 +109,33 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
         if isinstance(problem, ModelError):
             raise
         raise UsageError(str(problem)) from None
+    recorded = {"options": plain(request.options), "settings": request.wanted | {"tile": tile, "most": what["most"]}}
+    if is_drawn_only:
+        if difference({name: record_of(out).get(name) for name in recorded}, recorded):
+            claim_output(out)  # of other settings: it is refused
+        front, chosen = _stored(out, grid)
+        if not output.quiet:
+            say(f"{out} holds the results of this search; making the picture that is missing")
+        return _hand_over(request, shown, front, chosen, "", time.perf_counter() - start)
     made_now = not out.exists()
     try:
         out.mkdir(parents=True, exist_ok=True)
-        with locked(out), open_engine(jobs, tiling.dask) as engine, shown.stage("searching", "thinning") as show:
-            clear_up(out)
-            if output.overwrite:
-                _forget_other(out / WORK, what)
-            threads = request.search.threads or os.cpu_count() or 1
-            store = Folder(out / WORK, what)
+        if output.overwrite:
+            _forget_other(out / WORK, what)
+        threads = request.search.threads or os.cpu_count() or 1
+        store = Folder(out / WORK, what)
+        with (
+            answering("stopping: finished tiles are stored, the same command goes on"),
+            open_engine(jobs, tiling.dask) as engine,
+            shown.stage("searching", "thinning") as show,
+        ):
             front = tiled_front(
                 grid, tile=tile, most=what["most"], engine=engine, store=store, threads=threads, progress=show
             )
             front, chosen, missed = _choose(wish, front, threads)
-            run = {
-                "options": plain(request.options),
-                "settings": request.wanted | {"tile": tile, "most": what["most"]},
+            stop_if_interrupted()
+        with answering(*WRITING), shown.stage("writing", "writing"):
+            run = recorded | {
                 "seconds": round(time.perf_counter() - start, 3),
                 "read_seconds": round(read_seconds, 3),
                 "compile_seconds": round(compiled.seconds, 3),
@@ -120,8 +149,8 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
                 chosen=chosen,
                 piece_size=tile if tiling.pieces else None,
                 run=run,
-                drawings={"front.png": lambda path: _draw(front, chosen, path)},
             )
+            undrawn = is_interrupted()
     except EngineError as problem:
         goes_on = f"; finished tiles are in {out}, the same command goes on" if _has_pieces(out) else ""
         raise ResultError(f"{problem}{goes_on}") from None
@@ -140,12 +169,57 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     finally:
         if made_now and _is_unfinished(out) and not _has_pieces(out):
             shutil.rmtree(out, ignore_errors=True)
+    return _hand_over(request, shown, front, chosen, missed, time.perf_counter() - start, undrawn=undrawn)
+
+
+def _hand_over(
+    request: Request,
+    shown: Stages,
+    front: TiledFront,
+    chosen: int | None,
+    missed: str,
+    seconds: float,
+    *,
+    undrawn: bool = False,
+) -> int:
+    """Draw what is in place, say what there is, and return the exit code."""
+    out = request.output.folder
+    with answering(*DRAWING):
+        try:
+            stop_if_interrupted()
+            if not undrawn:
+                with shown.stage("writing", "drawing"), place_for_matplotlib(out):
+                    draw_into(out, {PICTURES[0]: lambda path: _draw(front, chosen, path)})
+        except KeyboardInterrupt:
+            undrawn = True
     shown.close()
-    _summarise(output, tiling, front, chosen, time.perf_counter() - start)
+    _summarise(request.output, request.tiling, front, chosen, seconds)
+    if undrawn:
+        say(f"interrupted while it was drawn; {out} holds the results: meshsimp report {as_argument(out)}")
+        return INTERRUPTED
     if missed:
         say(f"{out} holds a front, but no chosen mesh: {missed}")
         return TARGET_MISSED
     return OK
+
+
+def report_on_tiled(out: Path, model: str | None, *, quiet: bool, as_json: bool) -> int:
+    """Make the picture of a tiled front anew; return the exit code."""
+    stored, options = stored_model(out)
+    front, chosen = _stored(out, open_grid(model or stored, options))
+    with place_for_matplotlib(out):
+        draw_into(out, {PICTURES[0]: lambda path: _draw(front, chosen, path)})
+    if as_json:
+        tell(json.dumps({"picture": str(out / PICTURES[0]), "solutions": len(front)}, indent=2))
+    elif not quiet:
+        tell(f"written: {out}: {there(out, *PICTURES[:1])} ({len(front)} solutions)")
+    return OK
+
+
+def _stored(out: Path, grid: HeightGrid) -> tuple[TiledFront, int | None]:
+    """Return a stored front, and its row of the chosen solution."""
+    front, chosen = read_tiled_front(out, grid), record_of(out)["chosen"]
+    return front, None if chosen is None else len(front) - 1 - chosen
 
 
 def _draw(front: TiledFront, chosen: int | None, path: Path) -> None:
@@ -187,7 +261,7 @@ def _claim(output: Output) -> None:
 
 
 def _is_unfinished(out: Path) -> bool:
-    return out.is_dir() and {entry.name for entry in out.iterdir()} <= {WORK, ".lock"}
+    return out.is_dir() and {entry.name for entry in out.iterdir()} <= {WORK}
 
 
 def _forget_other(work: Path, what: dict[str, Any]) -> None:

@@ -19,6 +19,7 @@ import os
 import warnings
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.comparison import findings as verdicts
@@ -26,7 +27,7 @@ from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.page import experiment_page
 from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.comparison.study import Study
-from meshsimp_pymoo.files import new_folder, put_back, put_text
+from meshsimp_pymoo.files import draw_into, locked, new_folder, put_back, put_text
 from meshsimp_pymoo.report.document import slug
 
 if TYPE_CHECKING:
@@ -53,12 +54,18 @@ def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, floa
     Raises
     ------
     ResultError
-        If there is no experiment, or none of its runs is finished.
+        If there is no experiment, none of its runs is finished, or another process is at work there.
+
+    Warns
+    -----
+    PictureWarning
+        If a figure or the page cannot be made.
     """
     study = Study(out)
-    found = write_tables(study)
-    _write_figures(study, progress)
-    put_text(study.out / "report.html", experiment_page(study, found))
+    with locked(study.out, inside=True):
+        found = write_tables(study)
+        _write_figures(study, progress)
+        draw_into(study.out, {"report.html": lambda path: put_text(path, experiment_page(study, found))})
     return study
 
 
@@ -75,7 +82,7 @@ def write_tables(study: Study) -> list[verdicts.Finding]:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
             warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=3)
     found: list[verdicts.Finding] = []
-    put_back(study.out / "tables", tidy=True, replaced=True)
+    put_back(study.out / "tables")
     with new_folder(study.out / "tables", replace=True, flush=False) as folder:
         for budget in study.budgets:
             for scoring in study.scorings:
@@ -114,10 +121,13 @@ def _write_figures(study: Study, progress: Callable[[float, float, str], None] |
             for indicator in ("hvr", "cardinality"):
                 drawings.append((f"{where}/{indicator}.png", partial(figures.box_figure, study, cases, indicator)))
             drawings.append((f"{where}/selected.png", partial(figures.selected_figure, study, cases)))
-    put_back(study.out / "figures", tidy=True, replaced=True)
+    put_back(study.out / "figures")
     with new_folder(study.out / "figures", replace=True, flush=False) as folder:
         for done, (path, draw) in enumerate(drawings):
             if progress is not None:
                 progress(done, len(drawings), path)
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            draw().savefig(folder / path)
+            draw_into(folder, {path: partial(_save, draw)})
+
+
+def _save(draw: Callable[[], Figure], path: Path) -> None:
+    draw().savefig(path)

@@ -227,7 +227,7 @@ def run_experiment(
         raise ValueError(f"jobs is {jobs}; it must be 1 or more")
     experiment = config if isinstance(config, Experiment) else read_experiment_file(config, folder=folder)
     out = claim_experiment(out)
-    with locked(out):
+    with locked(out, inside=True):
         store = RunStore(out)
         store.clean()
         tasks = plan(experiment)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError, printable
-from meshsimp_pymoo.files import as_argument, put_text
+from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.problem import MeshProblem
     from meshsimp_pymoo.surface.surface import Original, Simplified
 
-__all__ = ["PAGE_BYTES", "simplification_page", "write_page"]
+__all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
@@ -79,20 +79,6 @@ class _Embedded:
     solutions: list[dict[str, Any] | None]
     scale_end: float
     drawn: int
-
-
-def write_page(
-    front: StoredFront,
-    problem: MeshProblem,
-    *,
-    folder: str | os.PathLike[str],
-    knee: int,
-) -> Path:
-    """Write ``report.html`` to the folder of a front, whole or not at all; see :func:`simplification_page`."""
-    content = simplification_page(front, problem, folder=folder, knee=knee)
-    path = front.folder / "report.html"
-    put_text(path, content, flush=True)
-    return path
 
 
 def simplification_page(

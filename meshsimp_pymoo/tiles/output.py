@@ -13,17 +13,15 @@
                         wanted (settings), package versions, seconds
     OUT/tiles/          while the work is going on: finished tiles, which the same call finds again
 
-The finished folder is put in place as a whole; see `meshsimp_pymoo.storage`. A process that is killed at any moment
-leaves the tiles or the finished folder, and beside them what :func:`restore` and :func:`clear_up` know.
+The finished folder is put in place as a whole, and drawn then; see `meshsimp_pymoo.storage`. A process that is killed
+at any moment leaves the tiles or the finished folder, and beside them what :func:`meshsimp_pymoo.files.put_back` knows.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import shutil
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +29,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.errors import ResultError, reason_of
-from meshsimp_pymoo.files import draw_into, left_beside, locked, new_file, new_folder, path_from, write_csv, write_npz
+from meshsimp_pymoo.files import new_file, new_folder, path_from, write_csv, write_npz
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import (
@@ -71,9 +69,8 @@ def write_tiled_front(
     chosen: int | None = None,
     piece_size: int | None = None,
     run: Mapping[str, Any] | None = None,
-    drawings: Mapping[str, Callable[[Path], object]] | None = None,
 ) -> Path:
-    """Write a tiled front in place of the folder's unfinished tiles, all or nothing.
+    """Write a tiled front in place of the folder's unfinished tiles, all or nothing, without pictures.
 
     Parameters
     ----------
@@ -91,8 +88,6 @@ def write_tiled_front(
         Write the chosen mesh in pieces of about so many samples a side, as ``chosen/ROW_COLUMN`` and the suffix.
     run : mapping, optional
         What to record in run.json beside versions and grid.
-    drawings : mapping of str to callable, optional
-        Pictures by name, made once all else is written; see :func:`~meshsimp_pymoo.storage.write_front`.
 
     Raises
     ------
@@ -154,27 +149,7 @@ def write_tiled_front(
         }
         text = json.dumps(record, indent=2, allow_nan=False)
         (partial / "run.json").write_text(text + "\n", encoding="utf-8")
-        draw_into(partial, drawings or {})
     return Path(folder)
-
-
-def restore(folder: Path) -> None:
-    """Put a folder back whose process was killed while it was putting the finished one in its place."""
-    target = folder.resolve()
-    for old in left_beside(target, "old"):
-        if not (old / WORK).is_dir():
-            continue
-        with suppress(ResultError, OSError), locked(old):  # another process may be at it right now
-            if target.exists():
-                shutil.rmtree(old)
-            else:
-                old.rename(target)
-
-
-def clear_up(folder: Path) -> None:
-    """Remove unfinished folders of processes that were killed; the caller holds the folder for itself."""
-    for partial in left_beside(folder.resolve(), "partial"):
-        shutil.rmtree(partial, ignore_errors=True)
 
 
 def _frame(front: TiledFront, kind: Format) -> dict[str, Any]:
@@ -239,8 +214,7 @@ def read_tiled_front(folder: str | os.PathLike[str], grid: HeightGrid) -> TiledF
     from meshsimp_pymoo.surface.measures import MEASURES, quality_of
 
     folder = Path(folder)
-    columns = read_front_csv(folder / "front.csv")[0]
-    record = read_record(folder / "run.json", len(columns["error"]))
+    columns, record = read_front_csv(folder / "front.csv")[0], record_of(folder)
     if record["model"]["hash"] != grid.hash:
         raise ResultError(f"{folder}: is not a front of {grid.name}, whose heights or spacing are others")
     path = folder / NESTED_FILE
@@ -265,10 +239,14 @@ def is_tiled(folder: str | os.PathLike[str]) -> bool:
     return (Path(folder) / NESTED_FILE).is_file()
 
 
+def record_of(folder: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the record of a stored tiled front; see :func:`~meshsimp_pymoo.storage.read_record`."""
+    return read_record(Path(folder) / "run.json", len(read_front_csv(Path(folder) / "front.csv")[1]))
+
+
 def stored_model(folder: str | os.PathLike[str]) -> tuple[str, Options]:
     """Return where the grid of a stored tiled front was, and how it was read."""
-    count = len(read_front_csv(Path(folder) / "front.csv")[1])
-    record = read_record(Path(folder) / "run.json", count)
+    record = record_of(folder)
     file = record["model"].get("file")
     name = record["model"]["name"] if file is None else str((Path(folder) / file).resolve())
     try:

@@ -501,7 +501,7 @@ def test_a_folder_that_a_killed_process_had_only_begun_is_continued(config, tmp_
 
 
 def test_two_calls_do_not_work_in_one_folder(config, stored):
-    with locked(stored), pytest.raises(ResultError, match="another process"):
+    with locked(stored, inside=True), pytest.raises(ResultError, match="another process"):
         run_experiment(config, stored)
 
 

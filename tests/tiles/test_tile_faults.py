@@ -62,9 +62,13 @@ def whole(path, tmp_path_factory):
     return contents(out)
 
 
-def contents(out):
-    files = {str(file.relative_to(out)): file.read_bytes() for file in out.rglob("*") if file.is_file()}
-    assert set(SAME) < set(files)
+def contents(out, *, drawn=True):
+    files = {
+        str(file.relative_to(out)): file.read_bytes()
+        for file in out.rglob("*")
+        if file.is_file() and not file.name.startswith(".")
+    }
+    assert set(SAME if drawn else SAME[:-1]) < set(files)
     files.pop("run.json")
     return files
 
@@ -146,7 +150,7 @@ while killed < moments:
     time.sleep(rng.random() * length)
     os.kill(pid, signal.SIGKILL)
     killed += os.WIFSIGNALED(os.waitpid(pid, 0)[1])
-    finished = (out / "front.csv").exists()
+    finished = (out / "front.png").exists()
     print(number, "killed", len(list((out / "tiles").glob("*.npz"))))
     if finished or killed == moments:
         # a finished folder is not made anew, but cleared up beside
@@ -170,6 +174,36 @@ def test_killed_at_ten_random_moments_the_same_command_ends_with_the_same_bytes(
         assert [entry.name for entry in (tmp_path / number).iterdir()] == ["out"]
 
 
+def in_fork(call):
+    """Run a command in a forked process, and return its code, or minus the signal that ended it."""
+    child = os.fork()
+    if child == 0:
+        os._exit(main(call))
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@pytest.mark.parametrize("moment", ["files.shutil.rmtree", "report.figures.plot_front"])
+def test_killed_when_the_new_folder_is_there_the_next_call_clears_up_and_draws(
+    path, whole, tmp_path, monkeypatch, moment
+):
+    out = tmp_path / "out"
+    import meshsimp_pymoo.report.figures  # noqa: F401
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"meshsimp_pymoo.{moment}", lambda *_, **__: os.kill(os.getpid(), signal.SIGKILL))
+        assert in_fork(command(path, out)) == -signal.SIGKILL
+    assert contents(out, drawn=False) == {name: data for name, data in whole.items() if name != "front.png"}
+    monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", None)
+    assert main(command(path, out)) == 0
+    assert contents(out) == whole
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+    (out / "front.png").unlink()
+    assert main(["report", str(out), "--quiet"]) == 0
+    assert contents(out) == whole
+    (out / "front.png").unlink()
+    assert main([*command(path, out), "--seed", "1", "--triangles", "200"]) == 2  # of another call
+
+
 def test_killed_between_taking_the_old_folder_away_and_putting_the_new_one_there_nothing_is_lost(
     path, whole, tmp_path, monkeypatch
 ):
@@ -178,15 +212,14 @@ def test_killed_between_taking_the_old_folder_away_and_putting_the_new_one_there
 
     def killed(self, target):
         if self.suffix == ".partial":
-            raise KeyboardInterrupt  # as far as the folders go: the renaming back is not done either
+            os.kill(os.getpid(), signal.SIGKILL)
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", killed)
-    monkeypatch.setattr("meshsimp_pymoo.files.shutil.rmtree", lambda *_, **__: None)
-    assert main(command(path, out)) == 130
+    assert in_fork(command(path, out)) == -signal.SIGKILL
     monkeypatch.undo()
     left = sorted(entry.suffix for entry in tmp_path.iterdir())
-    assert left == [".old", ".partial"]
+    assert left == [".lock", ".old", ".partial"]
     calls = []
     monkeypatch.setattr("meshsimp_pymoo.tiles.front.thin_tile", calls.append)
     assert main(command(path, out)) == 0

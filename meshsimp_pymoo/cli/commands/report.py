@@ -7,7 +7,8 @@ import argparse
 HELP = "make the report of a comparison or the page of a front anew"
 DESCRIPTION = """\
 Make the tables, figures, findings and the page (report.html) of an experiment anew, from its
-stored results alone; or the page of a front that `meshsimp simplify` wrote, from the front and its model."""
+stored results alone; or the picture and the page of a front that `meshsimp simplify` wrote, from the front
+and its model."""
 EXAMPLES = """\
 examples:
   meshsimp report results
@@ -27,17 +28,19 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Make the report of the experiment, or the page of the front, in ``args.output`` anew."""
+    """Make the report of the experiment, or the picture and page of the front, in ``args.output`` anew."""
     from pathlib import Path
 
     from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.reporting import report_on_experiment, report_on_front
+    from meshsimp_pymoo.cli.tiling import report_on_tiled
     from meshsimp_pymoo.errors import UsageError
+    from meshsimp_pymoo.tiles.output import is_tiled
 
     out, shown = Path(args.output), {"quiet": args.quiet, "as_json": args.json}
     if (out / "front.csv").is_file():
         with said_when_compiling(args.quiet):
-            return report_on_front(out, args.model, **shown)
+            return (report_on_tiled if is_tiled(out) else report_on_front)(out, args.model, **shown)
     if args.model is not None:
         raise UsageError(f"--model is for the page of a front; {out} holds none")
     return report_on_experiment(out, {}, **shown)

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
     from meshsimp_pymoo.cli.preparing import compile_first
     from meshsimp_pymoo.cli.reporting import report_on_experiment
-    from meshsimp_pymoo.cli.terminal import INTERRUPTED, bar, say, tell
+    from meshsimp_pymoo.cli.terminal import INTERRUPTED, answering, bar, say, tell
     from meshsimp_pymoo.comparison.config import read_experiment_file
     from meshsimp_pymoo.comparison.runner import run_experiment
     from meshsimp_pymoo.warming import SEARCH
@@ -56,7 +56,11 @@ def run(args: argparse.Namespace) -> int:
     compile_first((*SEARCH, "insertion"), quiet=args.quiet)
     start = time.perf_counter()
     try:
-        with bar(args.quiet, "runs") as show, ExitStack() as open_until_done:
+        with (
+            answering("stopping: finished runs are stored, the same command does the rest"),
+            bar(args.quiet, "runs") as show,
+            ExitStack() as open_until_done,
+        ):
             done = run_experiment(
                 experiment,
                 out,
