@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import unicodedata
 import warnings
 
@@ -64,6 +65,22 @@ def printable(text: object, *, keep: str = "") -> str:
         ascii(c)[1:-1] if c not in keep and unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") else c
         for c in str(text)
     )
+
+
+def way_to_install(extra: str) -> str:
+    """Return the command that installs what an extra of this package brings, wherever the package came from.
+
+    >>> way_to_install("geo")
+    "pip install 'rasterio>=1.3'"
+    """
+    from importlib.metadata import PackageNotFoundError, requires
+
+    try:
+        parts = [text.partition(";") for text in requires("meshsimp-pymoo") or ()]
+    except PackageNotFoundError:  # run from a clone that is not installed
+        return f"pip install '.[{extra}]' in the folder of its pyproject.toml"
+    needed = [name.strip() for name, _, marker in parts if re.search(rf"extra\s*==\s*['\"]{extra}['\"]", marker)]
+    return f"pip install {' '.join(map(repr, needed))}"
 
 
 def raise_if_memory(error: BaseException) -> None:

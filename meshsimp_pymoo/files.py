@@ -12,15 +12,16 @@ import shlex
 import shutil
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import IO
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray
 from meshsimp_pymoo.errors import ModelError, PictureWarning, ResultError, raise_if_memory, reason_of
+from meshsimp_pymoo.memory import check_free
 
 # Deflate cannot shrink data by more than 1032:1, so a .npz member that claims more is a forgery.
 DEFLATE_LIMIT = 1100
@@ -312,69 +313,135 @@ def write_npz(path: Path, **arrays: AnyArray) -> None:
             file.writestr(entry, content.getvalue())
 
 
-def read_npz(stream: IO[bytes], name: str) -> dict[str, AnyArray]:
-    """Read all arrays of a .npz, without pickles, after comparing what it declares with what it can hold.
+def read_npz(stream: IO[bytes], name: str, *, wanted: Collection[str] | None = None) -> dict[str, AnyArray]:
+    """Read the arrays of a .npz, without pickles, after comparing what it declares with what it can hold.
+
+    Parameters
+    ----------
+    stream : binary file
+        The archive.
+    name : str
+        What messages call it.
+    wanted : collection of str, optional
+        The arrays to read; by default all.
 
     Raises
     ------
     ModelError
-        If it is no whole archive, or declares more than its bytes can unpack to or than UNPACKED_LIMIT.
+        If it is no whole archive, or declares more than its bytes can unpack to, than UNPACKED_LIMIT or than fits into
+        memory.
     """
     arrays = {}
     unpacked = 0
+    with _archive(stream, name) as archive:
+        for info, key, label in _members(archive, name):
+            if wanted is not None and key not in wanted:
+                continue
+            unpacked += info.file_size
+            if unpacked > UNPACKED_LIMIT:
+                raise ModelError(
+                    f"{label} makes it unpack to more than {UNPACKED_LIMIT >> 30} GiB; save the heights as .npy"
+                )
+            check_free(unpacked, f"{label}: {unpacked} bytes unpacked", "save the heights alone, as .npy")
+            with archive.open(info) as member:
+                arrays[key] = read_npy(member, info.file_size, label)
+    return arrays
+
+
+def npz_headers(stream: IO[bytes], name: str) -> dict[str, NpyHeader]:
+    """Return what the arrays of a .npz are, after the same comparison, without reading them.
+
+    Raises
+    ------
+    ModelError
+        As of :func:`read_npz`.
+    """
+    found = {}
+    with _archive(stream, name) as archive:
+        for info, key, label in _members(archive, name):
+            with archive.open(info) as member:
+                found[key] = read_npy_header(member, info.file_size, label)
+    return found
+
+
+@contextmanager
+def _archive(stream: IO[bytes], name: str) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(stream) as archive:
-            for info in archive.infolist():
-                if not info.filename.endswith(".npy"):
-                    continue
-                label = f"{name}: {info.filename}"
-                unpacked += info.file_size
-                if info.file_size > DEFLATE_LIMIT * max(info.compress_size, 1):
-                    raise ModelError(
-                        f"{label} declares {info.file_size} bytes packed into {info.compress_size}; save it again"
-                    )
-                if unpacked > UNPACKED_LIMIT:
-                    raise ModelError(
-                        f"{label} makes it unpack to more than {UNPACKED_LIMIT >> 30} GiB; save the heights as .npy"
-                    )
-                with archive.open(info) as member:
-                    arrays[info.filename[:-4]] = read_npy(member, info.file_size, label)
+            yield archive
     except (ModelError, MemoryError):
         raise
     except Exception as error:  # its directory and its packed data may be damaged in any way
         raise_if_memory(error)
         raise ModelError(f"{name}: is not a complete .npz file ({reason_of(error)}); copy or save it again") from error
-    return arrays
 
 
-def read_npy(stream: IO[bytes], size: int, name: str) -> AnyArray:
-    """Read one .npy array after comparing the shape it declares with the bytes there are.
+def _members(archive: zipfile.ZipFile, name: str) -> Iterator[tuple[zipfile.ZipInfo, str, str]]:
+    """Yield (member, name of its array, what messages call it) of an archive."""
+    for info in archive.infolist():
+        if not info.filename.endswith(".npy"):
+            continue
+        label = f"{name}: {info.filename}"
+        if info.file_size > DEFLATE_LIMIT * max(info.compress_size, 1):
+            raise ModelError(f"{label} declares {info.file_size} bytes packed into {info.compress_size}; save it again")
+        yield info, info.filename[:-4], label
+
+
+class NpyHeader(NamedTuple):
+    """What a .npy array is: its shape, whether its first index runs fastest, and its type."""
+
+    shape: tuple[int, ...]
+    fortran: bool
+    dtype: np.dtype[Any]
+
+
+def read_npy_header(stream: IO[bytes], size: int, name: str) -> NpyHeader:
+    """Read the header of a .npy array, after which its numbers begin, and compare it with the bytes there are.
 
     Raises
     ------
     ModelError
         If it is no such array, holds objects, or is cut off.
     """
-    try:
+    with _npy(name):
         version = np.lib.format.read_magic(stream)
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about the header's spelling: Python 2's, or backslashes
-            shape, _, dtype = read_header(stream)
-        if dtype.hasobject:
+            header = NpyHeader(*read_header(stream))
+        if header.dtype.hasobject:
             raise ModelError(f"{name}: holds Python objects, which are never unpickled; save numbers")
-        needed = math.prod(shape) * dtype.itemsize
+        needed = math.prod(header.shape) * header.dtype.itemsize
         if needed > size - stream.tell():
             raise ModelError(
-                f"{name}: truncated: declares {shape} of {dtype}, {needed} bytes, but {size - stream.tell()} follow; "
-                "copy or save it again"
+                f"{name}: truncated: declares {header.shape} of {header.dtype}, {needed} bytes, but "
+                f"{size - stream.tell()} follow; copy or save it again"
             )
+        return header
+
+
+def read_npy(stream: IO[bytes], size: int, name: str) -> AnyArray:
+    """Read one .npy array, as far as its header can be believed.
+
+    Raises
+    ------
+    ModelError
+        As of :func:`read_npy_header`.
+    """
+    read_npy_header(stream, size, name)
+    with _npy(name):
         stream.seek(0)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             array = np.lib.format.read_array(stream, allow_pickle=False)
         stream.read(1)  # reaching the end makes an archive compare its checksum
         return array
+
+
+@contextmanager
+def _npy(name: str) -> Iterator[None]:
+    try:
+        yield
     except (ModelError, OSError, MemoryError):
         raise
     except Exception as error:  # its header is Python text and its data may be packed: anything may break

@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
-from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.errors import ModelError, ResultError, way_to_install
 from meshsimp_pymoo.files import claim_file, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
@@ -599,7 +599,7 @@ class Front(Sequence[FrontSolution]):
         try:
             import pandas
         except ImportError:
-            raise ImportError("to_frame() needs pandas: pip install pandas") from None
+            raise ImportError(f"to_frame() needs pandas: {way_to_install('pandas')}") from None
         frame = pandas.DataFrame([asdict(q) for q in self.quality])
         return frame.rename_axis(index="solution")
 

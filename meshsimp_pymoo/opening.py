@@ -13,7 +13,7 @@ from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
-from meshsimp_pymoo.formats.table import described, listed, read_source
+from meshsimp_pymoo.formats.table import are_given, described, listed, read_source
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.orient import front_patch
 
@@ -104,8 +104,9 @@ def _source_of(model: Source, options: Options) -> SourceMesh:
             "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
             f"not {type(model).__name__}"
         )
-    if applicable(model, options) != options:
-        raise ModelError(f"{source.name}: {listed(described())} are for files; {what} has its own samples")
+    if given := [name for name in described() if are_given([name], options)]:
+        are = "are" if len(given) > 1 else "is"
+        raise ModelError(f"{source.name}: {listed(given)} {are} for files; {what} has its own samples")
     return source
 
 

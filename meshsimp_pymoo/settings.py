@@ -233,7 +233,7 @@ class Setting(NamedTuple):
     metavar : str
         What the shell's help calls its value; empty: the choices.
     describes : tuple of str
-        The sorts of models that it is for, of "mesh", "grid" and "cloud"; empty: any.
+        The sorts of models that it is for, of "mesh", "grid" and "cloud", or names of single formats; empty: any.
     derived : bool
         Whether it follows from something else that the user says, and is only stored and read back.
     """

@@ -21,7 +21,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, Thr
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
-from meshsimp_pymoo.errors import reason_of
+from meshsimp_pymoo.errors import reason_of, way_to_install
 
 __all__ = ["DaskEngine", "Engine", "EngineError", "Processes", "Serial", "open_engine", "thread_pool"]
 
@@ -253,7 +253,7 @@ class DaskEngine:
             from distributed import Client
         except ImportError:
             raise EngineError(
-                "Dask clusters need the package distributed; install it with: pip install 'meshsimp-pymoo[dask]'"
+                f"Dask clusters need the package distributed; install it by {way_to_install('dask')}"
             ) from None
         try:
             self.client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)

@@ -606,7 +606,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(tmp_path, capsy
         (("--pin", "0,here"), r"'here' is not a whole number of at least 0"),
         (("--pin", "25"), r"pin: row 25 of roof:5 is not among"),
         (("--spacing", "0"), r"'0' is not one or two positive numbers"),
-        (("--spacing", "2"), r"roof:5: spacing, nodata, window and max_edge are for files"),
+        (("--spacing", "2"), r"roof:5: spacing is for files"),
         (("--nodata", "x"), r"'x' is not a finite number"),
         (("--pieces",), r"--pieces is for tiles, and this model is searched in one piece; leave it out"),
         (("--jobs", "2", "--tile", "none"), r"--jobs is for tiles"),

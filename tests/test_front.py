@@ -478,7 +478,7 @@ def test_without_pandas_the_way_out_is_said(front, monkeypatch):
 
     monkeypatch.delitem(sys.modules, "pandas", raising=False)
     monkeypatch.setattr(builtins, "__import__", refuse)
-    with pytest.raises(ImportError, match=r"to_frame\(\) needs pandas: pip install pandas"):
+    with pytest.raises(ImportError, match=r"to_frame\(\) needs pandas: pip install 'pandas>=2.0'"):
         front.to_frame()
 
 

@@ -32,7 +32,7 @@ def test_what_looks_like_a_file_is_looked_for_as_a_file(tmp_path):
 
 
 def test_spacing_is_for_grids_in_files():
-    with pytest.raises(ModelError, match="roof: spacing, nodata, window and max_edge are for files"):
+    with pytest.raises(ModelError, match="roof: spacing is for files"):
         open_source("roof", Options(spacing=2.0))
 
 
@@ -50,12 +50,12 @@ def test_whatever_a_mesh_is_given_as_the_model_is_the_same(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("of_file", "value"), [("spacing", 2.0), ("nodata", -1.0), ("window", (0, 0, 2, 2)), ("max_edge", 3.0)]
+    ("of_file", "value"), [("spacing", 2.0), ("nodata", -1.0), ("window", (0, 0, 2, 2)), ("band", 1), ("max_edge", 3.0)]
 )
 def test_what_describes_a_file_is_refused_for_a_mesh_in_memory(of_file, value):
     source = load("face:200")
     for given in (source, trimesh.Trimesh(source.points, source.faces, process=False)):
-        with pytest.raises(ModelError, match="spacing, nodata, window and max_edge are for files; a mesh in memory"):
+        with pytest.raises(ModelError, match=f": {of_file} is for files; a mesh in memory"):
             open_model(given, Options(**{of_file: value}))
 
 

@@ -177,6 +177,8 @@ SETTINGS = {
     "spacing": st.none() | st.tuples(positive, positive),
     "nodata": st.none() | st.floats(allow_nan=False, allow_infinity=False),
     "window": st.none() | st.tuples(wholes, wholes, *2 * [wholes.map(lambda count: count + 2)]),
+    "band": st.none() | wholes.map(lambda count: count + 1),
+    "encoding": st.none() | st.sampled_from(["mapbox", "terrarium"]),
     "max_edge": st.none() | positive,
     "footprint": st.sampled_from(FOOTPRINTS),
     "outside": st.sampled_from(OUTSIDES),

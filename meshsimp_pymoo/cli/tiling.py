@@ -42,7 +42,7 @@ from meshsimp_pymoo.workers import EngineError, open_engine
 KNOWN: dict[type[Any], tuple[str, ...]] = {
     Search: ("seed", "threads", "checkpoint"),  # nothing is left to chance, and finished tiles are always saved
     Rules: ("footprint", "outside"),  # a grid without gaps fills its hull
-    Options: ("up", "spacing", "nodata", "window"),
+    Options: ("up", "spacing", "nodata", "window", "band", "encoding"),
     Output: ("folder", "overwrite", "format", "meshes", "page", "quiet", "json"),
 }
 

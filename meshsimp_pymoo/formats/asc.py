@@ -11,72 +11,89 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
+    from meshsimp_pymoo.arrays import FloatArray
     from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
 
 # The lines that say what it is are the first few hundred bytes.
 HEADER_BYTES = 2000
 
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    """Read an ESRI ASCII grid: a line per key, then the rows of heights from north to south."""
-    from meshsimp_pymoo.formats.source.heights import grid_source
-    from meshsimp_pymoo.formats.source.numbers import parse_numbers
+    return _load(path, name, options).mesh(name, options.window)
 
-    steps = options.steps
-    text = path.read_bytes().decode("utf-8", errors="replace")
-    header: dict[str, float] = {}
-    at = 0
-    for match in re.finditer(r"[ \t]*([A-Za-z_]+)[ \t]+(\S+)[ \t]*(?:\r\n|\r|\n|$)", text):
-        if match.start() != at or match[1].lower() in ("nan", "inf"):
-            break
-        try:
-            header[match[1].lower()] = float(match[2])
-        except ValueError:
-            raise ModelError(
-                f"{name}: the header line {match[0].strip()[:60]!r} has no number; write it again"
-            ) from None
-        at = match.end()
-    missing = [key for key in ("ncols", "nrows") if key not in header]
-    if steps is None and "cellsize" not in header and not {"dx", "dy"} <= header.keys():
-        missing.append("cellsize")
-    if missing:
+
+def _open_heights(path: Path, name: str, options: Options) -> PlacedHeights:
+    return _load(path, name, options, by_windows=True).placed(name, options.window)
+
+
+def _load(path: Path, name: str, options: Options, *, by_windows: bool = False) -> Grid:
+    """Read an ESRI ASCII grid: a line per key, then the rows of heights from north to south."""
+    from meshsimp_pymoo.formats.source.esri import esri_header, header_lines
+    from meshsimp_pymoo.formats.source.heights import check_room, even_grid
+    from meshsimp_pymoo.formats.source.numbers import read_text
+
+    text = read_text(path, name)
+    lines, at = header_lines(text)
+    if not lines.keys() & {"ncols", "nrows", "cellsize"}:
+        first = text[:HEADER_BYTES].strip().partition("\n")[0]
         raise ModelError(
-            f"{name}: its header lacks {', '.join(missing)}, so it is no ESRI ASCII grid; check the suffix"
+            f"{name}: begins with {first[:60]!r} where an ESRI grid has 'ncols'; if it holds a point cloud, x y z in "
+            "every line, rename it to .xyz"
         )
-    columns, rows = header["ncols"], header["nrows"]
-    if not (columns >= 2 and rows >= 2 and columns % 1 == 0 and rows % 1 == 0):
-        raise ModelError(f"{name}: declares {columns:g} columns and {rows:g} rows; give at least 2 of each")
-    if columns * rows * 2 - 1 > len(text) - at:
+    header = esri_header(lines, options, name)
+    count = header.columns * header.rows
+    if count * 2 - 1 > len(text) - at:
         raise ModelError(
-            f"{name}: truncated: declares {columns:g} x {rows:g} heights, but {len(text) - at} bytes follow; "
+            f"{name}: truncated: declares {header.columns} x {header.rows} heights, but {len(text) - at} bytes follow; "
             "copy it again"
         )
-    heights = parse_numbers(text[at:], name)
-    if len(heights) != columns * rows:
+    check_room((header.rows, header.columns), 8, options, name, by_windows=by_windows)
+    heights = _numbers(text[at:], count, header.nodata, name)
+    if len(heights) != count:
         raise ModelError(
-            f"{name}: declares {columns:g} x {rows:g} = {columns * rows:g} heights, but {len(heights)} "
-            "follow; copy or write it again"
+            f"{name}: declares {header.columns} x {header.rows} = {count} heights, but {len(heights)} follow; copy or "
+            "write it again"
         )
-    cell = header.get("cellsize", 1.0)
-    dx, dy = steps or (header.get("dx", cell), header.get("dy", cell))
-    west = header.get("xllcenter", header.get("xllcorner", 0.0) + (dx / 2 if "xllcorner" in header else 0.0))
-    south = header.get("yllcenter", header.get("yllcorner", 0.0) + (dy / 2 if "yllcorner" in header else 0.0))
-    return grid_source(
-        heights.reshape(int(rows), int(columns)),
-        dx,
-        dy,
-        nodata=header.get("nodata_value", -9999.0) if options.nodata is None else options.nodata,  # ESRI's default
+    return even_grid(
+        heights.reshape(header.rows, header.columns),
+        header.dx,
+        header.dy,
+        nodata=header.nodata_value if options.nodata is None else options.nodata,
         name=name,
-        origin=(west, south + (rows - 1) * dy),
-        window=options.window,
+        origin=header.origin,
     )
 
 
+def _numbers(text: str, count: int, nodata: float | str, name: str) -> FloatArray:
+    """Return the heights; commas stand in them or between them, which their number tells."""
+    from meshsimp_pymoo.formats.source.numbers import parse_numbers
+
+    if isinstance(nodata, str):
+        text = re.sub(rf"(?<!\S){re.escape(nodata)}(?!\S)", "nan", text, flags=re.IGNORECASE)
+    if "," in text:
+        text = text.replace(",", "." if len(text.split()) == count else " ")
+    return parse_numbers(text, name)
+
+
 def _count_samples(path: Path, name: str) -> int | None:
+    from meshsimp_pymoo.formats.source.esri import header_lines
+    from meshsimp_pymoo.formats.source.numbers import without_mark
+
     with path.open("rb") as file:
-        header = file.read(HEADER_BYTES).decode("utf-8", errors="replace").lower()
-    sizes = [re.search(rf"^[ \t]*{key}[ \t]+(\d+)", header, re.MULTILINE) for key in ("nrows", "ncols")]
-    return int(sizes[0][1]) * int(sizes[1][1]) if sizes[0] and sizes[1] else None
+        lines, _ = header_lines(without_mark(file.read(HEADER_BYTES)).decode("utf-8", errors="replace"))
+    sizes = [lines.get(key, "") for key in ("nrows", "ncols")]
+    return int(sizes[0]) * int(sizes[1]) if all(size.isdecimal() for size in sizes) else None
 
 
-register(Format("asc", (".asc",), ".asc", "grid", read=_read, count_samples=_count_samples))
+register(
+    Format(
+        "asc",
+        (".asc",),
+        ".asc",
+        "grid",
+        read=_read,
+        open_heights=_open_heights,
+        count_samples=_count_samples,
+    )
+)

@@ -13,7 +13,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid, raise_if_memory, reason_of, warn_of
+from meshsimp_pymoo.errors import (
+    LONGEST_REASON,
+    ModelError,
+    ModelWarning,
+    NoFullGrid,
+    printable,
+    raise_if_memory,
+    reason_of,
+)
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
@@ -35,7 +43,7 @@ BAND_SAMPLES = 2_000_000
 
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
-    """Read the one band of a GeoTIFF as a triangle mesh.
+    """Read one band of a GeoTIFF as a triangle mesh.
 
     A sample lies at the middle of its pixel, at the place that the raster's transform says; rotated and mirrored
     rasters are read as they lie. Only the window is read. A scale and an offset of the band are applied, and samples
@@ -50,7 +58,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     options : Options
         ``spacing`` is the distance between columns and rows in place of the transform's; the raster's north-west corner
         stays. ``nodata`` marks missing samples in place of what the file says, before scale and offset. ``window`` is
-        the part to take.
+        the part to take, ``band`` the band; without, there must be only one beside those of transparency.
 
     Returns
     -------
@@ -62,22 +70,24 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     Raises
     ------
     ModelError
-        If rasterio is not installed, or the file is no GeoTIFF of one band of real numbers.
+        If rasterio is not installed, the file is no GeoTIFF of real numbers, or it has several bands and it is not said
+        which.
 
     Warns
     -----
     ModelWarning
         If its coordinates are degrees.
     """
-    from meshsimp_pymoo.formats.source.heights import check_window, grid_mesh
+    from meshsimp_pymoo.formats.source.heights import check_room, check_window, grid_mesh
 
     steps = options.steps
     with _opened(path, name) as raster:
-        kind, shape = _checked_band(raster, name)
+        band, kind, shape = _checked_band(raster, options.band, name)
         column, row, columns, rows = check_window(options.window, shape, name)
         _check_size(raster, kind, (columns, rows), path.stat().st_size, name)
+        check_room(shape, 0, options, name)
         place, mirrored = _placement(raster, steps, name)
-        height, hidden, missing = _read_part(raster, (column, row, columns, rows), options.nodata)
+        height, hidden, missing = _read_part(raster, band, (column, row, columns, rows), options.nodata)
         return grid_mesh(
             height,
             hidden,
@@ -87,7 +97,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
             corner=(row, column),
             file_columns=shape[1],
             mirrored=mirrored,
-            georeference=_georeference(raster, name) | {"window": [column, row, columns, rows]},
+            georeference=_georeference(raster, band, name) | {"window": [column, row, columns, rows]},
         )
 
 
@@ -132,8 +142,8 @@ class RasterHeights:
     Raises
     ------
     ModelError
-        If rasterio is not installed, the file is no GeoTIFF of one band of real numbers, or its rows do not run from
-        north to south along the axes. Later, if a part of it cannot be read.
+        If rasterio is not installed, the file is no GeoTIFF of real numbers, it has several bands and it is not said
+        which, or its rows do not run from north to south along the axes. Later, if a part of it cannot be read.
     """
 
     ndim = 2
@@ -150,7 +160,7 @@ class RasterHeights:
         self.path, self.name = path, name
         self._lock = threading.Lock()
         with _opened(path, name, keep=True) as raster:
-            kind, shape = _checked_band(raster, name)
+            band, kind, shape = _checked_band(raster, options.band, name)
             column, row, columns, rows = check_window(options.window, shape, name)
             _check_size(raster, kind, (columns, rows), path.stat().st_size, name, by_windows=True)
             place, mirrored = _placement(raster, steps, name)
@@ -166,8 +176,8 @@ class RasterHeights:
             i, j = row + np.arange(rows, dtype=np.int64), column + np.arange(columns, dtype=np.int64)
             self.x: FloatArray = np.asarray(place(np.int64(row), j)[0], np.float64)
             self.y: FloatArray = np.asarray(place(i, np.int64(column))[1], np.float64)
-            self.georeference = _georeference(raster, name) | {"window": [column, row, columns, rows]}
-            self._raster, self._nodata = raster, options.nodata
+            self.georeference = _georeference(raster, band, name) | {"window": [column, row, columns, rows]}
+            self._raster, self._band, self._nodata = raster, band, options.nodata
 
     def __getitem__(self, key: Any) -> FloatArray:
         import numpy as np
@@ -182,7 +192,7 @@ class RasterHeights:
     def _read(self, top: int, bottom: int, left: int, right: int) -> FloatArray:
         part = (self.corner[1] + left, self.corner[0] + top, right - left, bottom - top)
         with self._lock, _guarded(self.name), _environment():
-            height, hidden, missing = _read_part(self._raster, part, self._nodata)
+            height, hidden, missing = _read_part(self._raster, self._band, part, self._nodata)
         values: FloatArray = height.astype(self.dtype)
         if missing is not None:
             # in the grid's own precision: -3.4028235e38 must match its float32 neighbour
@@ -253,39 +263,52 @@ def _opened(path: Path, name: str, *, keep: bool = False) -> Iterator[Any]:
             raster.close()
 
 
-def _checked_band(raster: Any, name: str) -> tuple[np.dtype[Any], tuple[int, int]]:
-    """Return the type of the heights and the rows and columns, if they are one band of real numbers."""
+def _checked_band(raster: Any, band: int | None, name: str) -> tuple[int, np.dtype[Any], tuple[int, int]]:
+    """Return the number of the band of heights, its type, and its rows and columns."""
     import numpy as np
+    from rasterio.enums import ColorInterp
 
-    if raster.count != 1:
-        raise ModelError(
-            f"{name}: has {raster.count} bands; heights are one band: take it out (gdal_translate -b 1, say)"
-        )
-    kind = np.dtype(raster.dtypes[0])
+    if band is None:
+        found = [number for number, meant in enumerate(raster.colorinterp, start=1) if meant != ColorInterp.alpha]
+        if len(found) != 1:
+            raise ModelError(
+                f"{name}: has {raster.count} bands, and heights are one; say which, such as --band 1"
+                f"{_band_titles(raster)}"
+            )
+        (band,) = found
+    if band > raster.count:
+        raise ModelError(f"{name}: has {raster.count} bands, and no band {band}; leave the band out, or name another")
+    kind = np.dtype(raster.dtypes[band - 1])
     if kind.kind not in "iuf":
         raise ModelError(f"{name}: heights have the type {kind}; give real numbers")
-    return kind, (raster.height, raster.width)
+    return band, kind, (raster.height, raster.width)
+
+
+def _band_titles(raster: Any) -> str:
+    """Return what a raster says of its bands, for a message."""
+    said = [f"{number} is {title!r}" for number, title in enumerate(raster.descriptions, start=1) if title]
+    return printable(f" ({', '.join(said)}"[:LONGEST_REASON] + ")") if said else ""
 
 
 def _read_part(
-    raster: Any, part: tuple[int, int, int, int], nodata: float | None
+    raster: Any, band: int, part: tuple[int, int, int, int], nodata: float | None
 ) -> tuple[AnyArray, BoolArray, float | None]:
     """Read (column, row, columns, rows): heights, which are hidden, and the height that means "no sample" besides."""
     import numpy as np
     from rasterio.enums import MaskFlags
     from rasterio.windows import Window as Part
 
-    kind = np.dtype(raster.dtypes[0])
+    kind = np.dtype(raster.dtypes[band - 1])
     window = Part(*part)
-    height = raster.read(1, window=window)
-    flags = raster.mask_flag_enums[0]
+    height = raster.read(band, window=window)
+    flags = raster.mask_flag_enums[band - 1]
     hidden = np.zeros(height.shape, bool)
     if MaskFlags.all_valid not in flags and MaskFlags.nodata not in flags:
-        hidden = raster.read_masks(1, window=window) == 0
-    missing = raster.nodata if nodata is None else nodata
+        hidden = raster.read_masks(band, window=window) == 0
+    missing = raster.nodatavals[band - 1] if nodata is None else nodata
     if missing is not None and math.isnan(missing):
         missing = None  # NaN is missing anyway
-    scale, offset = float(raster.scales[0]), float(raster.offsets[0])
+    scale, offset = float(raster.scales[band - 1]), float(raster.offsets[band - 1])
     if (scale, offset) != (1.0, 0.0):
         if missing is not None:
             hidden |= height == (kind.type(missing) if kind.kind == "f" else missing)
@@ -304,12 +327,15 @@ def _check_size(
     by_windows: bool = False,
 ) -> None:
     """Refuse what no file of this size can hold, before anything is allocated; read by windows it may be larger."""
+    from rasterio.enums import Interleaving
+
     from meshsimp_pymoo.files import DEFLATE_LIMIT, UNPACKED_LIMIT
 
     credible = max(UNPACKED_FLOOR, DEFLATE_LIMIT * file_size)
     blocks = [(raster.width, raster.height)] if raster.compression is None else []
-    # a strip or tile is unpacked whole, however small the window is
-    whole = [(width, height) for height, width in raster.block_shapes]
+    # a strip or tile is unpacked whole, however small the window is, and with all bands if they lie sample by sample
+    together = raster.count if raster.interleaving is Interleaving.pixel else 1
+    whole = [(width * together, height) for height, width in raster.block_shapes]
     for columns, rows in (part, *whole, *blocks):
         needed = columns * rows * kind.itemsize
         if needed > (credible if by_windows and (columns, rows) not in whole else min(credible, UNPACKED_LIMIT)):
@@ -340,21 +366,21 @@ def _placement(raster: Any, steps: tuple[float, float] | None, name: str) -> tup
     return place, a * e - b * d > 0
 
 
-def _georeference(raster: Any, name: str) -> dict[str, Any]:
+def _georeference(raster: Any, band: int, name: str) -> dict[str, Any]:
+    from meshsimp_pymoo.formats.source.heights import warn_of_degrees
+
+    nodata = raster.nodatavals[band - 1]
     facts: dict[str, Any] = {
         "transform": [float(value) for value in tuple(raster.transform)[:6]],
         "size": [raster.width, raster.height],
-        "nodata": None if raster.nodata is None else repr(float(raster.nodata)),
+        "nodata": None if nodata is None else repr(float(nodata)),
     }
     crs = raster.crs
     if crs:
         facts |= {"crs": crs.to_wkt(), "epsg": crs.to_epsg()}
         facts["unit"] = crs.linear_units if crs.is_projected else "degree"
         if crs.is_geographic:
-            warn_of(
-                f"{name}: its coordinates are degrees, its heights are not; triangles are shaped in degrees: for "
-                "shapes in metres project it first (gdalwarp -t_srs)"
-            )
+            warn_of_degrees(name)
     return facts
 
 

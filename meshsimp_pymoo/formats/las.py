@@ -6,7 +6,7 @@ import struct
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-from meshsimp_pymoo.errors import ModelError, reason_of, warn_of
+from meshsimp_pymoo.errors import ModelError, reason_of, warn_of, way_to_install
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import Format, register
 
@@ -35,7 +35,7 @@ def _read_points(path: Path, name: str) -> tuple[FloatArray, dict[str, Any], dic
     with path.open("rb") as stream:
         packed = _check(stream, path.stat().st_size, name)
     if packed and not laspy.LazBackend.Lazrs.is_available():
-        raise ModelError(f"{name}: packed points need lazrs; install it by pip install 'meshsimp-pymoo[las]'")
+        raise ModelError(f"{name}: packed points need lazrs; install it by {way_to_install('las')}")
     parts: list[dict[str, Any]] = []
     withheld = 0
     try:

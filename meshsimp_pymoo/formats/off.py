@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 
     from meshsimp_pymoo.formats.source import SourceMesh
 
+# The word that a file may begin with, and says what a vertex has beside its place; the counts may follow at once.
+KEYWORD = re.compile(
+    r"(?P<texture>ST)?(?P<colors>C)?(?P<normals>N)?(?P<other>4?n?)OFF(?=[\s\d]|$)\s*|(?=\d+\s+\d+(\s+\d+)?\s*$)"
+)
+
 
 def _read(path: Path, name: str, options: Options) -> SourceMesh:
     import numpy as np
@@ -24,11 +29,18 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.formats.source.numbers import even_table, fans, parse_numbers, rgba_of, text_lines, whole
 
     lines = [line for line in text_lines(path) if line]
-    keyword = re.match(r"(ST)?(C)?(N)?OFF\b\s*", lines[0]) if lines else None
+    begin = lines[0] if lines else ""
+    keyword = KEYWORD.match(begin)
     if keyword is None:
-        begin = lines[0][:24] if lines else ""
-        raise ModelError(f"{name}: is not an OFF file (it begins with {begin!r}, not with 'OFF'); check the suffix")
-    rest = lines[0][keyword.end() :]
+        raise ModelError(
+            f"{name}: is not an OFF file (it begins with {begin[:24]!r}, not with 'OFF'); check the suffix"
+        )
+    if keyword["other"]:
+        raise ModelError(
+            f"{name}: its vertices have another number of coordinates than 3 (it begins with {keyword[0].strip()!r}); "
+            "save it as plain OFF"
+        )
+    rest = begin[keyword.end() :]
     if "BINARY" in rest.upper():
         raise ModelError(f"{name}: is a binary OFF, which is not read; save it as text or as PLY")
     lines = ([rest] if rest else []) + lines[1:]
@@ -45,9 +57,14 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         )
     table, width = even_table(lines[1 : 1 + n_vertices], name, "vertex", 3)
     attributes: dict[str, npt.ArrayLike] = {}
-    first_color = 6 if keyword[3] else 3
-    last_color = min(first_color + 4, width - (2 if keyword[1] else 0))
-    if keyword[2] and last_color - first_color >= 3:
+    named = 3 + 3 * bool(keyword["normals"]) + 4 * bool(keyword["colors"]) + 2 * bool(keyword["texture"])
+    if width > named:
+        warn_of(f"{name}: its vertices have {width} numbers, of which its keyword names {named}; the others stay behind")
+    if keyword["texture"]:
+        warn_of(f"{name}: its texture coordinates stay behind")
+    first_color = 6 if keyword["normals"] else 3
+    last_color = min(first_color + 4, width - (2 if keyword["texture"] else 0))
+    if keyword["colors"] and last_color - first_color >= 3:
         if (color := rgba_of(list(table[:, first_color:last_color].T))) is not None:
             attributes["color"] = color
         else:

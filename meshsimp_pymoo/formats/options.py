@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-from meshsimp_pymoo.settings import LARGEST, Choice, Direction, Part, Real, Steps, setting, settle
+from meshsimp_pymoo.settings import LARGEST, Choice, Direction, Part, Real, Steps, Whole, setting, settle
 
 # The part of a grid to take: column, row, columns, rows.
 Window = tuple[int, int, int, int]
@@ -62,6 +62,24 @@ class Options:
         help="the part of a height grid to take, from 0",
         metavar="COLUMN,ROW,COLUMNS,ROWS",
         describes=("grid",),
+    )
+    band: int | None = setting(
+        None,
+        kind=Whole(1),
+        accepts="int, optional",
+        doc="The band of a GeoTIFF that holds the heights, from 1; needed where there are several.",
+        help="the band of a GeoTIFF that holds the heights, from 1",
+        metavar="N",
+        describes=("geotiff",),
+    )
+    encoding: str | None = setting(
+        None,
+        kind=Choice(("mapbox", "terrarium")),
+        accepts='"mapbox" or "terrarium", optional',
+        doc="How the colours of a terrain-RGB PNG are heights [m]: -10000 + (65536 R + 256 G + B) / 10, or "
+        "256 R + G + B / 256 - 32768.",
+        help="how the colours of a terrain-RGB PNG are heights",
+        describes=("png",),
     )
     max_edge: float | None = setting(
         None,

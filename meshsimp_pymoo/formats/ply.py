@@ -43,9 +43,10 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     import numpy as np
 
     from meshsimp_pymoo.formats.source import build_source
+    from meshsimp_pymoo.formats.source.numbers import without_mark
     from meshsimp_pymoo.formats.source.rows import binary_columns, text_columns
 
-    data = path.read_bytes()
+    data = without_mark(path.read_bytes())
     elements, order, start = _header(data, name)
     named = {element.name: element for element in elements}
     if "vertex" not in named:

@@ -25,6 +25,8 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
 
 def _check(path: Path, name: str) -> None:
     """Compare a binary STL's declared count with its size, and see that a text one is complete."""
+    from meshsimp_pymoo.formats.source.numbers import without_mark
+
     size = path.stat().st_size
     with path.open("rb") as stream:
         head = stream.read(84)
@@ -32,7 +34,7 @@ def _check(path: Path, name: str) -> None:
             declared = struct.unpack("<I", head[80:])[0]
             if 84 + 50 * declared == size:
                 return
-        if head.lstrip()[:5].lower() != b"solid":
+        if without_mark(head).lstrip()[:5].lower() != b"solid":
             if len(head) < 84:
                 raise ModelError(f"{name}: is not an STL file ({size} bytes); check the suffix")
             raise ModelError(

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from meshsimp_pymoo import formats
 from meshsimp_pymoo.discovery import modules_in
-from meshsimp_pymoo.errors import ModelError, ModelWarning, raise_if_memory, reason_of
+from meshsimp_pymoo.errors import ModelError, ModelWarning, raise_if_memory, reason_of, way_to_install
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.settings import defaults_of, settings_of
@@ -34,8 +34,34 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.formats.source.heights import PlacedHeights
 
-# The sorts of models, as messages call them; a setting may describe one of them alone.
+# The sorts of models, as messages call them; a setting may describe some of them alone, or a format.
 SORTS = {"mesh": "meshes", "grid": "height grids", "cloud": "point clouds"}
+
+# What to do with files of formats that are not read.
+WAYS_OUT = (
+    (
+        ".vrt .grd .img .dem .adf .bil .bip .bsq .nc .h5 .hdf .grib .grb2 .jp2 .ecw .sid .dt0 .dt1 .dt2 .ter .rst "
+        ".sdat .kea .mbtiles .webp .jpg .jpeg .bmp .pgm .raw",
+        "if it is a raster of heights, make it a GeoTIFF (gdal_translate {file} out.tif)",
+    ),
+    (".hdr .prj .tfw .aux", "it says something of a file beside it: name that one"),
+    (
+        ".e57 .pcd .ptx .pcg .fls .fws .rcp .rcs .zfs .rdb .rdbx .bpf .bin .zlas",
+        "if it is a point cloud, save it as .las or .xyz, or with its faces as .ply (by CloudCompare, say, or PDAL: "
+        "pdal translate {file} out.las)",
+    ),
+    (
+        ".fbx .blend .3ds .dae .zae .3mf .3dxml .stp .step .igs .iges .brep .dxf .dwg .skp .wrl .x3d .usd .usda .usdc "
+        ".usdz .ctm .max .ma .mb .c4d .lwo .abc .vtk .vtp .vtu .msh .mesh .amf .u3d .drc .ifc .3dm .ts .2dm .cbor",
+        "if it is a mesh, export it as .ply, .obj or .glb from the program that made it",
+    ),
+    (".zip .gz .tgz .tar .7z .bz2 .xz .zst .rar .kmz", "no archive is unpacked: unpack it, and name the file in it"),
+    (
+        ".shp .gpkg .geojson .json .kml .gml .gpx .gdb",
+        "it holds features: make a raster of them (gdal_grid), or save their points as x y z (.xyz)",
+    ),
+    (".xls .xlsx .ods", "save the table as .csv, x y z in every line"),
+)
 
 
 class Held(Protocol):
@@ -222,7 +248,7 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
         A file in one of the formats of this folder. A scene of several meshes is read as one. Polygons are cut into
         triangle fans.
     options : Options
-        How it is read; what describes another sort of model than this one is refused.
+        How it is read; what describes another sort of model, or another format, than this one is refused.
 
     Returns
     -------
@@ -245,11 +271,21 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     _check_file(path, name)
     kind = format_of_input(path)
     if kind is None or kind.read is None:
-        known = [f"{' '.join(read_suffixes(sort))} for {title}" for sort, title in SORTS.items()]
-        raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; known are {listed(known)}")
-    refuse_foreign(name, kind.sort, options)
+        raise ModelError(f"{name}: unknown suffix {path.suffix.lower()!r}; {_way_out(path)}")
+    refuse_foreign(name, options, kind.name, kind.sort)
     with guarded(kind, name):
         return kind.read(path, name, options)
+
+
+def _way_out(path: Path) -> str:
+    """Return what to do with a file whose suffix is that of no format."""
+    from meshsimp_pymoo.files import as_argument
+
+    for suffixes, advice in WAYS_OUT:
+        if path.suffix.lower() in suffixes.split():
+            return advice.format(file=as_argument(path))
+    known = [f"{' '.join(read_suffixes(sort))} for {title}" for sort, title in SORTS.items()]
+    return f"known are {listed(known)}"
 
 
 def listed(words: Iterable[str]) -> str:
@@ -262,10 +298,10 @@ def listed(words: Iterable[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
-def described(sort: str | None = None) -> list[str]:
-    """Return the settings of `Options` that describe this sort of model; None: that describe some sorts alone."""
+def described(*models: str) -> list[str]:
+    """Return the settings of `Options` that describe one of these sorts or formats of models; none: all such ones."""
     known = settings_of(Options).items()
-    return [name for name, setting in known if setting.describes and (sort is None or sort in setting.describes)]
+    return [name for name, setting in known if setting.describes and (not models or {*models} & {*setting.describes})]
 
 
 def are_given(names: Iterable[str], options: Options) -> bool:
@@ -274,21 +310,23 @@ def are_given(names: Iterable[str], options: Options) -> bool:
     return any(getattr(options, name) != defaults[name] for name in names)
 
 
-def refuse_foreign(name: str, sort: str, options: Options) -> None:
-    """Refuse settings that describe another sort of model than this one.
+def refuse_foreign(name: str, options: Options, *models: str) -> None:
+    """Refuse settings that describe other models than those of these sorts and formats.
 
     Raises
     ------
     ModelError
-        With the settings of that sort, and the suffixes of its files.
+        With the settings of another sort or format, and the suffixes of its files.
     """
-    for other, title in SORTS.items():
-        names = [known for known in described(other) if known not in described(sort)]
+    known = {sort: (title, read_suffixes(sort, further=False)) for sort, title in SORTS.items()}
+    known |= {kind.name: (kind.title, list(kind.suffixes)) for kind in all_formats()}
+    own = described(*models)
+    for other, (title, suffixes) in known.items():
+        names = [setting for setting in described(other) if setting not in own]
         if not are_given(names, options):
             continue
         describe, leave = ("describe", "them") if len(names) > 1 else ("describes", "it")
-        suffixes = " ".join(read_suffixes(other, further=False))
-        raise ModelError(f"{name}: {listed(names)} {describe} {title} ({suffixes}); leave {leave} out")
+        raise ModelError(f"{name}: {listed(names)} {describe} {title} ({' '.join(suffixes)}); leave {leave} out")
 
 
 def _check_file(path: Path, name: str) -> None:
@@ -322,9 +360,7 @@ def guarded(kind: Format, name: str) -> Iterator[None]:
         if not kind.extra:
             raise
         library = (error.name or kind.extra).partition(".")[0]
-        raise ModelError(
-            f"{name}: {kind.title} needs {library}; install it by pip install 'meshsimp-pymoo[{kind.extra}]'"
-        ) from None
+        raise ModelError(f"{name}: {kind.title} needs {library}; install it by {way_to_install(kind.extra)}") from None
     except OSError as error:
         raise_if_memory(error)
         raise ModelError(f"{name}: cannot be read ({reason_of(error)}); check the path and its permissions") from error

@@ -240,7 +240,7 @@ def open_grid(
     if kind is None or kind.open_heights is None or not path.is_file():
         return _grid_of_model(open_model(model, options))
     name = str(path)
-    _refuse_other_sides(name, options)
+    _refuse_other_sides(name, options, kind.name)
     with guarded(kind, name):
         return _grid_of_heights(name, kind.open_heights(path, name, options))
 
@@ -265,9 +265,9 @@ def count_samples(model: str | os.PathLike[str], *, window: Window | None = None
         return kind.count_samples(path, str(path))
 
 
-def _refuse_other_sides(name: str, options: Options) -> None:
+def _refuse_other_sides(name: str, options: Options, *formats: str) -> None:
     """Refuse what says nothing of heights over rows and columns."""
-    refuse_foreign(name, "grid", options)
+    refuse_foreign(name, options, "grid", *formats)
     if options.up not in ("auto", "z", "+z"):
         raise ModelError(f"{name}: heights of a grid are along z; leave up={options.up!r} out")
     if options.patch is not None:

@@ -441,15 +441,3 @@ def test_a_tile_that_does_not_fit_after_all_is_said_in_one_line(path, tmp_path, 
     assert main(command(path, out)) == 2
     refused(capsys, "does not fit into memory", "smaller tiles")
     assert len(pieces(out)) >= 2
-
-
-def test_the_free_memory_is_what_the_system_and_the_limits_say(tmp_path, monkeypatch):
-    for_all, _ = memory.free_memory()
-    assert 1 << 20 < for_all
-    (tmp_path / "memory.stat").write_text("anon 5\nfile 300\n")
-    (tmp_path / "memory.current").write_text("1000\n")
-    (tmp_path / "memory.max").write_text("5000\n")
-    monkeypatch.setattr(memory, "CONTROL_GROUPS", ((str(tmp_path), "memory.max", "memory.current", "file"),))
-    assert memory.free_memory()[0] == 5000 - (1000 - 300)
-    (tmp_path / "memory.max").write_text("max\n")
-    assert memory.free_memory()[0] > 1 << 20

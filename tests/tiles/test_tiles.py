@@ -101,7 +101,7 @@ def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
     with pytest.raises(ModelError, match="has weights"):
         open_grid(SMALL.with_weights(np.full(SMALL.n_vertices, 2.0)))
     (tmp_path / "z.npy").write_bytes(b"\x93NUMPY nonsense")
-    with pytest.raises(ModelError, match="not a whole NumPy array file"):
+    with pytest.raises(ModelError, match="is not a NumPy array file"):
         open_grid(tmp_path / "z.npy")
 
 

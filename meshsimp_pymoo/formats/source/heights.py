@@ -13,10 +13,156 @@ from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray
 from meshsimp_pymoo.errors import ModelError, NoFullGrid, warn_of
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.memory import check_free
 
 # Values that programs write where a grid has no sample; and from this size on a height is none.
-NODATA_HABITS = (-9999.0, 9999.0, -99999.0, -999.0, -32768.0, -32767.0, 32767.0, 65535.0)
+NODATA_HABITS = (-9999.0, 9999.0, -99999.0, -999.0, -10000.0, -32768.0, -32767.0, 32767.0, 65535.0)
 NODATA_SIZE = 1e30
+# What a sample takes while a mesh is made of it: measured, rounded down.
+MESH_SAMPLE_BYTES = 300
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A whole height grid in memory, and where its rows and columns lie.
+
+    Attributes
+    ----------
+    heights : (R, C) array, masked array or memory map of a real type
+        [file units].
+    x : (C,) float array
+        Where the columns are, ascending or descending, evenly or not [file units].
+    y : (R,) float array
+        Where the rows are, likewise [file units].
+    nodata : float, optional
+        Height that marks missing samples, beside NaN and masked ones.
+    georeference : dict
+        See :class:`~meshsimp_pymoo.formats.source.SourceMesh`.
+    """
+
+    heights: AnyArray
+    x: FloatArray
+    y: FloatArray
+    nodata: float | None = None
+    georeference: dict[str, Any] = field(default_factory=dict)
+
+    def mesh(self, name: str, window: Window | None = None) -> SourceMesh:
+        """Make a mesh of the grid, or of a part of it; see :func:`grid_source`."""
+        column, row, columns, rows = check_window(window, self.shape, name)
+        part = np.s_[row : row + rows, column : column + columns]
+        return grid_mesh(
+            np.asarray(np.ma.getdata(self.heights))[part],
+            np.ma.getmaskarray(self.heights)[part],
+            lambda i, j: (self.x[j], self.y[i]),
+            nodata=self.nodata,
+            name=name,
+            corner=(row, column),
+            file_columns=self.shape[1],
+            mirrored=bool((self.x[1] > self.x[0]) == (self.y[1] > self.y[0])),
+            georeference=self.georeference,
+        )
+
+    def placed(self, name: str, window: Window | None = None) -> PlacedHeights:
+        """Return the grid, or a part of it, for work by tiles, without looking at its heights.
+
+        Raises
+        ------
+        NoFullGrid
+            If samples are masked, or its rows do not run from north to south and its columns from west to east.
+        """
+        if np.ma.getmask(self.heights).any():
+            raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
+        if self.x[1] < self.x[0] or self.y[1] > self.y[0]:
+            raise NoFullGrid(
+                f"{name}: its rows run to the north or its columns to the west, and tiles want the north-west first; "
+                "turn it (numpy.flipud, numpy.fliplr), with its axes, or leave the tiles out (--tile none)"
+            )
+        column, row, columns, rows = check_window(window, self.shape, name)
+        return PlacedHeights(
+            np.ma.getdata(self.heights)[row : row + rows, column : column + columns],
+            self.x[column : column + columns],
+            self.y[row : row + rows],
+            self.nodata,
+            (row, column),
+            self.shape[1],
+            self.georeference,
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.heights.shape[0], self.heights.shape[1]
+
+
+def even_grid(
+    heights: npt.ArrayLike,
+    dx: float = 1.0,
+    dy: float = 1.0,
+    *,
+    nodata: float | None = None,
+    name: str = "grid",
+    origin: tuple[float, float] = (0.0, 0.0),
+    georeference: dict[str, Any] | None = None,
+) -> Grid:
+    """Place heights whose rows run from north to south, columns and rows as far apart as said; see :func:`grid_source`.
+
+    Raises
+    ------
+    ModelError
+        For anything but a grid of at least 2 x 2 real numbers with a positive spacing.
+    """
+    array = np.asanyarray(heights)
+    check_heights(array.shape, array.dtype, name)
+    for label, step in (("dx", dx), ("dy", dy)):
+        if not (np.isfinite(step) and step > 0):
+            raise ModelError(f"{name}: the spacing {label} is {step}; give a positive number")
+    rows, columns = array.shape
+    x: FloatArray = origin[0] + np.arange(columns, dtype=np.float64) * dx
+    y: FloatArray = origin[1] - np.arange(rows, dtype=np.float64) * dy
+    return Grid(array, x, y, nodata, georeference or {})
+
+
+def check_heights(shape: tuple[int, ...], kind: np.dtype[Any], name: str) -> None:
+    """Refuse anything but a grid of at least 2 x 2 real numbers."""
+    if kind.kind not in "iuf":
+        raise ModelError(f"{name}: heights have the type {kind}; give real numbers")
+    if len(shape) != 2 or min(shape) < 2:
+        raise ModelError(f"{name}: heights have the shape {shape}; give a grid of at least 2 x 2")
+
+
+def check_room(
+    shape: tuple[int, ...], sample_bytes: int, options: Options, name: str, *, by_windows: bool = False
+) -> None:
+    """Refuse a grid whose declared size does not fit into memory, before anything is allocated.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Rows and columns that the file declares.
+    sample_bytes : int
+        What a sample of the file takes once it is read.
+    options : Options
+        The window.
+    name : str
+        What messages call it.
+    by_windows : bool
+        Whether it is to be cut into tiles, instead of being made one mesh.
+    """
+    _, _, columns, rows = check_window(options.window, (shape[0], shape[1]), name)
+    needed = shape[0] * shape[1] * sample_bytes + (0 if by_windows else columns * rows * MESH_SAMPLE_BYTES)
+    check_free(
+        needed,
+        f"{name}: {shape[1]} x {shape[0]} samples",
+        "take a part of it (--window)" + ("" if by_windows else ", or tiles (--tile)"),
+    )
+
+
+def warn_of_degrees(name: str) -> None:
+    """Warn that the plane of a model is in degrees."""
+    warn_of(
+        f"{name}: its coordinates are degrees, its heights are not; triangles are shaped in degrees: for "
+        "shapes in metres project it first (gdalwarp -t_srs)"
+    )
 
 
 def grid_source(
@@ -68,25 +214,7 @@ def grid_source(
     >>> grid_source([[0.0, 1.0, 4.0], [2.0, 3.0, float("nan")]]).faces.tolist()
     [[0, 3, 4], [0, 4, 1], [1, 4, 2]]
     """
-    if isinstance(elevation, np.ma.MaskedArray):
-        hidden = np.ma.getmaskarray(elevation)
-        height = np.asarray(elevation.data)
-    else:
-        height = np.asarray(elevation)
-        hidden = np.zeros(height.shape, bool)
-    _check_heights(height, name)
-    _check_steps(dx, dy, name)
-    column, row, columns, rows = check_window(window, height.shape, name)
-    part = np.s_[row : row + rows, column : column + columns]
-    return grid_mesh(
-        height[part],
-        hidden[part],
-        lambda i, j: (origin[0] + j * dx, origin[1] - i * dy),
-        nodata=nodata,
-        name=name,
-        corner=(row, column),
-        file_columns=height.shape[1],
-    )
+    return even_grid(elevation, dx, dy, nodata=nodata, name=name, origin=origin).mesh(name, window)
 
 
 def check_window(window: Window | None, shape: tuple[int, int], name: str) -> tuple[int, int, int, int]:
@@ -244,35 +372,4 @@ def placed_heights(heights: AnyArray, name: str, options: Options) -> PlacedHeig
     ModelError
         For anything but a grid of at least 2 x 2 real numbers with a positive spacing, and none of them masked.
     """
-    if isinstance(heights, np.ma.MaskedArray):
-        if np.ma.getmaskarray(heights).any():
-            raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
-        heights = heights.data
-    _check_heights(heights, name)
-    dx, dy = options.steps or (1.0, 1.0)
-    _check_steps(dx, dy, name)
-    column, row, columns, rows = check_window(options.window, (heights.shape[0], heights.shape[1]), name)
-    return PlacedHeights(
-        heights[row : row + rows, column : column + columns],
-        np.arange(column, column + columns, dtype=np.float64) * dx,
-        0.0 - np.arange(row, row + rows, dtype=np.float64) * dy,
-        options.nodata,
-        (row, column),
-        heights.shape[1],
-    )
-
-
-# -------------------------------------------------------------------------------------------------------------- checks
-
-
-def _check_heights(heights: AnyArray, name: str) -> None:
-    if heights.dtype.kind not in "iuf":
-        raise ModelError(f"{name}: heights have the type {heights.dtype}; give real numbers")
-    if heights.ndim != 2 or min(heights.shape) < 2:
-        raise ModelError(f"{name}: heights have the shape {heights.shape}; give a grid of at least 2 x 2")
-
-
-def _check_steps(dx: float, dy: float, name: str) -> None:
-    for label, step in (("dx", dx), ("dy", dy)):
-        if not (np.isfinite(step) and step > 0):
-            raise ModelError(f"{name}: the spacing {label} is {step}; give a positive number")
+    return even_grid(heights, *(options.steps or ()), nodata=options.nodata, name=name).placed(name, options.window)

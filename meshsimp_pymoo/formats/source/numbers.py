@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import warnings
 from pathlib import Path
 
@@ -10,6 +11,10 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.memory import check_free
+
+# What a byte of a text takes at least, as bytes and as text.
+TEXT_BYTES = 2
 
 
 def parse_numbers(text: str, name: str) -> FloatArray:
@@ -64,9 +69,34 @@ def rgba_of(channels: list[AnyArray]) -> npt.NDArray[np.uint8] | None:
     return np.column_stack(columns)
 
 
+def without_mark(data: bytes) -> bytes:
+    r"""Return a file's bytes without the byte order mark that editors put before text, and UTF-16 as UTF-8.
+
+    >>> without_mark(b"\xef\xbb\xbfOFF"), without_mark("OFF".encode("utf-16")), without_mark(b"OFF")
+    (b'OFF', b'OFF', b'OFF')
+    """
+    for mark, encoding in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
+        if data.startswith(mark):
+            return data[len(mark) :].decode(encoding, errors="replace").encode()
+    return data.removeprefix(codecs.BOM_UTF8)
+
+
+def read_text(path: Path, name: str) -> str:
+    """Return all of a text file, whatever byte order mark it begins with.
+
+    Raises
+    ------
+    ModelError
+        If it does not fit into memory.
+    """
+    size = path.stat().st_size
+    check_free(TEXT_BYTES * size, f"{name}: its {size} bytes of text", "take a part of it")
+    return without_mark(path.read_bytes()).decode("utf-8", errors="replace")
+
+
 def text_lines(path: Path) -> list[str]:
     """Return a text file's lines without comments and outer blanks; empty ones stay, so that they count."""
-    text = path.read_bytes().decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ")
+    text = read_text(path, str(path)).replace("\\\r\n", " ").replace("\\\n", " ")
     return [line.partition("#")[0].strip() for line in text.splitlines()]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import warnings
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, reason_of, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
-from meshsimp_pymoo.formats.source.numbers import rgba_of
+from meshsimp_pymoo.formats.source.numbers import rgba_of, without_mark
 
 if TYPE_CHECKING:
     import trimesh
@@ -52,14 +53,12 @@ def read_scene(path: Path, name: str) -> SourceMesh:
         If trimesh cannot, or it holds no mesh.
     """
     suffix = path.suffix.lower()
-    import trimesh
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         # older NumPy only warns when a number cannot be read
         warnings.filterwarnings("error", message="string or file could not be read")
         try:
-            loaded = trimesh.load(str(path), process=False)
+            loaded = _loaded(path, suffix)
         except (OSError, MemoryError):
             raise
         except Exception as error:  # a damaged file may break the reader anywhere
@@ -80,6 +79,19 @@ def read_scene(path: Path, name: str) -> SourceMesh:
         attributes = {key: values[first] for key, values in attributes.items()}
         return build_source(points, faces, attributes, name, rows=first)
     return build_source(points, faces, attributes, name)
+
+
+def _loaded(path: Path, suffix: str) -> Any:
+    """Return what trimesh makes of a file; it would stumble over a byte order mark, which is left out."""
+    import trimesh
+
+    with path.open("rb") as stream:
+        head = stream.read(4)
+    if without_mark(head) == head:
+        return trimesh.load(str(path), process=False)
+    content = io.BytesIO(without_mark(path.read_bytes()))
+    beside = trimesh.resolvers.FilePathResolver(str(path))
+    return trimesh.load(content, file_type=suffix.lstrip("."), resolver=beside, process=False)
 
 
 def _trimesh_arrays(mesh: Any) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:

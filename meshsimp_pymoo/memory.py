@@ -1,0 +1,88 @@
+"""How much memory is free: asked before anything large is begun."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from meshsimp_pymoo.errors import ModelError
+
+# Where a control group says its limit, what is taken, and how much of that are files that can be read again.
+CONTROL_GROUPS = (
+    ("/sys/fs/cgroup", "memory.max", "memory.current", "file"),
+    ("/sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes", "total_cache"),
+)
+
+
+def check_free(needed: float, what: str, way_out: str) -> None:
+    """Refuse what does not fit into the memory that is free.
+
+    Parameters
+    ----------
+    needed : float
+        What it takes at least [bytes].
+    what : str
+        Begins the message: the file, and what in it needs the memory; plural.
+    way_out : str
+        Ends the message.
+
+    Raises
+    ------
+    ModelError
+        With both sizes.
+    """
+    free = min(free_memory())
+    if needed > free:
+        raise ModelError(f"{what} need about {spelled(needed)}, and {spelled(free)} are free; {way_out}")
+
+
+def free_memory() -> tuple[float, float]:
+    """Return the bytes that are free for all processes together, and for each one; infinite where nobody says.
+
+    Asked are the system, the limits of this process and those of its control group.
+    """
+    for_all = [_from_meminfo(), _of_control_group()]
+    return min(for_all), _of_this_process()
+
+
+def _of_this_process() -> float:
+    try:
+        import resource
+    except ImportError:  # Windows
+        return float("inf")
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY:
+        return float("inf")
+    try:
+        used = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        used = 0
+    return float(max(limit - used, 0))
+
+
+def _from_meminfo() -> float:
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, ValueError, IndexError, StopIteration):
+        return float("inf")
+
+
+def _of_control_group() -> float:
+    for folder, limit, used, cache in CONTROL_GROUPS:
+        try:
+            stat = dict(line.split() for line in Path(folder, "memory.stat").read_text().splitlines())
+            taken = int(Path(folder, used).read_text()) - int(stat[cache])
+            return float(max(int(Path(folder, limit).read_text()) - taken, 0))
+        except (OSError, ValueError, KeyError):  # there is none, or it says "max"
+            continue
+    return float("inf")
+
+
+def spelled(size: float) -> str:
+    """Return a size as people say it.
+
+    >>> spelled(5 << 20), spelled(3 << 29)
+    ('5 MiB', '1.5 GiB')
+    """
+    return f"{size / 2**30:.1f} GiB" if size >= 2**30 else f"{size / 2**20:.0f} MiB"
