@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,7 @@ def _check(path: Path, name: str, *, packed: bool) -> None:
     """Refuse a glTF whose declared sizes exceed what its file can hold."""
     import json
 
+    from meshsimp_pymoo.formats.source import check_fits
     from meshsimp_pymoo.formats.source.numbers import glimpse
 
     size = path.stat().st_size
@@ -54,12 +56,46 @@ def _check(path: Path, name: str, *, packed: bool) -> None:
         # an accessor without a buffer view is all zeros: a few bytes that could ask for any amount of memory
         counts = [int(item.get("count", 0)) for item in accessors if "bufferView" not in item]
         outside = [uri for uri in _uris(tree) if not _is_beside(uri)]
-    except (ValueError, AttributeError, TypeError, OverflowError, RecursionError) as error:
+        vertices, triangles = _placed_sizes(tree)
+        is_tree = _has_tree(tree)
+    except (ValueError, AttributeError, TypeError, LookupError, OverflowError, RecursionError) as error:
         raise ModelError(f"{name}: its JSON part cannot be read ({reason_of(error)}); export the file again") from error
     if outside:
         raise ModelError(f"{name}: names {outside[0][:80]!r}, which is outside its folder; export it as .glb")
+    if not is_tree:
+        raise ModelError(f"{name}: its nodes are no tree: some stand below two others or themselves; export it again")
+    check_fits(vertices, triangles, name)
     if max(counts, default=0) > size:
         raise ModelError(f"{name}: declares {max(counts)} empty values in a file of {size} bytes; export it again")
+
+
+def _placed_sizes(tree: Any) -> tuple[int, int]:
+    """Return the vertices and triangles of all meshes, each as often as nodes place it, at least once."""
+    accessors = tree.get("accessors", [])
+    meshes = tree.get("meshes", [])
+    placed = Counter(node["mesh"] for node in tree.get("nodes", []) if "mesh" in node)
+    vertices, corners = 0, 0
+    for k, mesh in enumerate(meshes):
+        for part in mesh["primitives"]:
+            count = int(accessors[part["attributes"]["POSITION"]]["count"])
+            vertices += max(placed[k], 1) * count
+            corners += max(placed[k], 1) * (int(accessors[part["indices"]]["count"]) if "indices" in part else count)
+    return vertices, corners // 3
+
+
+def _has_tree(tree: Any) -> bool:
+    """Tell whether every node stands below one other node at most, and none below itself."""
+    below = {k: node.get("children", []) for k, node in enumerate(tree.get("nodes", []))}
+    children = [child for found in below.values() for child in found]
+    if len(set(children)) < len(children):
+        return False
+    reached = set(below) - set(children)
+    todo = list(reached)
+    while todo:
+        new = below[todo.pop()]
+        todo += new
+        reached.update(new)
+    return len(reached) == len(below)
 
 
 def _uris(tree: Any) -> list[str]:

@@ -457,7 +457,7 @@ def long_text(rng: np.random.Generator) -> Case:
     if kind == "ply":
         rest = b"element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
         return kind, text + piece * n + rest
-    at = _one_of(rng, [0, len(text), text.index(b"\n") + 1, text.rindex(b"\n", 0, -1)])
+    at = _one_of(rng, [0, len(text), text.index(b"\n") + 1, text.rfind(b"\n", 0, -1) + 1])
     return kind, text[:at] + piece * n + text[at:]
 
 
