@@ -88,7 +88,7 @@ def stacked_sheets(rng: np.random.Generator) -> Case:
     """Lay sheets over each other: from above every face hides every other."""
     n = _size(rng, HONEST // 4)
     apart = _one_of(rng, (0.0, 1e-9, 1.0))
-    points = np.concatenate([SQUARE + [0, 0, apart * k] for k in range(n)])
+    points = np.concatenate([SQUARE + np.array([0, 0, apart * k]) for k in range(n)])
     return _mesh(rng, points, [[4 * k + i for i in half] for k in range(n) for half in HALVES])
 
 
@@ -165,7 +165,8 @@ def _instances_of(points: np.ndarray, faces: list[list[int]]) -> tuple[dict[str,
     ]
     primitive = {"attributes": {"POSITION": 0}, "indices": 1, "mode": 4}
     tree = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}]}
-    return tree | {"meshes": [{"primitives": [primitive]}], "accessors": accessors, "bufferViews": views}, places + corners
+    tree |= {"meshes": [{"primitives": [primitive]}], "accessors": accessors, "bufferViews": views}
+    return tree, places + corners
 
 
 def _sheet(n: int) -> tuple[np.ndarray, list[list[int]]]:
@@ -175,11 +176,17 @@ def _sheet(n: int) -> tuple[np.ndarray, list[list[int]]]:
     return np.column_stack([i, j, i * j % 3.0]), np.concatenate([np.c_[a, b, c], np.c_[a, c, d]]).tolist()
 
 
+def _repeated(rng: np.random.Generator) -> tuple[dict[str, Any], bytes, int]:
+    """Return a mesh and how often it is to be there: as often as is due, or for more than a gigabyte."""
+    if rng.random() < 0.3:
+        return *_instances_of(*_sheet(60)), 3000
+    points, faces = (SQUARE, HALVES) if rng.random() < 0.5 else _sheet(int(rng.integers(3, 60)))
+    return *_instances_of(points, faces), _size(rng, max(2, min(HONEST // 10, 2 * HONEST // len(faces))))
+
+
 def instances(rng: np.random.Generator) -> Case:
     """Place one mesh at many nodes: side by side, nested, or where every node has the next one twice over."""
-    points, faces = (SQUARE, HALVES) if rng.random() < 0.5 else _sheet(int(rng.integers(3, 60)))
-    tree, data = _instances_of(points, faces)
-    n = _size(rng, HONEST // 10)
+    tree, data, n = _repeated(rng)
     way = rng.integers(5)
     if way == 0:  # each moved on its own
         tree["nodes"] = [{"mesh": 0, "translation": [float(k % 100), float(k // 100), 0.0]} for k in range(n)]
@@ -201,8 +208,7 @@ def instances(rng: np.random.Generator) -> Case:
 
 def shared_accessors(rng: np.random.Generator) -> Case:
     """Let many primitives or meshes take the same numbers."""
-    tree, data = _instances_of(*_sheet(int(rng.integers(2, 60))))
-    n = _size(rng, HONEST // 10)
+    tree, data, n = _repeated(rng)
     primitive = tree["meshes"][0]["primitives"][0]
     if rng.random() < 0.5:
         tree["meshes"] = [{"primitives": [primitive] * n}]
@@ -271,7 +277,7 @@ def forged_header(rng: np.random.Generator) -> Case:
         (
             ("ply", ply.format(order, many, "float", few, counts).encode() + body),
             ("ply", ply.format(order, few, "float", many, counts).encode() + body),
-            ("ply", (ply.format(order, 8, "float", 4, counts)).replace("list", "list uchar int a\nproperty list").encode() + body),
+            ("ply", ply.format(order, 8, "float", 4, f"uchar int a\nproperty list {counts}").encode() + body),
             ("off", b"OFF\n%d %d 0\n" % (many, few) + numbers),
             ("off", b"OFF\n%d %d %d\n" % (few, many, more) + numbers),
             ("off", b"OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n%d 0 1 2 3\n" % many),
@@ -336,7 +342,7 @@ def _png(columns: int, rows: int, packed: bytes) -> bytes:
 
 def packed_zeros(rng: np.random.Generator) -> Case:
     """Pack a grid or a cloud that is nearly all one number: what can be read, or what no machine should try to."""
-    packers = [_packed_npz, _packed_png, *(([_packed_tiff]) if _has("rasterio") else [])]
+    packers = [_packed_npz, _packed_png, *[_packed_tiff] * _has("rasterio")]
     if _has("laspy") and rng.random() < 0.2:
         return "laz", _packed_laz(int(10 ** rng.uniform(1, 4.5)))
     return _one_of(rng, packers)(int(_one_of(rng, PACKED)) if rng.random() < 0.4 else _size(rng, 4 * HONEST), rng)
@@ -430,22 +436,25 @@ def _packed_laz(n: int) -> bytes:
 # -------------------------------------------------------------------------------------------------------- lines, tokens
 
 
+PIECES = (
+    b"1 ", b"0 0 0\n", b"\n", b" ", b",", b"1,", b"9", b"-", b"1e", b"1 2\n", b"nan ", b"#\n", b"# x\n", b"v 0 0 0\n",
+    b"f 1 2 3\n", b"f 1//1 2//2 3//3\n", b"f -1 -2 -3\n", b"\\\n", b"//\n", b"comment a\n", b"a 1\n", b"\xff", b"\x00",
+    b"element a 1\nproperty int b\n", b"property float a\n", b"property list uchar int a\n", b'"', b"x y z ",
+    b"1;2;3\n", b"(", b"x,", b"solid a\n",
+    b"facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n",
+    b"endloop\nendfacet\n",
+)  # fmt: skip
+
+
 def long_text(rng: np.random.Generator) -> Case:
     """Write lines, numbers, names and comments without end."""
     n = _size(rng, 8 * HONEST)
-    piece = _one_of(
-        rng,
-        (
-            b"1 ", b"0 0 0\n", b"\n", b" ", b",", b"1,", b"9", b"-", b"1e", b"1 2\n", b"nan ", b"#\n", b"# x\n", b"v 0 0 0\n",
-            b"f 1 2 3\n", b"f 1//1 2//2 3//3\n", b"f -1 -2 -3\n", b"\\\n", b"//\n", b"comment a\n", b"element a 1\nproperty int b\n",
-            b"property float a\n", b"property list uchar int a\n", b"a 1\n", b"\xff", b"\x00", b"\"", b"x y z ", b"1;2;3\n", b"(",
-            b"x,", b"solid a\n", b"facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n",
-        ),
-    )  # fmt: skip
+    piece = _one_of(rng, PIECES)
     n = min(n, (1 << 19) // len(piece))
+    rest = b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
     start = {
         "obj": b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
-        "off": b"OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n",
+        "off": b"OFF\n4 2 0\n" + rest,
         "xyz": b"0 0 0\n1 0 0\n1 1 0\n0 1 0\n",
         "csv": b"x,y,z\n0,0,0\n1,0,0\n1,1,0\n0,1,0\n",
         "asc": mutations._asc().encode(),
@@ -455,8 +464,7 @@ def long_text(rng: np.random.Generator) -> Case:
     kind = str(_one_of(rng, list(start)))
     text = start[kind]
     if kind == "ply":
-        rest = b"element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n"
-        return kind, text + piece * n + rest
+        return kind, text + piece * n + b"element face 2\nproperty list uchar int vertex_indices\nend_header\n" + rest
     at = _one_of(rng, [0, len(text), text.index(b"\n") + 1, text.rfind(b"\n", 0, -1) + 1])
     return kind, text[:at] + piece * n + text[at:]
 

@@ -35,8 +35,8 @@ from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.model import build_model
 
-# The limits of every case: seconds of the processor (and of the clock, for what only waits), bytes beyond those that the
-# idle process has, and characters in a line.
+# The limits of every case: seconds of the processor (and of the clock, for what only waits), bytes beyond those that
+# the idle process has, and characters in a line.
 SECONDS = 5.0
 LONGEST_WAIT = 100.0
 MEMORY = 1 << 30
