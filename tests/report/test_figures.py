@@ -180,7 +180,6 @@ def test_the_mesh_of_a_subset_is_drawn_by_the_rules_of_its_problem(ax):
         plot_mesh(problem.model, ax, kept=everything)
 
 
-
 def test_the_colours_of_a_trimesh_show(ax, roof):
     colours = np.tile(np.array([255, 0, 0, 255], dtype=np.uint8), (roof.n_vertices, 1))
     plot_mesh(trimesh.Trimesh(roof.points, roof.faces, vertex_colors=colours, process=False), ax)
