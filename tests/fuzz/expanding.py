@@ -396,7 +396,7 @@ def _packed_png(n: int, rng: np.random.Generator) -> Case:
     rows, columns = _sides(n, rng)
     if n <= 10 * HONEST:
         return "png", _png(columns, rows, zlib.compress(bytes(rows * (1 + 2 * columns))))
-    return "png", _png(columns, rows, b"\x78\x9c" + _deflated(b"", 2 * n) + bytes(4))
+    return "png", _png(columns, min(rows, 2**31 - 1), b"\x78\x9c" + _deflated(b"", 2 * n) + bytes(4))
 
 
 def _packed_tiff(n: int, rng: np.random.Generator) -> Case:
