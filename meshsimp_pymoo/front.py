@@ -660,8 +660,10 @@ class Front(Sequence[FrontSolution]):
     def _repr_png_(self) -> bytes:
         from matplotlib.figure import Figure
 
+        from meshsimp_pymoo.report.figures import short_name
+
         figure = Figure(figsize=(6.0, 4.2), dpi=90, layout="constrained")
-        self.plot(figure.subplots()).set_title(Path(self.name).name, loc="left", fontsize=10)
+        self.plot(figure.subplots()).set_title(short_name(self.name), loc="left", fontsize=10)
         return _png(figure)
 
     def _repr_html_(self) -> str:

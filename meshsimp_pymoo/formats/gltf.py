@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 import struct
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -81,6 +82,7 @@ def _check(path: Path, name: str, *, packed: bool) -> tuple[dict[str, Any], int]
     """Refuse a glTF that declares more than its file can hold; return its tree, and where its binary part begins."""
     import json
 
+    from meshsimp_pymoo.formats.source import check_fits
     from meshsimp_pymoo.formats.source.numbers import glimpse
 
     size = path.stat().st_size
@@ -109,13 +111,47 @@ def _check(path: Path, name: str, *, packed: bool) -> tuple[dict[str, Any], int]
         parts = [part for mesh in tree.get("meshes", []) for part in mesh["primitives"]]
         positions = {part["attributes"]["POSITION"] for part in parts}
         needed += ["normalized positions"] * any(accessors[k].get("normalized") for k in positions)
+        vertices, triangles = _placed_sizes(tree)
+        is_tree = _has_tree(tree)
     if outside:
         raise ModelError(f"{name}: names {outside[0][:80]!r}, which is outside its folder; export it as .glb")
+    if not is_tree:
+        raise ModelError(f"{name}: its nodes are no tree: some stand below two others or themselves; export it again")
+    check_fits(vertices, triangles, name)
     if max(counts, default=0) > size:
         raise ModelError(f"{name}: declares {max(counts)} empty values in a file of {size} bytes; export it again")
     if needed:
         raise ModelError(f"{name}: needs {', '.join(needed)[:80]}, which is not read; export it without compression")
     return tree, start
+
+
+def _placed_sizes(tree: Any) -> tuple[int, int]:
+    """Return the vertices and triangles of all meshes, each as often as nodes place it, at least once."""
+    accessors = tree.get("accessors", [])
+    meshes = tree.get("meshes", [])
+    placed = Counter(node["mesh"] for node in tree.get("nodes", []) if "mesh" in node)
+    vertices, corners = 0, 0
+    for k, mesh in enumerate(meshes):
+        for part in mesh["primitives"]:
+            count = int(accessors[part["attributes"]["POSITION"]]["count"])
+            vertices += max(placed[k], 1) * count
+            corners += max(placed[k], 1) * (int(accessors[part["indices"]]["count"]) if "indices" in part else count)
+    return vertices, corners // 3
+
+
+def _has_tree(tree: Any) -> bool:
+    """Tell whether every node stands below one other node at most, and none below itself."""
+    below = {k: node.get("children", []) for k, node in enumerate(tree.get("nodes", []))}
+    children = [child for found in below.values() for child in found]
+    if len(set(children)) < len(children):
+        return False
+    reached = set(below) - set(children)
+    todo = list(reached)
+    while todo:
+        new = below[todo.pop()]
+        todo += new
+        reached.update(new)
+    return len(reached) == len(below)
 
 
 def _uris(tree: Any) -> list[str]:

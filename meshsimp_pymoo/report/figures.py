@@ -53,6 +53,7 @@ LINE, MARK = "#2b5c8a", "#c8452f"
 BESIDE, BESIDE_LINES = "#8b9099", ("-", "--", ":", "-.")  # other fronts, behind the one that counts
 UNCOVERED = "#0072B2"  # vertices that no triangle covers, on the yellow to black of the error
 PANELS = 3  # meshes beside a front
+LONGEST_NAME = 40  # characters of a model's name in a title: a longer one would leave no room for the axes
 # Their places on the logarithm of the size: meshes of a handful of triangles show little.
 PANEL_SHARES = (0.5, 0.7, 0.9)
 ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
@@ -308,6 +309,17 @@ def plot_error(
     return ax
 
 
+def short_name(name: str) -> str:
+    """Return what a title calls a model: the name of its file, the middle of a long one left out.
+
+    >>> short_name("scans/face.ply"), short_name("x" * 30 + "y" * 30)
+    ('face.ply', 'xxxxxxxxxxxxxxxxxxxx…yyyyyyyyyyyyyyyyyyy')
+    """
+    whole = printable(PurePath(name).name)
+    half = LONGEST_NAME // 2
+    return whole if len(whole) <= LONGEST_NAME else f"{whole[:half]}…{whole[len(whole) - half + 1 :]}"
+
+
 def front_figure(
     surface: Surface,
     F: npt.ArrayLike,
@@ -357,9 +369,7 @@ def front_figure(
     unit, system = length_unit(model.georeference), printable(reference_system(model.georeference))
     plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series, unit=unit)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
-    front.set_title(
-        title or f"{printable(PurePath(model.name).name)}: {size}" + f"\n{system}" * bool(system), loc="left"
-    )
+    front.set_title(title or f"{short_name(model.name)}: {size}" + f"\n{system}" * bool(system), loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
     look: dict[str, Any] = {"exaggeration": view.exaggeration, "colour": model.attributes.get("color")}

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import io
 import json
 import struct
+import time
 
 import numpy as np
 import pytest
@@ -397,3 +399,47 @@ def test_a_gltf_reads_no_file_outside_its_folder(tmp_path, uri):
     said = refusal(write(inside, "b.gltf", json.dumps(tree)))
     assert repr(uri) in said
     assert "outside its folder" in said
+
+
+def scene_of(path, nodes):
+    """Write the pyramid as GLB with these nodes in place of its own; the first is the scene's."""
+    parts = trimesh.exchange.gltf.export_gltf(trimesh.Trimesh(POINTS, FACES, process=False))
+    tree = json.loads(parts["model.gltf"])
+    tree |= {"nodes": nodes, "scenes": [{"nodes": [0]}], "scene": 0}
+    for buffer in tree["buffers"]:
+        content = base64.b64encode(parts[buffer["uri"]]).decode()
+        buffer["uri"] = f"data:application/octet-stream;base64,{content}"
+    path.write_text(json.dumps(tree))
+    return path
+
+
+def test_a_deep_chain_of_nodes_is_read_in_linear_time(tmp_path):
+    chain = [{"translation": [1.0, 0.0, 0.5], "children": [k + 1]} for k in range(2000)]
+    path = scene_of(tmp_path / "chain.gltf", [*chain, {"mesh": 0}])
+    start = time.process_time()
+    source = read_source(path)
+    assert time.process_time() - start < 3.0
+    assert np.array_equal(source.points, POINTS.astype(np.float32) + np.array([2000.0, 0.0, 1000.0]))
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        [{"mesh": 0, "children": [1]}, {"mesh": 0, "children": [0]}],
+        [{"children": [1, 1]}, {"mesh": 0}],
+        [{"children": [1, 2]}, {"children": [2]}, {"mesh": 0}],
+        [{"mesh": 0}, {"mesh": 0, "children": [2]}, {"children": [1]}],
+    ],
+)
+def test_nodes_that_are_no_tree_are_refused(tmp_path, nodes):
+    assert "nodes are no tree" in refusal(scene_of(tmp_path / "circle.gltf", nodes))
+
+
+def test_what_nodes_repeat_is_counted_before_it_is_unfolded(tmp_path, monkeypatch):
+    nodes = [{"children": list(range(1, 1001))}, *[{"mesh": 0}] * 1000]
+    path = scene_of(tmp_path / "many.gltf", nodes)
+    monkeypatch.setattr("meshsimp_pymoo.memory.free_memory", lambda: (1 << 20, 1 << 20))
+    monkeypatch.setattr(trimesh, "load", None)
+    line = refusal(path)
+    assert f"{1000 * len(POINTS)} vertices and {1000 * len(FACES)} faces" in line
+    assert "1 MiB are free" in line

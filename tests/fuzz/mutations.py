@@ -14,7 +14,7 @@ import numpy as np
 # A hill of 5 x 6 samples, not square, far enough from 0 that shifts matter.
 ROWS, COLUMNS = 5, 6
 PLACE = (10.0, 0.0, 500_000.0, 0.0, -10.0, 5_400_000.0)
-KINDS = ("files", "configs", "results")
+KINDS = ("files", "configs", "results", "expanding")
 
 # What readers get wrong: ends of ranges, signs, no numbers, numbers that overflow a product.
 WORDS = (

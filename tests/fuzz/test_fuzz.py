@@ -1,6 +1,7 @@
 """Whatever is in a file, reading it ends in a result or in one line: no traceback, no hang, no more than 1 GiB.
 
-The usual suite tries some hundred cases of each kind; ``pytest tests/fuzz --fuzz-cases 20000`` tries many.
+The usual suite tries some hundred cases of each kind; ``pytest tests/fuzz --fuzz-cases 20000`` tries many, ``-m slow``
+ten thousand of the small files that expand.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+import expanding
 import mutations
 import worker
 
@@ -21,6 +23,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the limits of m
 
 # Deaths of the worker after which nothing more is tried.
 DEATHS = 5
+# Cases of the files that expand, and how many of them the usual suite tries.
+EXPANDING, USUAL = 10_000, 500
 
 
 def run_worker(kind: str, seed: int, first: int, end: int, folder: Path) -> tuple[list[dict], dict | None, str]:
@@ -34,14 +38,24 @@ def run_worker(kind: str, seed: int, first: int, end: int, folder: Path) -> tupl
 
 @pytest.mark.parametrize("kind", mutations.KINDS)
 def test_every_damaged_input_ends_in_a_result_or_in_one_line(kind, tmp_path, request):
-    cases, seed = request.config.getoption("--fuzz-cases"), request.config.getoption("--fuzz-seed")
+    cases = request.config.getoption("--fuzz-cases")
+    check_cases(kind, max(cases, USUAL) if kind == "expanding" else cases, tmp_path, request)
+
+
+@pytest.mark.slow
+def test_small_files_that_expand_end_in_a_result_or_in_one_line(tmp_path, request):
+    check_cases("expanding", EXPANDING, tmp_path, request)
+
+
+def check_cases(kind: str, cases: int, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    seed = request.config.getoption("--fuzz-seed")
     first, wrong, counts, deaths = 0, [], {}, 0
     peak = 0
     while first < cases and deaths < DEATHS:
         lines, summary, said = run_worker(kind, seed, first, cases, tmp_path)
         wrong += [f"case {line['case']}: {line['ended']}\n{line['what']}" for line in lines]
         if summary is not None:
-            counts, peak = summary["counts"], summary["memory"]
+            counts, peak = summary["counts"], summary["largest"][0]
             if "panicked" in said or "Traceback" in said:
                 wrong.append(f"something was printed: {said}")
             break
@@ -49,7 +63,7 @@ def test_every_damaged_input_ends_in_a_result_or_in_one_line(kind, tmp_path, req
         case = tmp_path / "case"
         assert case.exists(), f"the undamaged input is not read: {said}"
         number = int(case.read_text())
-        wrong.append(f"case {number}: the process died (more than {worker.SECONDS} s?), {said}")
+        wrong.append(f"case {number}: the process died (more than {worker.SECONDS:g} s of the processor?), {said}")
         first = number + 1
     again = f"python {worker.__file__} {kind} {seed} NUMBER NUMBER+1 FOLDER"
     assert not wrong, f"{len(wrong)} of {cases} cases; again: {again}\n" + "\n\n".join(wrong[:10])
@@ -59,7 +73,7 @@ def test_every_damaged_input_ends_in_a_result_or_in_one_line(kind, tmp_path, req
 
 
 def test_damage_is_the_same_for_the_same_seed():
-    for make in (mutations.file_case, mutations.config_case, mutations.result_case):
+    for make in (mutations.file_case, mutations.config_case, mutations.result_case, expanding.expanding_case):
         one, two, other = (make(np.random.default_rng([1, number])) for number in (5, 5, 6))
         assert one == two
         assert one != other
@@ -77,6 +91,15 @@ def test_the_worker_sees_what_is_wrong(tmp_path, monkeypatch):
 
     monkeypatch.setattr(worker, "attempt", two_lines)
     assert worker.outcome("files", np.random.default_rng(0), tmp_path) == ("message", "a\nb")
+
+    def no_memory(*_: object) -> None:
+        try:
+            raise MemoryError
+        except MemoryError as error:
+            raise worker.ModelError("does not fit") from error
+
+    monkeypatch.setattr(worker, "attempt", no_memory)
+    assert worker.outcome("files", np.random.default_rng(0), tmp_path) == ("memory", "does not fit")
 
     def warned(*_: object) -> None:
         np.float32(1e30) * np.float32(1e30)

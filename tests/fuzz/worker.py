@@ -2,8 +2,9 @@
 
     python tests/fuzz/worker.py KIND SEED FIRST END FOLDER
 
-prints one JSON line for every case that ends otherwise than in a result or a one-line error. A case that takes longer
-than SECONDS ends the process, after the traceback of where it was; FOLDER/case says which one it was.
+prints one JSON line for every case that ends otherwise than in a result or a one-line error, or that ran into the
+limit of memory before anybody asked how much there is. A case that takes longer than SECONDS of the processor ends the
+process, after the traceback of where it was; FOLDER/case says which one it was.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ from __future__ import annotations
 import collections
 import faulthandler
 import json
+import re
 import resource
+import signal
 import sys
 import time
 import traceback
@@ -22,6 +25,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+import expanding
 import mutations
 
 from meshsimp_pymoo.comparison.config import ConfigError, read_experiment_file
@@ -31,7 +35,10 @@ from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.model import build_model
 
+# The limits of every case: seconds of the processor (and of the clock, for what only waits), bytes beyond those that
+# the idle process has, and characters in a line.
 SECONDS = 5.0
+LONGEST_WAIT = 100.0
 MEMORY = 1 << 30
 LONGEST_MESSAGE = 3000
 
@@ -68,6 +75,9 @@ def attempt(kind: str, rng: np.random.Generator | None, folder: Path) -> None:
         cases = mutations.good_files() if rng is None else [mutations.file_case(rng)]
         for suffix, content in cases:
             read_file(folder, suffix, content)
+    elif kind == "expanding":
+        for suffix, content in mutations.good_files() if rng is None else [expanding.expanding_case(rng)]:
+            read_file(folder, suffix, content)
     elif kind == "configs":
         (folder / "scans").mkdir(exist_ok=True)
         (folder / "scans" / "a.asc").write_bytes(dict(mutations.good_files())["asc"])
@@ -87,6 +97,8 @@ def outcome(kind: str, rng: np.random.Generator, folder: Path) -> tuple[str, str
             ended, said = "result", ""
         except (ModelError, ConfigError, ResultError) as problem:
             ended, said = type(problem).__name__, str(problem)
+            if any(isinstance(error, MemoryError) for error in (problem.__cause__, problem.__context__)):
+                return "memory", said
         except Exception:
             return "traceback", traceback.format_exc()
     foreign = [w for w in caught if not issubclass(w.category, ModelWarning)]
@@ -104,24 +116,37 @@ def main() -> None:
     folder = Path(sys.argv[5])
     warnings.simplefilter("ignore")
     attempt(kind, None, folder)  # compiles and imports everything
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + MEMORY, resource.RLIM_INFINITY))
+    idle = memory("VmRSS")
+    resource.setrlimit(resource.RLIMIT_AS, (memory("VmSize") + MEMORY, resource.RLIM_INFINITY))
+    # the signal of the processor's clock says where the process is, and then ends it as it does by default
+    faulthandler.register(signal.SIGPROF, chain=True)
     counts: collections.Counter[str] = collections.Counter()
     slowest: tuple[float, int] = (0.0, -1)
+    largest: tuple[int, int] = (0, -1)
     for number in range(first, end):
         (folder / "case").write_text(str(number))
         rng = np.random.default_rng([seed, number])
-        faulthandler.dump_traceback_later(SECONDS, exit=True)
-        start = time.perf_counter()
+        Path("/proc/self/clear_refs").write_text("5")  # the peak of memory begins again
+        faulthandler.dump_traceback_later(LONGEST_WAIT, exit=True)
+        signal.setitimer(signal.ITIMER_PROF, SECONDS)
+        start = time.process_time()
         ended, wrong = outcome(kind, rng, folder)
-        slowest = max(slowest, (time.perf_counter() - start, number))
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        slowest = max(slowest, (time.process_time() - start, number))
+        largest = max(largest, (memory("VmHWM") - idle, number))
         faulthandler.cancel_dump_traceback_later()
         counts[ended] += 1
         if wrong:
             print(json.dumps({"case": number, "ended": ended, "what": wrong}), flush=True)
-    summary: dict[str, Any] = {"counts": dict(counts), "slowest": slowest}
-    summary["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    summary: dict[str, Any] = {"counts": dict(counts), "slowest": slowest, "largest": largest}
     print(json.dumps(summary), flush=True)
+
+
+def memory(what: str) -> int:
+    """Return a size of this process that the system keeps [bytes]."""
+    found = re.search(rf"^{what}:\s+(\d+) kB", Path("/proc/self/status").read_text(), re.MULTILINE)
+    assert found is not None
+    return int(found[1]) << 10
 
 
 if __name__ == "__main__":

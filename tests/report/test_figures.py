@@ -342,3 +342,14 @@ def test_other_fronts_are_drawn_behind_in_the_same_units(ax):
 def test_missing_meshes_leave_empty_panels(roof):
     figure = front_figure(roof, [[10.0, 2]], [])
     assert [panel.axison for panel in figure.axes[2:]] == [False, False, False]
+
+
+def test_a_long_name_leaves_the_axes_their_room(roof, tmp_path):
+    import dataclasses
+
+    model = dataclasses.replace(roof.model, name="scans/" + "a_" * 60 + ".asc")
+    figure = front_figure(HeightSurface(model), [[10.0, 2]], [])
+    figure.savefig(tmp_path / "front.png")  # matplotlib's warning that it gives up would be an error
+    front = figure.get_axes()[0]
+    assert front.get_title(loc="left").startswith("a_a_")
+    assert front.get_position().width * figure.subfigs[0].bbox.width > 0.7 * figure.subfigs[0].bbox.width

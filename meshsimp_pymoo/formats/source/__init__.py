@@ -21,9 +21,12 @@ from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source.metric import in_metric_frame
 from meshsimp_pymoo.formats.source.texture import merged
+from meshsimp_pymoo.memory import check_free
 
 # Areas and in-circle tests multiply up to four coordinates; beyond 1e75 those products overflow.
 COORDINATE_LIMIT = 1e75
+# What a vertex and a face take while a model is made of a mesh: measured, rounded down.
+VERTEX_BYTES, FACE_BYTES = 150, 300
 
 # Fewer vertices leave nothing to simplify.
 LEAST_VERTICES = 4
@@ -125,7 +128,7 @@ def build_source(
     ------
     ModelError
         For fewer than 4 vertices, coordinates that are NaN, infinite or beyond 1e75, no faces, faces that
-        index past the end, and arrays of another shape.
+        index past the end, arrays of another shape, and more than fits into the memory.
 
     Warns
     -----
@@ -144,6 +147,7 @@ def build_source(
         )
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
         raise ModelError(f"{name}: faces are {triangles.dtype} of the shape {triangles.shape}; give integers (F, 3)")
+    check_fits(count, len(triangles), name)
     wrong = ((triangles < 0) | (triangles >= count)).any(axis=1)
     if wrong.any():
         first = int(np.argmax(wrong))
@@ -224,6 +228,21 @@ def _leaders(points: FloatArray) -> IntArray:
     leader = np.empty(len(points), np.int64)
     leader[order] = order[starts][np.cumsum(starts) - 1]
     return leader
+
+
+def check_fits(vertices: int, faces: int, name: str) -> None:
+    """Refuse a mesh of which no model can be made in the memory that is free, before it is unfolded in it.
+
+    Raises
+    ------
+    ModelError
+        With the numbers and both sizes.
+    """
+    check_free(
+        VERTEX_BYTES * vertices + FACE_BYTES * faces,
+        f"{name}: its {vertices} vertices and {faces} faces, each as often as it is placed,",
+        "take a part of it",
+    )
 
 
 def check_points(points: npt.ArrayLike, name: str, rows: IntArray | None = None) -> FloatArray:

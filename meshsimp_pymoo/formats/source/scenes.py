@@ -167,8 +167,9 @@ def _scene_pieces(loaded: Any, name: str) -> list[tuple[FloatArray, IntArray, di
         points = np.array(getattr(loaded, "vertices", np.empty((0, 3))), dtype=np.float64)
         return [(points, np.empty((0, 3), np.int64), {})]
     pieces = []
-    for node in loaded.graph.nodes_geometry:
-        transform, geometry = loaded.graph[node]
+    placed = _transforms(loaded.graph)
+    for node in filter(placed.__contains__, loaded.graph.nodes_geometry):
+        transform, geometry = placed[node], loaded.graph.transforms.node_data[node]["geometry"]
         mesh = loaded.geometry[geometry]
         if not hasattr(mesh, "faces"):
             continue
@@ -179,6 +180,19 @@ def _scene_pieces(loaded: Any, name: str) -> list[tuple[FloatArray, IntArray, di
                 faces = faces[:, ::-1]
         pieces.append((points, faces, attributes))
     return pieces
+
+
+def _transforms(graph: Any) -> dict[str, FloatArray]:
+    """Return where each node of a scene is; trimesh multiplies its way down to it anew for each, in cubic time."""
+    found = {graph.base_frame: np.eye(4)}
+    todo = [graph.base_frame]
+    while todo:
+        node = todo.pop()
+        for child in graph.transforms.children.get(node, ()):
+            edge = graph.transforms.edge_data[node, child]
+            found[child] = found[node] @ edge.get("matrix", np.eye(4))
+            todo.append(child)
+    return found
 
 
 def _concatenated(
