@@ -273,10 +273,10 @@ def _checked_band(raster: Any, band: int | None, name: str) -> tuple[int, np.dty
         band = found[0] if found else 1
     if band > raster.count:
         raise ModelError(f"{name}: has {raster.count} bands, and no band {band}; leave the band out, or name another")
-    kind = np.dtype(raster.dtypes[band - 1])
-    if kind.kind not in "iuf":
+    kind = str(raster.dtypes[band - 1])
+    if kind.startswith("complex") or np.dtype(kind).kind not in "iuf":  # NumPy knows no complex integers
         raise ModelError(f"{name}: heights have the type {kind}; give real numbers")
-    return band, kind, (raster.height, raster.width)
+    return band, np.dtype(kind), (raster.height, raster.width)
 
 
 def _alpha_bands(raster: Any) -> list[int]:

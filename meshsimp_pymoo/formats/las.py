@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Points that are unpacked at once.
 CHUNK_POINTS = 1_000_000
+# The way of packing that has no chunks.
+POINTWISE = b"\1\0"
 # What a small .laz may unpack to, whatever its packing.
 UNPACKED_FLOOR = 64 << 20
 
@@ -132,6 +134,11 @@ def _check_items(stream: IO[bytes], at: int, n_records: int, length: int, name: 
         if (user, number) != (b"laszip encoded", 22204):
             continue
         content = stream.read(size)
+        if content[:2] == POINTWISE:
+            raise ModelError(
+                f"{name}: is packed in LASzip's first way, without chunks, which is not read; pack it anew with LASzip "
+                "or PDAL"
+            )
         count = struct.unpack_from("<H", content, 32)[0] if len(content) >= 34 else 0
         items = [struct.unpack_from("<HH", content, 34 + 6 * k) for k in range(count) if len(content) >= 40 + 6 * k]
         if count == 0 or len(items) < count or sum(size for _, size in items) != length:

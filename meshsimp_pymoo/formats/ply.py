@@ -158,6 +158,7 @@ def _header(data: bytes, name: str) -> tuple[list[PlyElement], str, int]:
         raise ModelError(f"{name}: its header has no line 'end_header'; the file is truncated, export it again")
     order: str | None = None
     elements: list[PlyElement] = []
+    unknown: list[str] = []
     for line in data[: end.start()].decode("utf-8", errors="replace").splitlines()[1:]:
         words = line.split()
         try:
@@ -177,12 +178,17 @@ def _header(data: bytes, name: str) -> tuple[list[PlyElement], str, int]:
             elif words[0] == "property":
                 kind = np.dtype((order or "<") + TYPES_READ[words[1]])
                 elements[-1].properties.append(PlyProperty(words[2], kind, None))
-            else:
+            elif elements:
                 raise ValueError
+            else:  # of what follows it says nothing
+                unknown.append(line)
         except (KeyError, IndexError, ValueError):
             raise ModelError(f"{name}: cannot read the header line {line[:80]!r}; export the file again") from None
     if order is None:
         raise ModelError(f"{name}: its header has no line 'format'; export the file again")
+    if unknown:
+        first = f"{unknown[0][:80]!r}"
+        warn_of(f"{name}: lines of its header that mean nothing were left out: {len(unknown)} (first: {first})")
     if len({element.name for element in elements}) < len(elements):
         raise ModelError(f"{name}: declares an element twice; export the file again")
     for element in elements:

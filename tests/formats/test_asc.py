@@ -97,3 +97,11 @@ def test_a_cloud_with_the_suffix_of_a_grid_is_told_its_own(tmp_path, text):
     assert "if it holds a point cloud, x y z in every line, rename it to .xyz" in refusal(
         write(tmp_path, "a.asc", text)
     )
+
+
+@pytest.mark.parametrize(("where", "first"), [("corner", (105.5, 25)), ("center", (100.5, 20))])
+def test_an_axis_that_is_not_said_begins_at_0_in_the_sense_of_the_other(tmp_path, where, first):
+    text = ASC.format(-1).replace("yllcorner 200\n", "").replace("corner", where)
+    with pytest.warns(ModelWarning, match=f"its header has xll{where}, but no yll{where}, which is taken for 0"):
+        source = read_source(write(tmp_path, "a.asc", text))
+    assert_array_equal(source.points[0, :2], first)

@@ -152,6 +152,14 @@ def test_a_las_that_declares_what_it_cannot_hold_is_refused_at_once(las, tmp_pat
             read_source(tmp_path / name)
 
 
+def test_a_laz_without_chunks_is_told_apart_from_a_damaged_one(las, tmp_path):
+    content = las("a.laz", scattered(40)).read_bytes()
+    at = content.index(b"laszip encoded") - 2 + 54
+    (tmp_path / "b.laz").write_bytes(content[:at] + b"\1\0" + content[at + 2 :])
+    with pytest.raises(ModelError, match="is packed in LASzip's first way, without chunks"):
+        read_source(tmp_path / "b.laz")
+
+
 def test_a_laz_whose_table_of_chunks_is_a_forgery_is_refused_before_it_is_allocated(las, tmp_path):
     content = bytearray(las("a.laz", scattered(40)).read_bytes())
     start = struct.unpack_from("<I", content, 96)[0]

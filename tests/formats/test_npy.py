@@ -41,3 +41,8 @@ def test_a_bad_array_is_refused_and_never_unpickled(tmp_path):
 
 def test_an_array_that_declares_more_than_its_file_holds_allocates_nothing(tmp_path):
     assert "(1000000, 1000000)" in refusal(write(tmp_path, "a.npy", hostile_array()))
+
+
+def test_a_table_of_points_is_no_grid_and_is_told_its_own(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros(9, [("x", "f4"), ("y", "f4"), ("z", "f4")]))
+    assert "holds a table of x, y, z, not a grid; save its points as .ply or .xyz" in refusal(tmp_path / "a.npy")

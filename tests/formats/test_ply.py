@@ -157,7 +157,6 @@ def test_a_text_named_ply_is_refused(tmp_path):
         ("element vertex 5", "element point 5"),
         ("property double x", "property double a"),
         ("format {} 1.0\n", ""),
-        ("comment made", "what is made"),
     ],
 )
 def test_a_header_that_makes_no_sense_is_refused(tmp_path, line, instead):
@@ -407,3 +406,11 @@ def test_elements_that_are_not_read_are_named(tmp_path):
     text = f"{head}{edges}element nothing 0\nproperty int x\nend_header\n{rest}0 1\n1 2\n"
     with pytest.warns(ModelWarning, match=r"a\.ply: 2 of 'edge' are not read and stay behind$"):
         assert_array_equal(read_source(write(tmp_path, "a.ply", text)).faces, FACES)
+
+
+def test_a_line_without_meaning_before_the_elements_is_left_out_with_a_word(tmp_path):
+    text = ascii_ply().replace("element vertex", "Created by hand\nelement vertex")
+    with pytest.warns(ModelWarning, match="mean nothing were left out: 1 "):
+        assert_array_equal(read_source(write(tmp_path, "a.ply", text)).faces, FACES)
+    text = ascii_ply().replace("element face", "Created by hand\nelement face")
+    assert "cannot read the header line 'Created by hand'" in refusal(write(tmp_path, "a.ply", text))

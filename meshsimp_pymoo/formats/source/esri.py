@@ -105,6 +105,7 @@ def esri_header(lines: dict[str, str], options: Options, name: str) -> EsriHeade
     for label, step in (("dx", dx), ("dy", dy)):
         if not (math.isfinite(step) and step > 0):
             raise ModelError(f"{name}: the spacing {label} is {step}; give a positive number")
+    lines = _with_both_axes(lines, name)
     west, south = (_start(lines, axis, step, name) for axis, step in (("x", dx), ("y", dy)))
     return EsriHeader(
         int(rows),
@@ -130,6 +131,20 @@ def _steps(lines: dict[str, str], name: str) -> tuple[float, float]:
         _number(lines[key], key, name) if key in lines else step for key, step in (("dx", both[0]), ("dy", both[-1]))
     )
     return dx, dy
+
+
+def _with_both_axes(lines: dict[str, str], name: str) -> dict[str, str]:
+    """Return the lines with 0 where one axis says where it begins and the other one does not."""
+    said = {
+        axis: next((key for key in (corner, *centres) if key in lines), "")
+        for axis, (corner, centres) in ORIGIN.items()
+    }
+    if all(said.values()) or not any(said.values()):
+        return lines
+    known, lacking = sorted(said, key=lambda axis: not said[axis])
+    key = lacking + said[known][1:]
+    warn_of(f"{name}: its header has {said[known]}, but no {key}, which is taken for 0")
+    return lines | {key: "0"}
 
 
 def _start(lines: dict[str, str], axis: str, step: float, name: str) -> float:

@@ -123,6 +123,9 @@ def even_grid(
 
 def check_heights(shape: tuple[int, ...], kind: np.dtype[Any], name: str) -> None:
     """Refuse anything but a grid of at least 2 x 2 real numbers."""
+    if kind.names:
+        names = ", ".join(map(str, kind.names))
+        raise ModelError(f"{name}: holds a table of {names[:200]}, not a grid; save its points as .ply or .xyz")
     if kind.kind not in "iuf":
         raise ModelError(f"{name}: heights have the type {kind}; give real numbers")
     if len(shape) != 2 or min(shape) < 2:
