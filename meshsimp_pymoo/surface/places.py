@@ -6,6 +6,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import warn_of
+from meshsimp_pymoo.plane.order import unit_square
 from meshsimp_pymoo.surface.orient import edge_on
 
 # Coordinates in steps of more than this share of the usual distance of neighbours may have put vertices together.
@@ -48,6 +49,17 @@ def feet(points: FloatArray, faces: IntArray, below: BoolArray) -> IntArray:
     holds = np.zeros(len(points), bool)
     holds[faces[~edge_on(points, faces)]] = True
     return np.flatnonzero(below & ~holds)
+
+
+def count_places(points: FloatArray, faces: IntArray) -> tuple[int, int]:
+    """Return how many of the upright vertices (V, 3) of faces lie below another at their place; how many are feet."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    upright = points[used] - points[used].min(axis=0)
+    _, xy = unit_square(upright)
+    order = np.lexsort((-upright[:, 2], xy[:, 1], xy[:, 0]))  # any order will do that keeps places together
+    number = np.argsort(order)
+    below = below_others(xy[order])
+    return int(below.sum()), len(feet(upright[order], number[renumbered.reshape(-1, 3)], below))
 
 
 def warn_of_places(name: str, file_points: FloatArray, xy: FloatArray, unit: float, n_below: int, n_feet: int) -> None:

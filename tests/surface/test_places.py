@@ -20,6 +20,7 @@ from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.greedy import thinning
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.pins import pinned_vertices
+from meshsimp_pymoo.surface.places import count_places
 
 SIDE = 9
 RNG = np.random.default_rng(5)
@@ -103,6 +104,14 @@ def test_no_mesh_of_thinning_hangs_on_a_foot():
     sizes = [t for t in best if t >= 10]
     mine = {t: e for t, e in zip(front.triangles, front.error, strict=True)}
     assert all(mine[t] <= 1.2 * best[t] + 1e-9 for t in sizes if t in mine)
+
+
+@pytest.mark.parametrize("make", [skirted, walled])
+def test_places_are_counted_without_a_model(make):
+    found = stepped_model(make()).found
+    shifted = make().points + np.array([1e5, -1e6, 3.0])
+    assert count_places(shifted, make().faces) == (found["below_others"], found.get("feet", 0))
+    assert count_places(GRID.points, GRID.faces) == (0, 0)
 
 
 def test_the_foot_of_a_wall_that_stands_on_ground_counts():

@@ -61,7 +61,8 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.formats.source.classes import classes_in_words
     from meshsimp_pymoo.opening import mended_source
-    from meshsimp_pymoo.surface.orient import seen_upright
+    from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
+    from meshsimp_pymoo.surface.places import count_places
     from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source, mended = mended_source(model, options)
@@ -105,6 +106,10 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         refusal: str | None = str(problem)
     else:
         refusal = facts.refusal
+        n_below, n_feet = (0, 0) if refusal else count_places(measured.points @ upright_rotation(up).T, measured.faces)
+        if n_below:
+            rows["vertices"] += f" ({n_below:,} lie below others, {n_feet:,} of them feet that do not count)"
+        content |= {"below_others": n_below, "feet": n_feet}
         content |= {"up": up.tolist(), "fold_share": facts.fold_share} | asdict(facts)
         flipped = " (its faces are wound the other way)" if facts.flipped else ""
         rows |= {
