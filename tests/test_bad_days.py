@@ -200,7 +200,6 @@ def test_a_signal_while_compiling_is_answered_at_once_and_leaves_nothing(tmp_pat
     assert [entry.name for entry in tmp_path.iterdir()] == ["cache"]
 
 
-
 @needs_posix
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):

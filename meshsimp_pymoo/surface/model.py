@@ -211,8 +211,10 @@ class OpenModel:
                 )
             n_others = int((values[self.repeats[:, 0]] != values[self.repeats[:, 1]]).sum())
             if n_others:
-                warn_of(f"{self.name}: {n_others} {label} of rows that repeat another vertex differ from its own, "
-                "which counts")
+                warn_of(
+                    f"{self.name}: {n_others} {label} of rows that repeat another vertex differ from its own, "
+                    "which counts"
+                )
             values = values[self.source_index]
         values = np.ascontiguousarray(values, float)
         wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0)))
