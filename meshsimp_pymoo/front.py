@@ -142,7 +142,7 @@ class FrontSolution(_Numbers):
         suffix = path.suffix.lower()
         stored = self.front.stored_mesh(self.solution)
         with new_file(path) as unfinished:
-            if stored is not None and stored.suffix == suffix and self.front.model.material is None:
+            if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
                 write_solution(unfinished, self.front.problem.surface, self.faces)
@@ -434,6 +434,12 @@ class Front(Sequence[FrontSolution]):
         """Where on Earth the model is, as far as its file says."""
         recorded = self.run.get("model")
         return (recorded.get("georeference") or {}) if recorded else self.problem.model.georeference
+
+    @property
+    def has_material(self) -> bool:
+        """Whether its meshes may name files beside them: a library of materials, an image."""
+        recorded = self.run.get("model")
+        return bool(recorded.get("material")) if recorded else self.problem.model.material is not None
 
     @property
     def unit(self) -> str:

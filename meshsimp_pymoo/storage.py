@@ -312,6 +312,7 @@ def write_front(
                 "up": surface.view.rotation[2],
                 **({"found": model.found} if model.found else {}),
                 **({"georeference": model.georeference} if model.georeference else {}),
+                **({"material": True} if model.material is not None else {}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),

@@ -541,7 +541,7 @@ def changed(row, value):
 
 def folded():
     points = ROOF.points.copy()
-    points[6, :2] = points[18, :2]
+    points[6, :2] = points[18, :2] + 0.01
     return points
 
 
@@ -824,8 +824,8 @@ def test_score_refuses_a_front_of_another_model_or_reading(picked, tmp_path, cap
     assert "is the front of another model than face:300" in one_line(capsys)
     assert run("score", "face:200", mesh, "--front", picked, "--outside", "ignore") == 2
     assert "its errors are those of --outside nearest; leave --outside out to compare" in one_line(capsys)
-    upright = load("roof:3").points[:, [2, 0, 1]]
-    write_mesh(tmp_path / "wall.ply", upright * [1, 1, 0], load("roof:3").faces)
+    upright = load("roof:3").points[:, [0, 2, 1]]
+    write_mesh(tmp_path / "wall.ply", upright * [1, 0, 1], load("roof:3").faces)
     assert run("score", "face:200", tmp_path / "wall.ply") == 2
     assert re.search(r"wall\.ply: cannot be measured against face:200: none of the 8 faces has", one_line(capsys))
 

@@ -455,7 +455,9 @@ def test_a_signal_that_meets_a_place_that_can_raise_nothing_is_raised_after_it(c
     assert capsys.readouterr().err == "meshsimp: stopping\n"
 
 
-def test_signals_are_answered_in_turn_and_the_last_answer_stops():
+def test_signals_are_answered_in_turn_and_the_last_answer_stops(monkeypatch):
+    # a shell starts what runs behind with Ctrl-C ignored
+    monkeypatch.setattr(signal, "default_int_handler", signal.getsignal(signal.SIGINT))
     with interruptible():
         with answering("first", "second", "stop"):
             for _ in range(2):

@@ -133,7 +133,7 @@ def test_what_does_not_fit_into_memory_is_one_line(monkeypatch, capsys):
     def refuse(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr(meshsimp_pymoo.opening, "open_source", refuse)
+    monkeypatch.setattr(meshsimp_pymoo.opening, "mended_source", refuse)
     assert run("info", "roof") == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "does not fit into memory" in line

@@ -17,7 +17,7 @@ GROWTH = 4 << 20
 PER_RUN = 64 << 10
 
 SCRIPT = """
-import ctypes, gc, json, os, sys, threading
+import contextlib, ctypes, gc, json, os, sys, threading
 from pathlib import Path
 from meshsimp_pymoo.cli import main
 
@@ -29,7 +29,10 @@ def state():
     if hasattr(libc, "malloc_trim"):
         libc.malloc_trim(0)
     pages = int(Path("/proc/self/statm").read_text().split()[1])
-    handles = sorted(os.readlink(f"/proc/self/fd/{fd}") for fd in os.listdir("/proc/self/fd")[:-1])
+    handles = []
+    for fd in os.listdir("/proc/self/fd"):
+        with contextlib.suppress(FileNotFoundError):  # the one that listed them
+            handles.append(os.readlink(f"/proc/self/fd/{fd}"))
     return {
         "memory": pages * os.sysconf("SC_PAGESIZE"),
         "handles": len(handles),

@@ -618,7 +618,7 @@ def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp
 def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one_line(stored, capsys):
     record = stored / "experiment.json"
     content = json.loads(record.read_text(encoding="utf-8"))
-    assert content["format"] == FORMAT == 2
+    assert content["format"] == FORMAT == 3
 
     def told(**changed):
         record.write_text(json.dumps(content | changed), encoding="utf-8")

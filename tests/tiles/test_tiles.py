@@ -110,7 +110,7 @@ def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
     [
         ({"patch": "front"}, "all of a grid faces up; leave patch='front' out"),
         ({"up": "-z"}, "heights of a grid are along z; leave up='-z' out"),
-        ({"max_edge": 3.0}, "max_edge describes point clouds"),
+        ({"max_edge": 3.0}, "max_edge and classes describe point clouds"),
     ],
 )
 def test_what_says_nothing_of_a_grid_is_refused(tmp_path, how, message):
