@@ -489,6 +489,11 @@ def read_npy_header(stream: IO[bytes], size: int, name: str) -> NpyHeader:
     """
     with _npy(name):
         version = np.lib.format.read_magic(stream)
+        if version != (1, 0):  # a header may be as long as it likes, and room is made for it before it is read
+            length = int.from_bytes(stream.read(4), "little")
+            if length > size:
+                raise ModelError(f"{name}: truncated: declares a header of {length} bytes; copy or save it again")
+            stream.seek(-4, os.SEEK_CUR)
         read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about the header's spelling: Python 2's, or backslashes

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of, warn_of
 from meshsimp_pymoo.formats.material import Material
@@ -97,9 +97,11 @@ def _check(path: Path, name: str, *, packed: bool) -> tuple[dict[str, Any], int]
                     f"{name}: truncated: its header declares {length} bytes, but the file has {size}; copy it again"
                 )
             text = stream.read(chunk)
+            _check_chunks(stream, size, name)
+            start = 20 + chunk + 8
         else:
             text = stream.read()
-        start = stream.tell() + 8
+            start = size
     with _json_of(name):
         tree = json.loads(text)
         accessors = tree.get("accessors", [])
@@ -123,6 +125,17 @@ def _check(path: Path, name: str, *, packed: bool) -> tuple[dict[str, Any], int]
     if needed:
         raise ModelError(f"{name}: needs {', '.join(needed)[:80]}, which is not read; export it without compression")
     return tree, start
+
+
+def _check_chunks(stream: IO[bytes], size: int, name: str) -> None:
+    """See that the chunks behind the first one lie in the file: room is made for them before they are read."""
+    while len(head := stream.read(8)) == 8:
+        (length,) = struct.unpack_from("<I", head)
+        if length > size - stream.tell():
+            raise ModelError(
+                f"{name}: truncated: a chunk declares {length} bytes, but {size - stream.tell()} follow; copy it again"
+            )
+        stream.seek(length, 1)
 
 
 def _placed_sizes(tree: Any) -> tuple[int, int]:
@@ -230,7 +243,7 @@ def _image(path: Path, tree: dict[str, Any], start: int, image: dict[str, Any], 
         return (_content(path, str(buffer["uri"]), name) or b"")[first : first + size]
     with path.open("rb") as stream:
         stream.seek(start + first)
-        return stream.read(size)
+        return stream.read(min(size, path.stat().st_size))
 
 
 def _content(path: Path, uri: str, name: str) -> bytes | None:

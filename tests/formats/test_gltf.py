@@ -365,6 +365,9 @@ def test_what_would_be_read_wrongly_is_refused(tmp_path, change, said):
 def test_a_damaged_glb_is_refused(tmp_path):
     mesh = trimesh.Trimesh(POINTS, FACES, process=False)
     glb = mesh.export(file_type="glb")
+    at = 20 + int.from_bytes(glb[12:16], "little")
+    forged = glb[:at] + (4_000_000_000).to_bytes(4, "little") + glb[at + 4 :]
+    assert "a chunk declares 4000000000 bytes" in refusal(write(tmp_path, "forged.glb", forged))
     for size in range(1, len(glb), 37):
         refusal(write(tmp_path, "cut.glb", glb[:size]))
 

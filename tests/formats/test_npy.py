@@ -46,3 +46,10 @@ def test_an_array_that_declares_more_than_its_file_holds_allocates_nothing(tmp_p
 def test_a_table_of_points_is_no_grid_and_is_told_its_own(tmp_path):
     np.save(tmp_path / "a.npy", np.zeros(9, [("x", "f4"), ("y", "f4"), ("z", "f4")]))
     assert "holds a table of x, y, z, not a grid; save its points as .ply or .xyz" in refusal(tmp_path / "a.npy")
+
+
+def test_a_header_longer_than_its_file_allocates_nothing(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((5, 5)))
+    content = (tmp_path / "a.npy").read_bytes()
+    forged = content[:6] + b"\x02\0" + (4_000_000_000).to_bytes(4, "little") + content[10:]
+    assert "declares a header of 4000000000 bytes" in refusal(write(tmp_path, "b.npy", forged))
