@@ -7,6 +7,7 @@ import glob
 import io
 import math
 import os
+import re
 import secrets
 import shlex
 import shutil
@@ -181,8 +182,8 @@ def _hidden(path: Path, kind: str) -> Path:
 
 def _turned(hidden: Path, kind: str) -> Path:
     """Return the name of the other kind with the same mark."""
-    head, _, suffix = hidden.name.rpartition(".partial" if kind == "old" else ".old")
-    return hidden.with_name(f"{head}.{kind}{suffix}")
+    # behind the mark: the name itself may hold either word
+    return hidden.with_name(re.sub(r"(.*\.[0-9a-f]{8}\.)(?:partial|old)", rf"\g<1>{kind}", hidden.name, count=1))
 
 
 def _flush(path: Path) -> None:
@@ -246,6 +247,7 @@ def locked(folder: str | os.PathLike[str], *, inside: bool = False) -> Iterator[
         If another process holds it.
     """
     target = Path(folder).resolve()
+    inside = inside or not target.name  # nothing is beside a root
     path = target / ".lock" if inside else target.with_name(f".{target.name}.lock")
     made = [parent for parent in path.parents if not is_there(parent)]
     handle = None

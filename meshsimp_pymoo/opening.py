@@ -104,10 +104,17 @@ def mended_source(model: Source, options: Options = DEFAULT) -> tuple[SourceMesh
 
 
 def _patch(source: SourceMesh, up: Up) -> SourceMesh:
-    """Cut out the front patch in the metric frame; what is left is as in the file."""
+    """Cut out the front patch in the metric frame; what is left is as in the file, whose name it keeps."""
     patch = front_patch(replace(source.measured, rows=np.arange(len(source.points))), up)
     rows = patch.rows
-    return replace(patch, points=source.points[rows], rows=source.rows[rows], georeference=source.georeference)
+    return replace(
+        patch,
+        name=source.name,  # by which a stored front finds its model again
+        points=source.points[rows],
+        rows=source.rows[rows],
+        georeference=source.georeference,
+        sort=source.sort,
+    )
 
 
 def applicable(model: Any, options: Options) -> Options:

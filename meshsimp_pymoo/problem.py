@@ -311,14 +311,13 @@ class MeshProblem(ElementwiseProblem):
         mesh = trimesh.Trimesh(
             vertices=self.model.file_points[used], faces=inverse.reshape(-1, 3), process=False, validate=False
         )
-        for name, values in self.model.attributes.items():
-            if name == "color":
-                mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=values[used])
-            else:
-                mesh.vertex_attributes[name] = values[used]
-        if self.model.material is not None and "uv" in self.model.attributes:
-            own = {name: values[used] for name, values in self.model.attributes.items() if name in ("uv", "color")}
-            mesh.visual = textured(own, self.model.material, mesh.visual)
+        attributes = {name: values[used] for name, values in self.model.attributes.items()}
+        if "color" in attributes:
+            mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=attributes["color"])
+        if self.model.material is not None and "uv" in attributes:
+            mesh.visual = textured(attributes, self.model.material, mesh.visual)
+        looks = {"color"} | ({"uv"} if mesh.visual.kind == "texture" else set())
+        mesh.vertex_attributes.update({name: values for name, values in attributes.items() if name not in looks})
         return mesh
 
     def name(self) -> str:

@@ -47,6 +47,7 @@ from meshsimp_pymoo.files import (
     write_csv,
     write_npz,
 )
+from meshsimp_pymoo.formats.material import is_put_beside
 from meshsimp_pymoo.formats.source.precision import single_precision_shift
 from meshsimp_pymoo.formats.table import (
     Format,
@@ -151,7 +152,10 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
         foreign = sorted(
             e.name
             for e in target.iterdir()
-            if e.name not in OWN_ENTRIES and e.stem not in CHOSEN and not _of_unfinished(e.name)
+            if e.name not in OWN_ENTRIES
+            and e.stem not in CHOSEN
+            and not _of_unfinished(e.name)
+            and not is_put_beside(e.name)
         )
         if foreign:
             raise ResultError(

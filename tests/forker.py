@@ -102,9 +102,12 @@ def serve() -> None:
 
 def answer(request: dict[str, Any], said: Path) -> dict[str, Any]:
     start = time.perf_counter()
+    # a signal that comes before the child is what it shall be waits, or it would end what is the parent's
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     child = os.fork()
     if child == 0:
-        become(request, said)
+        become(request, said, before)
+    signal.pthread_sigmask(signal.SIG_SETMASK, before)
     waiting = [*sorted(request["signals"]), (LONGEST, signal.SIGKILL)]
     done, status = 0, 0
     while not done:
@@ -136,7 +139,7 @@ def die(*_: Any, **__: Any) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def become(request: dict[str, Any], said: Path) -> None:
+def become(request: dict[str, Any], said: Path, mask: set[Any]) -> None:
     import traceback
 
     os.setsid()
@@ -156,7 +159,12 @@ def become(request: dict[str, Any], said: Path) -> None:
             mock.patch(request["die_in"], die).start()
         from meshsimp_pymoo.cli import main
 
-        code = main(request["args"])
+        try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        except KeyboardInterrupt:  # as if the command had just begun
+            code = 130
+        else:
+            code = main(request["args"])
     except BaseException:
         traceback.print_exc()
     finally:

@@ -278,6 +278,15 @@ def test_whoever_wants_degrees_gets_them(raster, tmp_path, recwarn):
     assert "scale" not in model.georeference
 
 
+def test_the_user_s_scale_goes_before_the_one_that_a_glb_states(tmp_path):
+    source = sheet()
+    write_mesh(tmp_path / "a.glb", source.points, source.faces, georeference=source.georeference)
+    stated = read_source(tmp_path / "a.glb")
+    assert stated.scale[:2].tolist() == source.georeference["scale"]
+    assert read_source(tmp_path / "a.glb", Options(scale="none")).scale.tolist() == [1, 1, 1]
+    assert read_source(tmp_path / "a.glb", Options(scale=(2.0, 3.0))).scale.tolist() == [2, 3, 1]
+
+
 def test_a_stored_front_needs_its_scale_again(raster, tmp_path):
     out = tmp_path / "out"
     write_mesh(tmp_path / "mesh.obj", (degrees := sheet()).points, degrees.faces)

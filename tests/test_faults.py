@@ -43,7 +43,7 @@ from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.search import checkpoint
-from meshsimp_pymoo.storage import CHECKPOINT, read_front
+from meshsimp_pymoo.storage import CHECKPOINT, PICTURES, read_front
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.grid import open_grid
 
@@ -372,12 +372,14 @@ def test_signals_at_random_moments_change_no_byte_and_leave_nothing(tmp_path, fo
         if kind != "killed":
             assert {entry.name for entry in tmp_path.iterdir()} <= {"out", "whole"}
         if name == "simplify" and (out / "run.json").exists() and kind != "killed":
-            # a front so far is whole, and of another budget than the undisturbed one
-            assert read_front(out).run["interrupted"] == (ended.code != 0) or not (out / "front.png").exists()
-            if read_front(out).run["interrupted"]:
+            if read_front(out).run["interrupted"]:  # a front so far: whole, of another budget
+                assert ended.code != 0
                 shutil.rmtree(out)
+            else:  # interrupted while it was drawn, if at all
+                assert same_bytes(out).items() <= same_bytes(whole).items()
         # all may be done before the signal was heard; then the folder is whole, and no other call begins in it
-        is_whole = name != "run" and ended.code != 2 and (out / "front.png").exists()
+        drawn = [picture for picture in PICTURES if (whole / picture).exists()]
+        is_whole = name != "run" and ended.code != 2 and all((out / picture).exists() for picture in drawn)
         if ended.code == 0 or is_whole:
             assert same_bytes(out) == same_bytes(whole)
             shutil.rmtree(out)
@@ -408,6 +410,12 @@ def test_a_second_search_for_a_folder_is_refused_before_it_begins(tmp_path, comm
     said = one_line(capsys)
     assert "out: another process is at work there; wait for it or name another folder" in said
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_root_of_all_folders_is_refused_in_a_line(tmp_path, commands, capsys):
+    for command in commands.values():
+        assert run(*command, "-o", tmp_path.root) == 2
+        assert one_line(capsys).startswith("meshsimp: /: ")
 
 
 def test_a_signal_is_answered_while_a_kernel_runs(tmp_path):
@@ -471,6 +479,14 @@ def test_signals_are_answered_in_turn_and_the_last_answer_stops(monkeypatch):
         assert not is_interrupted()
         assert interrupted_code() == 130
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_signal_gets_the_word_of_the_part_that_it_stops_though_that_is_past(capsys):
+    with interruptible(), answering("first", "second", "third"):
+        for _ in range(20):
+            with pytest.raises(KeyboardInterrupt), answering("stopping the part"):
+                signal.raise_signal(signal.SIGINT)
+    assert capsys.readouterr().err == 20 * "meshsimp: stopping the part\n"
 
 
 # -------------------------------------------------------------------------------------------- disk and folder: simplify

@@ -11,7 +11,7 @@ import pytest
 
 from meshsimp_pymoo import files
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.files import left_beside, locked, new_file, new_folder, put_back, put_text
+from meshsimp_pymoo.files import _turned, left_beside, locked, new_file, new_folder, partial_folder, put_back, put_text
 
 
 def entries(folder):
@@ -286,3 +286,14 @@ def test_only_a_folder_s_own_remains_are_touched(tmp_path):
     put_back(tmp_path / "a")  # the name is no pattern
     put_back(tmp_path / "[ab]")
     assert entries(tmp_path) == sorted([*others, "[ab]"])
+
+
+@pytest.mark.parametrize("name", ["out", "out.v1", "out.partial", "out.old", "out.0123abcd.old"])
+def test_whatever_a_folder_is_called_what_stood_aside_when_a_process_was_killed_is_put_back(tmp_path, name):
+    target = tmp_path / name
+    partial = partial_folder(target)
+    _turned(partial, "old").mkdir()
+    (_turned(partial, "old") / "results").write_text("hours")
+    put_back(target)
+    assert (target / "results").read_text() == "hours"
+    assert list(tmp_path.iterdir()) == [target]

@@ -10,6 +10,8 @@ from numpy.testing import assert_array_equal
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import write_mesh
+from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.opening import open_model, open_source
 from meshsimp_pymoo.problem import MeshProblem
 
@@ -86,3 +88,13 @@ def test_a_patch_is_cut_out_on_the_way():
     ball = trimesh.creation.icosphere(3)
     lid = open_source(ball, Options(up="z", patch="front"))
     assert 0 < len(lid.faces) < len(ball.faces)
+
+
+def test_the_front_of_a_patch_finds_its_model_again(tmp_path):
+    x, y = (values.ravel() for values in np.mgrid[:5, :4] * 1.0)
+    sheet = [[4 * i + j, 4 * i + j + 4, 4 * i + j + 5] for i in range(4) for j in range(3)]
+    sheet += [[a, c, a + 1] for a, _, c in sheet]
+    write_mesh(tmp_path / "m.ply", np.column_stack([x, y, np.sin(x * y)]), sheet)
+    problem = MeshProblem(tmp_path / "m.ply", patch="front", up="z")
+    Front.from_subsets(problem, np.ones((1, problem.n_var), bool)).save(tmp_path / "out", page=False)
+    assert Front.load(tmp_path / "out").problem.model.hash == problem.model.hash

@@ -17,6 +17,7 @@ from samples import random_solutions, write_solutions
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.formats.material import IMAGES, Material
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.opening import open_model
@@ -136,6 +137,20 @@ def test_own_results_are_replaced_when_asked(tmp_path, model, solutions):
     write_solutions(folder, model, solutions, meshes=0, overwrite=True)
     assert set(files(folder)) == {"front.csv", "front.npz", "run.json"}
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("mesh_format", ["ply", "obj"])
+def test_own_results_with_an_image_beside_the_chosen_mesh_are_replaced_too(tmp_path, model, solutions, mesh_format):
+    look = Material(image=IMAGES[".png"] + b"...")
+    painted = dataclasses.replace(model, material=look, attributes={"uv": model.points[:, :2]})
+    for _ in range(2):
+        folder = write_solutions(
+            tmp_path / "out", painted, solutions, chosen=4, mesh_format=mesh_format, meshes=1, overwrite=True
+        )
+    assert [path.read_bytes() for path in folder.glob("texture-*.png")] == [look.image]
+    (folder / "texture.png").write_bytes(b"a user's")
+    with pytest.raises(ResultError, match=r"holds texture\.png, which is no result"):
+        claim_output(folder, overwrite=True)
 
 
 def test_foreign_files_are_never_deleted(tmp_path, model, solutions):

@@ -15,6 +15,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ResultError, printable, reason_of
@@ -75,17 +76,27 @@ ENDING = (signal.SIGINT, signal.SIGTERM)
 LONGEST_NAME = 18
 
 
+@dataclass
+class _Part:
+    """A part of the work, and the signals that came in it."""
+
+    #: What is said to the first one, the second one ...; the last words are for all others.
+    answers: tuple[str, ...] = ()
+    #: How many came. Libraries may swallow the exception, while they are imported, say.
+    came: int = 0
+    #: How many of them have been answered.
+    answered: int = 0
+
+
 class _Signals:
     """What came of Ctrl-C and SIGTERM, and what is to be done about it."""
 
     #: The first that came, which decides the exit code.
     first: int | None = None
-    #: How many came in this part of the work. Libraries may swallow the exception, while they are imported, say.
-    came = 0
-    #: What is said to the first one, the second one ... in this part; the last words are for all others.
-    answers: tuple[str, ...] = ()
-    #: How many of them have been answered.
-    answered = 0
+    #: The part of the work that is being done.
+    part = _Part()
+    #: The part that each signal stopped. Its answer may come when that is past.
+    stopped: tuple[_Part, ...] = ()
     #: How many more are no new ones.
     repeated = 0
 
@@ -97,7 +108,7 @@ def interruptible() -> Iterator[None]:
     Schedulers and containers end a program by SIGTERM: what is found so far is written then too. Python acts upon a
     signal when the main thread comes back to it, perhaps seconds later; so the word is that of another thread.
     """
-    _Signals.first = None
+    _Signals.first, _Signals.stopped = None, ()
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -128,18 +139,20 @@ def answering(*answers: str) -> Iterator[None]:
     With the last of the answers KeyboardInterrupt is raised. The signal after that is only answered, so that what ends
     now can end; if there are still more, it is raised again.
     """
-    before = _Signals.answers
-    _Signals.came, _Signals.answered, _Signals.answers = 0, 0, answers
+    before = _Signals.part
+    _Signals.part = _Part(answers)
     try:
         yield
     finally:
-        _Signals.came, _Signals.answered, _Signals.answers = 0, 0, before
+        _Signals.part = _Part(before.answers)
 
 
 def _note(signum: int, frame: Any) -> None:
+    part = _Signals.part
     _Signals.first = _Signals.first or signum
-    _Signals.came += 1
-    if _Signals.came >= len(_Signals.answers) and _Signals.came != len(_Signals.answers) + 1:
+    _Signals.stopped += (part,)
+    part.came += 1
+    if part.came >= len(part.answers) and part.came != len(part.answers) + 1:
         raise KeyboardInterrupt
 
 
@@ -148,19 +161,26 @@ def _raise_again(lost: Any) -> None:
     if lost.exc_type is not KeyboardInterrupt or _Signals.first is None:
         sys.__unraisablehook__(lost)
         return
-    _Signals.came -= 1
+    _Signals.part.came -= 1
     _Signals.repeated += 1
     threading.Timer(0.05, _thread.interrupt_main, (int(_Signals.first),)).start()
 
 
 def _answer(bell: int) -> None:
     """Say a word whenever a signal came, until the other end is closed."""
+    rung = 0
     while number := os.read(bell, 1):
+        if number[0] not in ENDING:
+            continue
+        # Python may have acted upon it already, and be at the next part
+        stopped = _Signals.stopped
+        part = stopped[rung] if rung < len(stopped) else _Signals.part
+        rung += 1
         if _Signals.repeated:
             _Signals.repeated -= 1
-        elif number[0] in ENDING and (answers := _Signals.answers):
-            word = answers[min(_Signals.answered, len(answers) - 1)]
-            _Signals.answered += 1
+        elif part.answers:
+            word = part.answers[min(part.answered, len(part.answers) - 1)]
+            part.answered += 1
             with suppress(OSError, ValueError):  # nobody is there to hear it
                 say(word)
 
@@ -172,7 +192,7 @@ def interrupted_code() -> int:
 
 def is_interrupted() -> bool:
     """Tell whether Ctrl-C or SIGTERM came in this part of the work."""
-    return _Signals.came > 0
+    return _Signals.part.came > 0
 
 
 def stop_if_interrupted() -> None:

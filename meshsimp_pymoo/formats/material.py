@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 # How the files of the images begin that every format with materials can hold, by suffix.
 IMAGES = {".png": b"\x89PNG\r\n\x1a\n", ".jpg": b"\xff\xd8\xff"}
 MEDIA_TYPES = {".png": "image/png", ".jpg": "image/jpeg"}
+# What is put beside meshes: images, and libraries of materials.
+TEXTURE, LIBRARY = "texture", "material.mtl"
+CHECKSUM_DIGITS = 16
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class Material:
 
     def put_image(self, folder: Path) -> str:
         """Write the image into a folder unless it is there, and return its file's name."""
-        return put_beside(folder, f"texture{self.suffix}", self.image)
+        return put_beside(folder, f"{TEXTURE}{self.suffix}", self.image)
 
 
 def put_beside(folder: Path, name: str, content: bytes) -> str:
@@ -54,9 +58,19 @@ def put_beside(folder: Path, name: str, content: bytes) -> str:
     from meshsimp_pymoo.files import new_file
 
     stem, dot, suffix = name.partition(".")
-    name = f"{stem}-{hashlib.sha256(content).hexdigest()[:16]}{dot}{suffix}"
+    name = f"{stem}-{hashlib.sha256(content).hexdigest()[:CHECKSUM_DIGITS]}{dot}{suffix}"
     path = folder / name
     if not path.is_file() or path.stat().st_size != len(content):
         with new_file(path) as unfinished:
             unfinished.write_bytes(content)
     return name
+
+
+def is_put_beside(name: str) -> bool:
+    """Tell whether a file's name is one that :func:`put_beside` gave to an image or a library.
+
+    >>> is_put_beside("texture-0123456789abcdef.png"), is_put_beside("texture.png")
+    (True, False)
+    """
+    stems = {TEXTURE: "|".join(map(re.escape, IMAGES)), Path(LIBRARY).stem: re.escape(Path(LIBRARY).suffix)}
+    return any(re.fullmatch(rf"{stem}-[0-9a-f]{{{CHECKSUM_DIGITS}}}(?:{ends})", name) for stem, ends in stems.items())

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from meshsimp_pymoo.errors import ModelError, warn_of
-from meshsimp_pymoo.formats.material import Material, put_beside
+from meshsimp_pymoo.formats.material import LIBRARY, Material, put_beside
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, register
@@ -180,7 +180,7 @@ def _put_material(folder: Path, material: Material) -> str:
     *color, opacity = (f"{value:.6g}" for value in material.color)
     lines = [f"newmtl {_word(material.name)}", f"Kd {' '.join(color)}", f"d {opacity}"]
     lines += [f"map_Kd {material.put_image(folder)}"] if material.suffix else []
-    return put_beside(folder, "material.mtl", ("\n".join(lines) + "\n").encode("utf-8"))
+    return put_beside(folder, LIBRARY, ("\n".join(lines) + "\n").encode("utf-8"))
 
 
 def _word(text: str) -> str:

@@ -303,8 +303,8 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     with guarded(kind, name):
         source = kind.read(path, name, options)
     refuse_foreign(name, options, kind.name, source.sort)
-    # clouds had to know before they were triangulated
-    return source if "scale" in source.georeference else source.in_frame(options.scale)
+    # clouds had to know before they were triangulated; a GLB may state a scale, and the user another one
+    return source if source.sort == "cloud" else source.in_frame(options.scale)
 
 
 def _way_out(path: Path) -> str:

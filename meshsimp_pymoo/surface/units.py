@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from meshsimp_pymoo.formats.outmesh import metres_of
 from meshsimp_pymoo.surface.measures import LENGTH
 
-METRE = ("metre", "meter", "m")
 ANGLES = ("degree", "grad", "gon", "radian")
 
 
@@ -21,8 +21,8 @@ def length_unit(georeference: Mapping[str, Any]) -> str:
     >>> length_unit({"unit": "degree"}), length_unit({})
     ('model units', 'model units')
     """
-    unit = str(georeference.get("height_unit") or (METRE[0] if "scale" in georeference else georeference.get("unit")))
-    if unit.lower() in METRE:
+    unit = str(georeference.get("height_unit") or ("metre" if "scale" in georeference else georeference.get("unit")))
+    if metres_of(unit) == 1.0:
         return "m"
     return LENGTH if unit in ("None", *ANGLES) else unit
 

@@ -20,6 +20,8 @@ import mutations
 import numpy as np
 
 HONEST = 30_000
+# No format has sides beyond this.
+LARGEST_SIDE = 2**31 - 1
 FORGED = (2**24, 2**31 - 1, 2**31, 2**32 - 1, 10**9, 10**10, 2**40, 2**53, 2**63 - 1, 10**30)
 PACKED = (10**8, 4 * 10**8, 10**10)
 
@@ -396,11 +398,12 @@ def _packed_png(n: int, rng: np.random.Generator) -> Case:
     rows, columns = _sides(n, rng)
     if n <= 10 * HONEST:
         return "png", _png(columns, rows, zlib.compress(bytes(rows * (1 + 2 * columns))))
-    return "png", _png(columns, min(rows, 2**31 - 1), b"\x78\x9c" + _deflated(b"", 2 * n) + bytes(4))
+    return "png", _png(columns, min(rows, LARGEST_SIDE), b"\x78\x9c" + _deflated(b"", 2 * n) + bytes(4))
 
 
 def _packed_tiff(n: int, rng: np.random.Generator) -> Case:
-    return "tif", _raster_of_zeros(*_sides(n, rng), str(_one_of(rng, ("deflate", "lzw", "packbits", "zstd"))))
+    rows, columns = (min(side, LARGEST_SIDE) for side in _sides(n, rng))
+    return "tif", _raster_of_zeros(rows, columns, str(_one_of(rng, ("deflate", "lzw", "packbits", "zstd"))))
 
 
 def _raster_of_zeros(rows: int, columns: int, packing: str) -> bytes:
