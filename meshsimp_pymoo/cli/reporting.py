@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.terminal import OK, bar, place_for_matplotlib, tell, there
+from meshsimp_pymoo.cli.terminal import OK, bar, place_for_matplotlib, tell, tell_drawn, there
 from meshsimp_pymoo.comparison.report import write_report
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.storage import PICTURES
@@ -17,11 +17,7 @@ def report_on_front(out: Path, model: str | None, *, quiet: bool, as_json: bool)
     front = Front.load(out, model=model)
     with place_for_matplotlib(out):
         front.draw()
-    if as_json:
-        tell(json.dumps({"page": str(out / "report.html"), "solutions": len(front)}, indent=2))
-    elif not quiet:
-        tell(f"written: {out}: {there(out, *PICTURES)} ({len(front)} solutions)")
-    return OK
+    return tell_drawn(out, PICTURES, len(front), quiet=quiet, as_json=as_json)
 
 
 def report_on_experiment(out: Path, facts: dict[str, Any], *, quiet: bool, as_json: bool) -> int:

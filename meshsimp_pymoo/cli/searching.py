@@ -34,6 +34,7 @@ from meshsimp_pymoo.cli.terminal import (
     say,
     stop_if_interrupted,
     tell,
+    tell_origin,
     there,
 )
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
@@ -499,8 +500,7 @@ def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None) -> N
     if (compiled := keeper.before["compile_seconds"]) >= 1.0:
         tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
     if any(origin):
-        place = ", ".join(f"{value:.15g}" for value in origin)
-        tell(f"origin of the glb meshes: ({place}); each file states it")
+        tell_origin(origin)
     if chosen is None:
         size = _round_size(front)
         tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")

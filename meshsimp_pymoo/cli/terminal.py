@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import json
 import logging
 import math
 import os
@@ -13,7 +14,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -55,6 +56,8 @@ __all__ = [
     "say",
     "stop_if_interrupted",
     "tell",
+    "tell_drawn",
+    "tell_origin",
     "there",
     "warnings_as_lines",
 ]
@@ -405,6 +408,23 @@ def say(line: str) -> None:
 def there(folder: Path, *names: str) -> str:
     """Return those names that are files of a folder, in a row: a picture may have failed."""
     return ", ".join(name for name in names if (folder / name).is_file())
+
+
+def tell_origin(origin: Sequence[float]) -> None:
+    """Say from which origin the coordinates of meshes count."""
+    place = ", ".join(f"{value:.15g}" for value in origin)
+    tell(f"origin of the glb meshes: ({place}); each file states it")
+
+
+def tell_drawn(folder: Path, pictures: tuple[str, ...], solutions: int, *, quiet: bool, as_json: bool) -> int:
+    """Say which pictures of a front there are now; return the exit code, which says whether these are all."""
+    made = {key: name for key, name in zip(("picture", "page"), pictures, strict=False) if (folder / name).is_file()}
+    if as_json:
+        found = {key: str(folder / name) for key, name in made.items()}
+        tell(json.dumps(found | {"solutions": solutions}, indent=2))
+    elif made and not quiet:
+        tell(f"written: {folder}: {', '.join(made.values())} ({solutions} solutions)")
+    return OK if len(made) == len(pictures) else BAD_INPUT
 
 
 def tell(lines: str) -> None:

@@ -28,6 +28,8 @@ from meshsimp_pymoo.cli.terminal import (
     say,
     stop_if_interrupted,
     tell,
+    tell_drawn,
+    tell_origin,
     there,
 )
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, printable, reason_of
@@ -209,11 +211,7 @@ def report_on_tiled(out: Path, model: str | None, *, quiet: bool, as_json: bool)
     front, chosen = _stored(out, open_grid(model or stored, options))
     with place_for_matplotlib(out):
         draw_into(out, {PICTURES[0]: lambda path: _draw(front, chosen, path)})
-    if as_json:
-        tell(json.dumps({"picture": str(out / PICTURES[0]), "solutions": len(front)}, indent=2))
-    elif not quiet:
-        tell(f"written: {out}: {there(out, *PICTURES[:1])} ({len(front)} solutions)")
-    return OK
+    return tell_drawn(out, PICTURES[:1], len(front), quiet=quiet, as_json=as_json)
 
 
 def _stored(out: Path, grid: HeightGrid) -> tuple[TiledFront, int | None]:
@@ -357,3 +355,5 @@ def _summarise(output: Output, tiling: Tiling, front: TiledFront, chosen: int | 
     written = len(list(out.glob(f"meshes/*{suffix}")))
     files = there(out, "front.csv", "nested.npz", "front.png")
     tell(f"written: {out}: {files}" + (f", {written} in meshes" if written else ""))
+    if origin := record_of(out).get("mesh_origin"):
+        tell_origin(origin)

@@ -32,7 +32,13 @@ MEASURES = {
 
 
 def _refuse(model: Held) -> None:
-    """Refuse a mesh with faces that do not look up along the z of its file."""
+    """Refuse coordinates that are no lengths, and a mesh with faces that do not look up along the z of its file."""
+    unit = model.georeference.get("unit")
+    if unit and metres_of(unit) is None:
+        raise ResultError(
+            f"{model.name}: a LandXML surface has lengths for coordinates, and the unit of these is {unit!r}; write "
+            "another format, such as ply, or project the model first (gdalwarp -t_srs)"
+        )
     a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     if (area < 0).any() or not (area > 0).any():

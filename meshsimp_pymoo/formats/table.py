@@ -80,6 +80,10 @@ class Held(Protocol):
     def faces(self) -> IntArray:
         """Triangles (T, 3)."""
 
+    @property
+    def georeference(self) -> Mapping[str, Any]:
+        """Where on Earth it is, as far as its file says."""
+
 
 class Format(NamedTuple):
     """All that is known of a format of files.

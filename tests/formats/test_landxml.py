@@ -63,3 +63,9 @@ def test_landxml_is_refused_where_the_height_is_not_z(tmp_path):
     quality = [surface.simplify(kept[0]).quality]
     with pytest.raises(ResultError, match=r"turned: a LandXML surface has its heights along z, .* do not look up"):
         write_front(tmp_path / "out", surface, quality, kept, meshes=0, mesh_format="landxml")
+
+
+def test_degrees_are_no_lengths_and_are_refused(tmp_path, model, solutions):
+    there = dataclasses.replace(model, georeference={"unit": "degree", "scale": [71_000.0, 111_000.0]})
+    with pytest.raises(ResultError, match=r"the unit of these is 'degree'; write another format, such as ply"):
+        write_solutions(tmp_path / "out", there, solutions, mesh_format="landxml")
