@@ -68,7 +68,7 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
     source, mended = mended_source(model, options)
     built = build_model(source, up=options.up)
     if mended != Mended():
-        warn_of(f"{source.name}: {mended} (repair='none' leaves them)")
+        warn_of(f"{source.name}: {mended} (--repair none (repair='none') leaves them)")
         built = replace(built, found=built.found | {f"faces_{what}": n for what, n in vars(mended).items() if n})
     return built
 

@@ -226,9 +226,11 @@ class OpenModel:
         values[self.feet] = 0.0
         if not values.any():
             raise ModelError(f"{self.name}: all {len(values)} {label} are 0; nothing would count")
-        if not values.sum() <= MOST_WEIGHT:
+        with np.errstate(over="ignore"):
+            total = values.sum()
+        if not total <= MOST_WEIGHT:
             raise ModelError(
-                f"{self.name}: the {len(values)} {label} add up to {values.sum():g}, beyond {MOST_WEIGHT:g}; "
+                f"{self.name}: the {len(values)} {label} add up to {total:g}, beyond {MOST_WEIGHT:g}; "
                 "divide them all by one number"
             )
         weighted = dataclasses.replace(self, weights=values)

@@ -20,7 +20,15 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.errors import ModelError, ModelWarning, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh
-from meshsimp_pymoo.surface.edges import Edges, border_loops, components, seams, single_precision, used_vertices
+from meshsimp_pymoo.surface.edges import (
+    Edges,
+    border_loops,
+    components,
+    next_corner,
+    seams,
+    single_precision,
+    used_vertices,
+)
 from meshsimp_pymoo.surface.overlap import height_at, hidden_faces
 
 Up = str | Sequence[float] | FloatArray
@@ -137,10 +145,13 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
         direction = _given_direction(given)
         return direction, seen_from(direction)
     normals = _area_vectors(points, source.faces)
-    area = float(np.linalg.norm(normals, axis=1).sum())
+    areas = np.linalg.norm(normals, axis=1)
+    area = float(areas.sum())
     total = normals.sum(axis=0)
     length = float(np.linalg.norm(total))
-    if area <= WIDTH_SHARE * float(np.ptp(source.points, axis=0).max()) ** 2:
+    corners = points[source.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    if (areas <= WIDTH_SHARE * longest**2).all():
         raise ModelError(
             f"{source.name}: all {len(source.points)} vertices lie on one line: the {len(source.faces)} faces have no "
             "area; give a mesh that spans a surface"
@@ -655,7 +666,7 @@ def _vertical(upright: FloatArray, faces: IntArray, normals: FloatArray, areas: 
 def _largest_part(xy: FloatArray, faces: IntArray, chosen: IntArray, weight: FloatArray, blur: float) -> IntArray:
     """Return the connected part of the chosen faces with the largest weight, manifold and wound alike.
 
-    Borders closer than `blur` in the plane connect, whatever the step between them.
+    Borders closer than `blur` in the plane connect faces beside each other, whatever the step between them.
 
     Where two of its faces lie on the same side of an edge (slivers that the overlap test let pass), the
     heavier stays.
@@ -665,8 +676,12 @@ def _largest_part(xy: FloatArray, faces: IntArray, chosen: IntArray, weight: Flo
         first, second = edges.pairs
         label = components(len(chosen), first // 3, second // 3)
         if label.any():
-            touching = seams(xy, edges, blur)
-            label = components(int(label.max()) + 1, label[touching[0] // 3], label[touching[1] // 3])[label]
+            one, other = seams(xy, edges, blur)
+            start, end, there = (xy[edges.faces.ravel()[half]] for half in (one, next_corner(one), other))
+            # faces beside each other run along their seam in opposite senses; those above each other alike
+            beside = np.linalg.norm(start - there, axis=1) > np.linalg.norm(end - there, axis=1)
+            first, second = label[one[beside] // 3], label[other[beside] // 3]
+            label = components(int(label.max()) + 1, first, second)[label]
         best = int(np.argmax(np.bincount(label, weights=weight[chosen])))
         part = chosen[label == best]
         directed = faces[part].ravel() * (int(faces.max()) + 1) + np.roll(faces[part], -1, axis=1).ravel()

@@ -618,3 +618,11 @@ def test_a_large_scan_is_checked_and_cut_within_seconds():
     check_open_surface(patch, patch.points)
     assert len(patch.faces) > 160_000
     assert time.perf_counter() - start < 20
+
+
+def test_spikes_far_out_make_no_line_of_a_sheet():
+    source = relief(20)
+    points = source.points.copy()
+    points[[45, 150, 300], 2] += [1e12, -1e12, 1e12]
+    spiked = build_source(points, source.faces, name="spiked")
+    assert_array_equal(up_direction(spiked), [0, 0, 1])

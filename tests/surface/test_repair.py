@@ -171,7 +171,7 @@ def test_what_was_mended_is_said_once_with_its_numbers_and_none_leaves_it():
     broken = build_source(source.points, faces, name="broken.ply")
     told = (
         "broken.ply: 3 faces listed twice and dropped, 2 faces that stand on edges of two others dropped, 13 faces "
-        "wound against the others turned (repair='none' leaves them)"
+        "wound against the others turned (--repair none (repair='none') leaves them)"
     )
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -223,3 +223,14 @@ def test_the_front_takes_both_of_two_tiles_that_touch_within_single_precision(ga
     )
     with pytest.warns(ModelWarning, match=r"^two: 722 of 1444 faces \(50.00% of the area\) .* in 1 piece$"):
         assert len(front_patch(apart, "z").faces) == 722
+
+
+def test_a_sheet_above_a_part_of_the_ground_is_no_part_of_it_although_their_outlines_coincide():
+    ground = sheet()
+    part = ground.faces[(ground.points[ground.faces, 0] <= ground.points[:, 0].min() + 8).all(axis=1)]
+    used, numbers = np.unique(part, return_inverse=True)
+    points = np.vstack([ground.points, ground.points[used] + [0, 0, 5]])
+    both = build_source(points, np.vstack([ground.faces, numbers.reshape(-1, 3) + len(ground.points)]), name="two")
+    with pytest.warns(ModelWarning, match=rf"^two: {len(part)} of \d+ faces"):
+        patch = front_patch(both, "z")
+    assert_array_equal(patch.points[:, 2].max(), ground.points[:, 2].max())

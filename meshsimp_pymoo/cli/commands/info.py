@@ -141,4 +141,5 @@ def _file_unit(georeference: dict[str, Any]) -> str:
     from meshsimp_pymoo.surface.units import length_unit
 
     unit = str(georeference.get("unit") or "file units")
-    return f"{unit}, {unit}, {length_unit(georeference)}" if "scale" in georeference else unit
+    # degrees are of the plane alone
+    return f"{unit}, {unit}, {length_unit(georeference)}" if "scale" in georeference or unit == "degree" else unit
