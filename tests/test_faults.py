@@ -376,8 +376,9 @@ def test_signals_at_random_moments_change_no_byte_and_leave_nothing(tmp_path, fo
             if read_front(out).run["interrupted"]:  # a front so far: whole, of another budget
                 assert ended.code != 0
                 shutil.rmtree(out)
-            else:  # interrupted while it was drawn, if at all
-                assert same_bytes(out).items() <= same_bytes(whole).items()
+            else:  # interrupted while it was drawn, if at all; an earlier call may have been killed while it drew
+                shown = {entry: found for entry, found in same_bytes(out).items() if not entry.startswith(".")}
+                assert shown.items() <= same_bytes(whole).items()
         # all may be done before the signal was heard; then the folder is whole, and no other call begins in it
         drawn = [picture for picture in PICTURES if (whole / picture).exists()]
         is_whole = name != "run" and ended.code != 2 and all((out / picture).exists() for picture in drawn)
