@@ -380,12 +380,21 @@ def draw_into(folder: Path, drawings: Mapping[str, Callable[[Path], object]]) ->
             with new_file(folder / name, flush=False) as partial:
                 draw(partial)
         except Exception as problem:  # whatever a library may not like about a name, a font or the memory
+            if _was_interrupted(problem):
+                raise KeyboardInterrupt from problem
             cause = problem.__context__ if isinstance(problem.__context__, OSError) else problem
             warnings.warn(
                 f"{name} could not be made ({reason_of(cause)}); the rest of the results is complete",
                 PictureWarning,
                 stacklevel=3,
             )
+
+
+def _was_interrupted(problem: BaseException | None) -> bool:
+    """Tell whether Ctrl-C is what a library made an error of its own of."""
+    while problem is not None and not isinstance(problem, KeyboardInterrupt):
+        problem = problem.__cause__ or problem.__context__
+    return problem is not None
 
 
 def write_npz(path: Path, **arrays: AnyArray) -> None:
@@ -491,7 +500,10 @@ def read_npy_header(stream: IO[bytes], size: int, name: str) -> NpyHeader:
     """
     with _npy(name):
         version = np.lib.format.read_magic(stream)
-        if version != (1, 0):  # a header may be as long as it likes, and room is made for it before it is read
+        if version in (
+            (2, 0),
+            (3, 0),
+        ):  # a header may be as long as it likes, and room is made for it before it is read
             length = int.from_bytes(stream.read(4), "little")
             if length > size:
                 raise ModelError(f"{name}: truncated: declares a header of {length} bytes; copy or save it again")

@@ -297,3 +297,15 @@ def test_whatever_a_folder_is_called_what_stood_aside_when_a_process_was_killed_
     put_back(target)
     assert (target / "results").read_text() == "hours"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_an_interruption_of_which_a_library_makes_an_error_stays_one(tmp_path):
+    def draw(path):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as problem:
+            raise SystemError("returned a result with an exception set") from problem
+
+    with pytest.raises(KeyboardInterrupt):
+        files.draw_into(tmp_path, {"front.png": draw})
+    assert list(tmp_path.iterdir()) == []

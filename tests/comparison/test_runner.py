@@ -627,7 +627,7 @@ def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one
         return line
 
     without_rules = [{key: item[key] for key in item if key != "rules"} for item in content["problems"]]
-    assert "experiment.json: is not of the format 2 that this version reads; run it again" in told(
+    assert "experiment.json: is not of the format 3 that this version reads; run it again" in told(
         format=1, problems=without_rules
     )
     assert "experiment.json: is damaged ('rules' is missing); `meshsimp run` writes it anew" in told(
