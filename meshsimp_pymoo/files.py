@@ -500,10 +500,9 @@ def read_npy_header(stream: IO[bytes], size: int, name: str) -> NpyHeader:
     """
     with _npy(name):
         version = np.lib.format.read_magic(stream)
-        if version in (
-            (2, 0),
-            (3, 0),
-        ):  # a header may be as long as it likes, and room is made for it before it is read
+        if version not in ((1, 0), (2, 0), (3, 0)):
+            raise ValueError(f"there is no version {version[0]}.{version[1]} of its header")
+        if version != (1, 0):  # it may be as long as it likes, and room is made for it before it is read
             length = int.from_bytes(stream.read(4), "little")
             if length > size:
                 raise ModelError(f"{name}: truncated: declares a header of {length} bytes; copy or save it again")
