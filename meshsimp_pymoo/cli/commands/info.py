@@ -106,7 +106,9 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         refusal: str | None = str(problem)
     else:
         refusal = facts.refusal
-        n_below, n_feet = (0, 0) if refusal else count_places(measured.points @ upright_rotation(up).T, measured.faces)
+        n_below = n_feet = 0
+        if not refusal and source.sort == "mesh":  # grids and clouds have one vertex at a place
+            n_below, n_feet = count_places(measured.points @ upright_rotation(up).T, measured.faces)
         if n_below:
             rows["vertices"] += f" ({n_below:,} lie below others, {n_feet:,} of them feet that do not count)"
         content |= {"below_others": n_below, "feet": n_feet}
