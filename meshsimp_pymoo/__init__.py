@@ -9,14 +9,14 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
     files          files and folders whole or not at all, locks, arrays without pickles
     plane/         predicates, triangulation, footprint, faces: arrays in, arrays out
     formats/       one file a format, in one table; ends in a SourceMesh
-    surface/       what a chromosome means: rules and measures, the height surface, its moves, refit, score
+    surface/       what a chromosome means: rules and measures, the height surface, its moves, refit, score; big grids
     datasets       built-in models by name
-    opening        the one way in: path, name or arrays, and Options -> model
+    opening        the one way in: path, name or arrays, and Options -> model, or a grid read by windows
     problem        MeshProblem: which vertices are kept -> (error, triangles)
     search/        operators, thinning and insertion, annealing, memetic, presets, MOEA/D, GA, checkpoints
     storage        the folder of a front
     report/        pictures and the page of one front
-    front          Front: a sequence of solutions to choose from
+    front          Front: a sequence of solutions to choose from, whole models' or tiles'
     tiles/         height grids too big for one piece
     comparison/    the study: YAML files, the runs they ask for, tables, findings
     warming        what has to be compiled once on a machine
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.front import Front, FrontSolution
+    from meshsimp_pymoo.opening import open_grid
     from meshsimp_pymoo.problem import MeshProblem
     from meshsimp_pymoo.report.figures import plot_error, plot_front, plot_mesh
     from meshsimp_pymoo.search.display import FrontOutput
@@ -63,7 +64,6 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.surface.rules import Rules
     from meshsimp_pymoo.surface.surface import Refitted
     from meshsimp_pymoo.tiles.front import tiled_front
-    from meshsimp_pymoo.tiles.grid import open_grid
     from meshsimp_pymoo.workers import DaskEngine, Processes
 
 _HOMES = {
@@ -99,7 +99,7 @@ _HOMES = {
     "report.figures": ("plot_error", "plot_front", "plot_mesh"),
     "storage": ("read_front", "write_front"),
     "tiles.front": ("tiled_front",),
-    "tiles.grid": ("open_grid",),
+    "opening": ("open_grid",),
     "workers": ("DaskEngine", "Processes"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

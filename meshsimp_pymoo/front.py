@@ -3,7 +3,7 @@
 It comes from a pymoo result or from a folder that was written before, and shows itself in a notebook::
 
     front = Front.from_result(minimize(MeshProblem("face.ply"), nsga2_v1(), seed=1))
-    front = Front.load("out")
+    front = Front.load("out")                       # of tiles too
     front.best(triangles=500).mesh.export("small.ply")
     front.knee().error, front[3].triangles, len(front)
     front.save("out")
@@ -32,8 +32,9 @@ from meshsimp_pymoo.files import claim_file, draw_into, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
-from meshsimp_pymoo.opening import applicable
-from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.opening import applicable, open_grid, open_model
+from meshsimp_pymoo.problem import MeshProblem, mesh_of
+from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.settings import plain, read_back
@@ -45,17 +46,19 @@ from meshsimp_pymoo.storage import (
     write_front,
     write_solution,
 )
+from meshsimp_pymoo.surface.grid_surface import GridSurface
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES, Measure, Quality, quality_of
+from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Refitted, Simplified
+from meshsimp_pymoo.surface.surface import Refitted, Simplified, Surface
 from meshsimp_pymoo.surface.units import length_unit
+from meshsimp_pymoo.surface.weld import pieces
 
 if TYPE_CHECKING:
     import pandas
     import trimesh
     from matplotlib.axes import Axes
-
-    from meshsimp_pymoo.surface.model import OpenModel
 
 __all__ = ["Front", "FrontSolution", "starting_front"]
 
@@ -83,20 +86,24 @@ class FrontSolution(_Numbers):
         Its number in the front, from 0; the column ``solution`` of ``front.csv``.
     quality : Quality
         All its numbers; each of them is an attribute of the solution too (``error``, ``triangles``, ...).
-    kept : (N,) bool array
-        The vertices that stay, in vector order.
     """
 
     def __init__(self, front: Front, solution: int) -> None:
         self.front = front
         self.solution = solution
         self.quality: Quality = front.quality[solution]
-        self.kept: BoolArray = front.kept[solution]
+
+    @cached_property
+    def kept(self) -> BoolArray:
+        """The vertices that stay (N,), in vector order."""
+        kept: BoolArray = self.front.kept[self.solution]
+        return kept
 
     @cached_property
     def simplified(self) -> Simplified:
         """Triangles, deviation and cover of the original vertices, computed when first used."""
-        return self.front.problem.simplify(self.kept)
+        surface = self.front.surface
+        return surface.simplify(self.kept | surface.pinned)
 
     @cached_property
     def refitted(self) -> Refitted:
@@ -105,28 +112,29 @@ class FrontSolution(_Numbers):
 
     def refit(self, *, until: float | None = None) -> Refitted:
         """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
-        surface = self.front.problem.surface
+        surface = self.front.surface
         return surface.refit(self.kept | surface.pinned, until=until)
 
     @property
     def points(self) -> FloatArray:
         """The model's vertices (N, 3), as pictures show them; ``faces`` are rows of them."""
-        return self.front.problem.surface.view.points
+        return self.front.surface.points
 
-    @property
+    @cached_property
     def faces(self) -> IntArray:
         """The triangles (M, 3) as rows of the model's vertices."""
-        return self.simplified.faces
+        surface = self.front.surface
+        return surface.triangles(self.kept | surface.pinned)
 
     @property
     def attributes(self) -> dict[str, npt.NDArray[Any]]:
         """Colours and other attributes of the model's vertices."""
-        return self.front.problem.model.attributes
+        return self.front.model.attributes
 
     @cached_property
     def mesh(self) -> trimesh.Trimesh:
         """The simplified mesh in the frame of the model's file, with its colours and attributes."""
-        return self.front.problem.mesh(self.kept)
+        return mesh_of(self.front.surface, self.faces)
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
@@ -145,21 +153,21 @@ class FrontSolution(_Numbers):
             if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.problem.surface, self.faces)
+                write_solution(unfinished, self.front.surface, self.faces)
         return path
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
         from meshsimp_pymoo.report.figures import plot_mesh
 
-        return plot_mesh(self, ax, **{"exaggeration": self.front.problem.surface.view.exaggeration} | kwargs)
+        return plot_mesh(self, ax, **{"exaggeration": self.front.surface.view.exaggeration} | kwargs)
 
     def plot_error(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the deviation at every original vertex; see :func:`meshsimp_pymoo.report.figures.plot_error`."""
         from meshsimp_pymoo.report.figures import plot_error
 
         found = self.simplified
-        return plot_error(self.front.problem.surface, found.deviation, ax, **{"covered": found.covered} | kwargs)
+        return plot_error(self.front.surface, found.deviation, ax, **{"covered": found.covered} | kwargs)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FrontSolution):
@@ -210,10 +218,12 @@ class Front(Sequence[FrontSolution]):
     ----------
     quality : sequence of Quality, length S
         The numbers of each solution, sorted by triangles, then error.
-    kept : (S, N) bool array
-        The solutions in vector order.
+    kept : (S, N) bool array, or Nested
+        The solutions in vector order; or by rows of the file, as tiles find them, and then made one at a time.
     problem : MeshProblem, optional
         What they are solutions of; by default it is read again from what ``run`` says of it when it is needed.
+    surface : Surface, optional
+        The same without a problem.
     run : mapping, optional
         The record of the run; see ``run.json``.
     folder : Path, optional
@@ -241,25 +251,28 @@ class Front(Sequence[FrontSolution]):
     def __init__(
         self,
         quality: Sequence[Quality],
-        kept: npt.ArrayLike,
+        kept: npt.ArrayLike | Nested,
         *,
         problem: MeshProblem | None = None,
+        surface: Surface | None = None,
         run: Mapping[str, Any] | None = None,
         folder: Path | None = None,
         meshes: Sequence[str] = (),
         series: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
         self.quality = tuple(quality)
-        self.kept: BoolArray = np.asarray(kept, dtype=bool)
+        self._kept = kept if isinstance(kept, Nested) else np.asarray(kept, dtype=bool)
         self.run = dict(run or {})
         self.folder = folder
         self.series: dict[str, npt.ArrayLike] = dict(series or {})
         self._meshes = tuple(meshes) or ("",) * len(self.quality)
         self._problem = problem
+        self._surface = problem.surface if problem is not None else surface
         if not self.quality:
             raise ValueError("a front has at least one solution; this one has none")
-        if self.kept.ndim != 2 or len(self.kept) != len(self.quality) or len(self._meshes) != len(self.quality):
-            raise ValueError(f"{len(self.quality)} solutions cannot have kept of the shape {self.kept.shape}")
+        shape = (len(self._kept), 1) if isinstance(self._kept, Nested) else self._kept.shape
+        if len(shape) != 2 or not shape[0] == len(self.quality) == len(self._meshes):
+            raise ValueError(f"{len(self.quality)} solutions cannot have kept of the shape {shape}")
 
     # ---------------------------------------------------------------------------------------------- where it comes from
 
@@ -355,7 +368,8 @@ class Front(Sequence[FrontSolution]):
         folder : path
             The folder.
         model : path, built-in name, trimesh.Trimesh, OpenModel or Surface, optional
-            The original mesh, if it is no longer where the record says.
+            The original mesh, if it is no longer where the record says; of a front made by tiles what
+            :func:`~meshsimp_pymoo.opening.open_grid` takes, or its surface.
 
         Raises
         ------
@@ -369,7 +383,7 @@ class Front(Sequence[FrontSolution]):
             quality, stored.kept, run=stored.run, folder=stored.folder, meshes=stored.meshes, series=stored.series
         )
         if model is not None:
-            front._problem = front._problem_of(model)
+            front._surface = front._surface_of(model)
         return front
 
     # ---------------------------------------------------------------------------------------------------- as a sequence
@@ -389,8 +403,9 @@ class Front(Sequence[FrontSolution]):
             rows = range(len(self))[min(rows) : max(rows) + 1 : abs(item.step or 1)]  # sorted by triangles, always
             return Front(
                 [self.quality[row] for row in rows],
-                self.kept[list(rows)],
+                self._kept.take(rows) if isinstance(self._kept, Nested) else self._kept[list(rows)],
                 problem=self._problem,
+                surface=self._surface,
                 run=self.run,
                 folder=self.folder,
                 meshes=[self._meshes[row] for row in rows],
@@ -400,6 +415,11 @@ class Front(Sequence[FrontSolution]):
         if not -len(self) <= row < len(self):
             raise IndexError(f"the front has the solutions 0 to {len(self) - 1}; there is no {row}")
         return FrontSolution(self, row % len(self))
+
+    @cached_property
+    def kept(self) -> BoolArray | Chromosomes:
+        """The vertices that stay (S, N), in vector order; of a front made by tiles one row is made at a time."""
+        return Chromosomes(self._kept, self.model) if isinstance(self._kept, Nested) else self._kept
 
     @property
     def objectives(self) -> tuple[str, ...]:
@@ -414,32 +434,41 @@ class Front(Sequence[FrontSolution]):
         return _objectives(self.quality, self.objectives)
 
     @cached_property
-    def problem(self) -> MeshProblem:
-        """What these are solutions of; of a stored front, read again when it is needed.
+    def surface(self) -> Surface:
+        """The original mesh and what counted; of a stored front, read again when it is needed.
 
         Raises
         ------
         ResultError
             If the model is not where the record says, or has changed.
         """
-        return self._problem if self._problem is not None else self._problem_of(None)
+        return self._surface if self._surface is not None else self._surface_of(None)
+
+    @cached_property
+    def problem(self) -> MeshProblem:
+        """What these are solutions of; a ResultError as of :attr:`surface`."""
+        if self._problem is not None:
+            return self._problem
+        problem = MeshProblem(self.surface, objectives=self.objectives)
+        problem.options = self._recorded()[0]  # a surface is given as it is, but was read so
+        return problem
 
     @property
-    def model(self) -> OpenModel:
-        """The original mesh."""
-        return self.problem.model
+    def model(self) -> Any:
+        """The original mesh: an OpenModel, or the HeightGrid of tiles."""
+        return self.surface.model
 
     @property
     def georeference(self) -> Mapping[str, Any]:
         """Where on Earth the model is, as far as its file says."""
         recorded = self.run.get("model")
-        return (recorded.get("georeference") or {}) if recorded else self.problem.model.georeference
+        return (recorded.get("georeference") or {}) if recorded else self.model.georeference
 
     @property
     def has_material(self) -> bool:
         """Whether its meshes may name files beside them: a library of materials, an image."""
         recorded = self.run.get("model")
-        return bool(recorded.get("material")) if recorded else self.problem.model.material is not None
+        return bool(recorded.get("material")) if recorded else self.model.material is not None
 
     @property
     def unit(self) -> str:
@@ -450,7 +479,7 @@ class Front(Sequence[FrontSolution]):
     def name(self) -> str:
         """What the model is called."""
         recorded = (self.run.get("model") or {}).get("name")
-        return str(recorded or self.problem.model.name)
+        return str(recorded or self.model.name)
 
     # --------------------------------------------------------------------------------------------------------- choosing
 
@@ -460,7 +489,8 @@ class Front(Sequence[FrontSolution]):
         Parameters
         ----------
         triangles : int
-            The most accurate solution of at most that many triangles.
+            The most accurate solution of at most that many triangles. Tiles leave a mesh of nearly any size, so that
+            the solution of one of their fronts may be a new one: then its ``front`` is this one with it.
         LIMITS : float
             The smallest solution with at most that much of a measure; see
             :class:`~meshsimp_pymoo.surface.measures.Quality`.
@@ -488,13 +518,37 @@ class Front(Sequence[FrontSolution]):
                 else f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
             )
         if name == "triangles":
-            accuracy = self.F[fitting, 0]
-            return self[int(fitting[np.argmin(accuracy)])]
+            best = self[int(fitting[np.argmin(self.F[fitting, 0])])]
+            between = None if most < 2 else self._between(int(most))
+            return best if between is None or between.error >= best.error else between
         return self[int(fitting[0])]
 
     def knee(self) -> FrontSolution:
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
         return self[knee(self.F)]
+
+    def _between(self, triangles: int) -> FrontSolution | None:
+        """Return a solution of a nested front of at most so many triangles, which it may not have had so far."""
+        nested, surface = self._kept, self.surface if isinstance(self._kept, Nested) else None
+        if not isinstance(nested, Nested) or not isinstance(surface, GridSurface):
+            return None
+        slope = slope_of(surface, nested, triangles)
+        if slope in nested.slope:
+            return self[nested.slope.tolist().index(slope)]
+        at = int(np.searchsorted(-nested.slope, -slope))
+        sizes = [q.triangles for q in self.quality]
+        room = (sizes[at - 1] if at else 0, sizes[at] if at < len(self) else np.inf)
+        moved, quality = of_size(surface, nested, slope, triangles, room=room)
+        front = Front(
+            [*self.quality[:at], quality, *self.quality[at:]],
+            nested.with_subset(at, slope, moved),
+            surface=surface,
+            run=self.run,
+            folder=self.folder,
+            meshes=[*self._meshes[:at], "", *self._meshes[at:]],
+            series=self.series,
+        )
+        return front[at]
 
     # ------------------------------------------------------------------------------------------- showing and writing it
 
@@ -515,6 +569,7 @@ class Front(Sequence[FrontSolution]):
         meshes: int | None = MESHES_BY_DEFAULT,
         mesh_format: str = "ply",
         chosen: int | FrontSolution | None = None,
+        piece: int | None = None,
         refit: bool | Mapping[int, Refitted] = False,
         pictures: bool = True,
         page: bool = True,
@@ -534,6 +589,8 @@ class Front(Sequence[FrontSolution]):
             A name out of :func:`~meshsimp_pymoo.formats.table.written_formats`, such as "ply" or "landxml".
         chosen : int or FrontSolution, optional
             The solution to write as ``chosen.<mesh_format>`` too.
+        piece : int, optional
+            Write the chosen mesh of a height grid in pieces of about so many samples a side, in the folder ``chosen``.
         refit : bool or mapping
             Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
             :func:`~meshsimp_pymoo.surface.height.refit_heights`. Or only those of these solutions, found already.
@@ -549,40 +606,33 @@ class Front(Sequence[FrontSolution]):
         ResultError
             If the folder cannot be written.
         """
-        problem = self.problem
+        surface = self.surface
         row = chosen.solution if isinstance(chosen, FrontSolution) else chosen
-        drawn: dict[int, Any] = {}
-
-        def faces(solution: int) -> Any:
-            if solution not in drawn:
-                drawn[solution] = problem.simplify(self.kept[solution]).faces
-            return drawn[solution]
 
         def fitted(solution: int) -> Refitted | None:
             return self[solution].refitted if refit is True else refit.get(solution) if refit else None
 
         record = self.run | dict(run or {})
-        record |= {
-            "options": plain(problem.options),
-            "rules": plain(problem.surface.rules),
-            "objectives": list(problem.objectives),
-        }
+        if self._problem is not None:
+            record["options"] = plain(self._problem.options)
+        record |= {"rules": plain(surface.rules), "objectives": list(self.objectives)}
         path = write_front(
             folder,
-            problem.surface,
+            surface,
             self.quality,
-            self.kept,
-            faces=faces,
+            self._kept,
+            faces=lambda solution: self[solution].faces,
             meshes=meshes,
             mesh_format=mesh_format.lower(),
             chosen=row,
+            cut=None if piece is None else lambda faces: pieces(self.model, faces, piece),
             refit=fitted if refit is not False else None,
             series=self.series,
             run=record,
             overwrite=overwrite,
         )
         if pictures:
-            Front.load(folder, model=problem.surface).draw(page=page)
+            Front.load(folder, model=surface).draw(page=page)
         return path
 
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
@@ -608,13 +658,13 @@ class Front(Sequence[FrontSolution]):
         stored = self.folder
         if stored is None:
             raise ResultError("the front is not stored; save() it, which draws it too")
-        problem, F, chosen = self.problem, self.F, self.run.get("chosen")
+        surface, F, chosen = self.surface, self.F, self.run.get("chosen")
 
         def draw_front(path: Path) -> None:
             from meshsimp_pymoo.report.figures import front_figure, panel_rows
 
             figure = front_figure(
-                problem.surface,
+                surface,
                 F[:, [0, -1]],
                 [(row, self[row].faces) for row in panel_rows([q.triangles for q in self.quality], chosen, knee(F))],
                 knee=knee(F),
@@ -627,7 +677,9 @@ class Front(Sequence[FrontSolution]):
         def draw_page(path: Path) -> None:
             from meshsimp_pymoo.report.page import simplification_page
 
-            content = simplification_page(read_front(stored), problem, folder=stored, knee=knee(F))
+            content = simplification_page(
+                read_front(stored), surface, self.kept, measure=self.objectives[0], folder=stored, knee=knee(F)
+            )
             path.write_bytes(content.encode("utf-8"))
 
         drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
@@ -705,35 +757,35 @@ class Front(Sequence[FrontSolution]):
         except (TypeError, ValueError) as problem:
             raise ResultError(f"{self.folder or 'the front'}: its record cannot be used: {problem}") from None
 
-    def _problem_of(self, model: Any) -> MeshProblem:
-        """Make the problem again from the record, and check that the model is the same."""
+    def _surface_of(self, model: Any) -> Surface:
+        """Make the surface again from the record, and check that the model is the same."""
         facts = self.run.get("model") or {}
         where = self.folder if self.folder is not None else "the front"
         way_out = "pass the original (Front.load(folder, model=...), --model FILE) or simplify it again"
-        source = model if model is not None else self._model_file()
+        source: Any = model if model is not None else self._model_file()
         try:
-            options, rules, objectives = self._recorded()
+            options, rules, _ = self._recorded()
             if hasattr(source, "rules"):
                 if plain(source.rules) != plain(rules):
                     raise ResultError(f"{where}: has other rules than this {type(source).__name__}: {rules}; {way_out}")
-                problem = MeshProblem(source, objectives=objectives)
+                surface: Surface = source
+            elif isinstance(self._kept, Nested):
+                surface = GridSurface(open_grid(source, applicable(source, options)), rules)
             else:
-                how = applicable(source, options)
-                problem = MeshProblem(source, options=how, rules=rules, objectives=objectives)
+                surface = HeightSurface(open_model(source, applicable(source, options)), rules)
         except ModelError as trouble:
             if model is not None:
                 raise
             raise ResultError(f"{where}: its model cannot be read ({trouble}); {way_out}") from None
-        if problem.model.hash != facts.get("hash"):
+        if surface.model.hash != facts.get("hash"):
             raise ResultError(
-                f"{where}: is the front of another model than {problem.model.name} is now"
+                f"{where}: is the front of another model than {surface.model.name} is now"
                 + ("" if model is not None else " (the file has changed since)")
-                + f", of {facts.get('vertices')} vertices, not {problem.model.n_vertices}"
-                * (facts.get("vertices") != problem.model.n_vertices)
+                + f", of {facts.get('vertices')} vertices, not {surface.n_vertices}"
+                * (facts.get("vertices") != surface.n_vertices)
                 + f"; {way_out}"
             )
-        problem.options = options  # a model that was given in memory is the same one, and was read so
-        return problem
+        return surface
 
     def _model_file(self) -> Path | str:
         """Return where the record says the model is: beside the results, as it was called, or built in."""

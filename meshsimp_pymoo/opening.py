@@ -8,14 +8,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, warn_of
+from meshsimp_pymoo.errors import ModelError, NoFullGrid, warn_of
 from meshsimp_pymoo.files import is_there
-from meshsimp_pymoo.formats.options import DEFAULT, Options
+from meshsimp_pymoo.formats.options import DEFAULT, Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source.heights import PlacedHeights, placed_heights
+from meshsimp_pymoo.formats.source.metric import in_metric_frame
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
-from meshsimp_pymoo.formats.table import are_given, described, listed, read_source
+from meshsimp_pymoo.formats.table import (
+    are_given,
+    described,
+    format_of_input,
+    guarded,
+    listed,
+    read_source,
+    refuse_foreign,
+)
+from meshsimp_pymoo.settings import settings_of, taken
+from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.orient import Up, front_patch
 from meshsimp_pymoo.surface.repair import Mended, mend
@@ -159,3 +172,125 @@ def _is_file(model: str | os.PathLike[str]) -> bool:
 
 def _given(options: Options) -> str:
     return listed(f"{name}={value!r}" for name, value in vars(options).items() if value != getattr(DEFAULT, name))
+
+
+# ---------------------------------------------------------------------------------------------------------- by windows
+
+
+def open_grid(
+    model: str | os.PathLike[str] | npt.ArrayLike | OpenModel | HeightGrid,
+    options: Options | None = None,
+    **kwargs: Any,
+) -> HeightGrid:
+    """Open a height grid for work by tiles.
+
+    Parameters
+    ----------
+    model : path, built-in name, (R, C) array, OpenModel or HeightGrid
+        A ``.npy`` file is mapped into memory and a GeoTIFF opened, and both are read by windows only; any other file is
+        read whole first. A model's vertices must be all the crossings of rows and columns, and nothing else.
+    options : Options, optional
+        How it is read; a grid with samples of the height ``nodata`` is refused, as is what cannot apply.
+    **kwargs
+        Settings of :class:`~meshsimp_pymoo.formats.options.Options` that differ from those, such as ``spacing``.
+
+    Raises
+    ------
+    ModelError
+        If it cannot be read or is no such grid.
+    """
+    options = taken(Options, options, kwargs)
+    if kwargs:
+        raise TypeError(f"open_grid has no argument {next(iter(kwargs))!r}; it takes {', '.join(settings_of(Options))}")
+    if isinstance(model, HeightGrid):
+        if options != DEFAULT:
+            raise ModelError(f"{model.name}: is a grid that is open already; say how it is read where it is opened")
+        return model
+    if isinstance(model, OpenModel):
+        return _grid_of_model(open_model(model, options), options)
+    if not isinstance(model, (str, os.PathLike)):
+        _refuse_other_sides("grid", options)
+        return _grid_of_heights("grid", placed_heights(np.asanyarray(model), "grid", options), options)
+    path = Path(model)
+    kind = format_of_input(path)
+    if kind is None or kind.open_heights is None or not path.is_file():
+        return _grid_of_model(open_model(model, options), options)
+    name = str(path)
+    _refuse_other_sides(name, options, kind.name)
+    with guarded(kind, name):
+        return _grid_of_heights(name, kind.open_heights(path, name, options), options)
+
+
+def count_samples(model: str | os.PathLike[str], *, window: Window | None = None) -> int | None:
+    """Return the number of samples of a grid file, or of a part of it, from its header alone; None for anything else.
+
+    Parameters
+    ----------
+    model : path
+        A file whose format knows how to count them, such as ``.npy`` or ``.tif``.
+    window : (column, row, columns, rows), optional
+        The part.
+    """
+    path = Path(model)
+    kind = format_of_input(path)
+    if kind is None or kind.count_samples is None or not path.is_file():
+        return None
+    if window is not None:
+        return int(window[2]) * int(window[3])
+    with guarded(kind, str(path)):
+        return kind.count_samples(path, str(path))
+
+
+def _refuse_other_sides(name: str, options: Options, *formats: str) -> None:
+    """Refuse what says nothing of heights over rows and columns."""
+    refuse_foreign(name, options, "grid", *formats)
+    if options.up not in ("auto", "z", "+z"):
+        raise ModelError(f"{name}: heights of a grid are along z; leave up={options.up!r} out")
+    if options.patch is not None:
+        raise ModelError(f"{name}: all of a grid faces up; leave patch={options.patch!r} out")
+
+
+def _grid_of_heights(name: str, found: PlacedHeights, options: Options) -> HeightGrid:
+    low, high = (np.array([end(found.x), end(found.y)]) for end in (np.min, np.max))
+    georeference = in_metric_frame(found.georeference, low, high, scale=options.scale, name=name)
+    x, y = georeference.get("scale", (1.0, 1.0))
+    return HeightGrid(
+        name,
+        found.heights,
+        found.x,
+        found.y,
+        nodata=found.nodata,
+        corner=found.corner,
+        file_columns=found.file_columns,
+        georeference=georeference,
+        scale=(x, y),
+        options=options,
+    )
+
+
+def _grid_of_model(model: OpenModel, options: Options) -> HeightGrid:
+    """Find the rows and columns of a model's vertices."""
+    x, column = np.unique(model.xy[:, 0], return_inverse=True)
+    y, row = np.unique(model.xy[:, 1], return_inverse=True)
+    number = (len(y) - 1 - row) * len(x) + column
+    n_cells = 2 * (len(x) - 1) * (len(y) - 1)
+    if model.n_vertices != len(x) * len(y) or len(np.unique(number)) != len(number) or len(model.faces) != n_cells:
+        raise NoFullGrid(
+            f"{model.name}: its {model.n_vertices} vertices are not all crossings of {len(y)} rows and {len(x)} "
+            "columns; only a height grid without gaps can be cut into tiles: leave the tiles out"
+        )
+    if model.weights is not None:
+        raise ModelError(f"{model.name}: has weights, which tiles do not know; leave the weights or the tiles out")
+    row_of = np.empty(model.n_vertices, np.int64)
+    row_of[number] = np.arange(model.n_vertices)
+    heights = model.points[row_of, 2].reshape(len(y), len(x))
+    return HeightGrid(
+        model.name,
+        heights,
+        x * model.unit,
+        y[::-1] * model.unit,
+        model=model,
+        row_of=row_of,
+        georeference=model.georeference,
+        options=options,
+    )

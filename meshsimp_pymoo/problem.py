@@ -16,7 +16,7 @@ import numpy.typing as npt
 import trimesh
 from pymoo.core.problem import ElementwiseProblem, Problem
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import textured
@@ -39,7 +39,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Simplified, Surface
+from meshsimp_pymoo.surface.surface import Simplified, Surface, mesh_arrays
 
 # Chromosomes whose numbers are remembered; each takes about 200 bytes.
 MEMO_SIZE = 100_000
@@ -306,19 +306,7 @@ class MeshProblem(ElementwiseProblem):
 
         Its vertices are original ones, in double precision, in vector order; none is without a face.
         """
-        faces = self.simplify(kept).faces
-        used, inverse = np.unique(faces, return_inverse=True)
-        mesh = trimesh.Trimesh(
-            vertices=self.model.file_points[used], faces=inverse.reshape(-1, 3), process=False, validate=False
-        )
-        attributes = {name: values[used] for name, values in self.model.attributes.items()}
-        if "color" in attributes:
-            mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=attributes["color"])
-        if self.model.material is not None and "uv" in attributes:
-            mesh.visual = textured(attributes, self.model.material, mesh.visual)
-        looks = {"color"} | ({"uv"} if mesh.visual.kind == "texture" else set())
-        mesh.vertex_attributes.update({name: values for name, values in attributes.items() if name not in looks})
-        return mesh
+        return mesh_of(self.surface, self.simplify(kept).faces)
 
     def name(self) -> str:
         """Return the model's name."""
@@ -330,6 +318,20 @@ class MeshProblem(ElementwiseProblem):
     def __deepcopy__(self, memo: dict[int, Any]) -> MeshProblem:
         # Nothing of it changes during a run but what it remembers, so copies may share it (save_history makes many).
         return self
+
+
+def mesh_of(surface: Surface, faces: IntArray) -> trimesh.Trimesh:
+    """Return triangles (M, 3) of a surface's vertices as a mesh in the frame of the file; see `MeshProblem.mesh`."""
+    model = surface.model
+    vertices, compact, attributes = mesh_arrays(model, faces)
+    mesh = trimesh.Trimesh(vertices=vertices, faces=compact, process=False, validate=False)
+    if "color" in attributes:
+        mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=attributes["color"])
+    if model.material is not None and "uv" in attributes:
+        mesh.visual = textured(attributes, model.material, mesh.visual)
+    looks = {"color"} | ({"uv"} if mesh.visual.kind == "texture" else set())
+    mesh.vertex_attributes.update({name: values for name, values in attributes.items() if name not in looks})
+    return mesh
 
 
 def _doc() -> str:

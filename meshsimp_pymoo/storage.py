@@ -8,12 +8,16 @@
     OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
                        the columns REFIT_COLUMNS too
     OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
-    OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); no pickles
+    OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); of a nested front (one made by
+                       tiles) rows (V,), which the largest solution keeps, level (V,), at which each goes, slope (S,):
+                       solution s keeps the rows of higher level, unless moved_start (S + 1,) gives it a part of moved.
+                       No pickles
     OUT/run.json       the model with its hash, how it was read (options), what counted (rules), what was minimised
                        (objectives), how it was searched and written (settings, seed), package versions, evaluations,
                        seconds
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
+    OUT/tiles/         alone, likewise: finished tiles (see `meshsimp_pymoo.tiles.front`)
 
 All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
 the same front. Floats are written with the fewest digits that read back to the same number. Everything is written to a
@@ -26,7 +30,7 @@ import csv
 import json
 import os
 import platform
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
@@ -36,7 +40,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
     new_folder,
@@ -59,7 +63,8 @@ from meshsimp_pymoo.formats.table import (
     write_mesh,
 )
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
-from meshsimp_pymoo.surface.surface import Original, Refitted, Surface, require_rules
+from meshsimp_pymoo.surface.nested import Nested
+from meshsimp_pymoo.surface.surface import Refitted, Surface, mesh_arrays, require_rules
 
 FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
@@ -70,10 +75,11 @@ MOST_COUNTED = 2**53  # no mesh has so many triangles
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 PICTURES = ("front.png", "report.html")  # made once all else is in place
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
+TILES = "tiles"  # finished tiles of one
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
-    "nested.npz", "tiles", "series.csv",
+    TILES, "series.csv",
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
@@ -89,10 +95,10 @@ class StoredFront:
         Where it was read.
     quality : dict of str to (S,) array
         The numbers of front.csv by column, sorted by triangles.
-    kept : (S, N) bool array
-        The chromosomes, in vector order.
+    kept : (S, N) bool array, or Nested
+        The chromosomes, in vector order; or rows of the file.
     source_index : (N,) int array
-        Row of each vertex in the model's file.
+        Row of each vertex in the model's file; empty where ``kept`` says rows.
     meshes : tuple of str
         Path of each solution's mesh relative to the folder; empty where it was not written.
     run : dict
@@ -107,7 +113,7 @@ class StoredFront:
 
     folder: Path
     quality: dict[str, npt.NDArray[Any]]
-    kept: BoolArray
+    kept: BoolArray | Nested
     source_index: IntArray
     meshes: tuple[str, ...]
     run: dict[str, Any] = field(default_factory=dict)
@@ -188,12 +194,13 @@ def write_front(
     folder: str | os.PathLike[str],
     surface: Surface,
     quality: Sequence[Quality],
-    kept: BoolArray,
+    kept: BoolArray | Nested,
     *,
     faces: Callable[[int], IntArray] | None = None,
     meshes: int | None = MESHES_BY_DEFAULT,
     mesh_format: str = "ply",
     chosen: int | None = None,
+    cut: Callable[[IntArray], Iterable[tuple[str, IntArray]]] | None = None,
     refit: Callable[[int], Refitted | None] | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
@@ -209,8 +216,8 @@ def write_front(
         The original mesh and its rules.
     quality : sequence of Quality, length S
         The numbers of each solution, in any order; written sorted by triangles, then error.
-    kept : (S, N) bool array
-        The solutions in vector order.
+    kept : (S, N) bool array, or Nested
+        The solutions in vector order; or by rows of the file.
     faces : callable, optional
         Triangles (M, 3) of the solution in this row of ``kept``, as indices in vector order. Needed for
         meshes.
@@ -223,6 +230,9 @@ def write_front(
         origin that it states (see :func:`~meshsimp_pymoo.formats.table.write_mesh`).
     chosen : int, optional
         Row of ``kept`` to write as ``chosen.<mesh_format>`` too.
+    cut : callable, optional
+        Cuts the triangles (M, 3) of the chosen mesh into pieces, each with a name: they are written to a folder
+        ``chosen`` instead.
     refit : callable, optional
         The best heights for the solution in this row of ``kept`` (see
         :func:`~meshsimp_pymoo.surface.height.refit_heights`). Each mesh that is written is then written with them
@@ -249,14 +259,15 @@ def write_front(
     """
     require_rules(surface, "write_front")
     model = surface.model
-    kept = np.asarray(kept, dtype=bool)
     if len(quality) == 0:
         raise ValueError("the front is empty; there is nothing to write")
-    if kept.shape != (len(quality), model.n_vertices):
-        raise ValueError(
-            f"kept has the shape {kept.shape}; {len(quality)} solutions of a model of {model.n_vertices} vertices "
-            f"need {(len(quality), model.n_vertices)}"
-        )
+    if not isinstance(kept, Nested):
+        kept = np.asarray(kept, dtype=bool)
+        if kept.shape != (len(quality), model.n_vertices):
+            raise ValueError(
+                f"kept has the shape {kept.shape}; {len(quality)} solutions of a model of {model.n_vertices} vertices "
+                f"need {(len(quality), model.n_vertices)}"
+            )
     kind = format_to_write(mesh_format)
     kind.check(model)
     look = _look(kind, surface)
@@ -285,7 +296,11 @@ def write_front(
                 if solution in with_mesh:
                     path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                     write_mesh(partial / path, *arrays, **look)
-                if row == chosen:
+                if row == chosen and cut is not None:
+                    (partial / "chosen").mkdir()
+                    for name, part in cut(faces(int(row))):
+                        write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
+                elif row == chosen:
                     write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
                 better = None if refit is None else refit(int(row))
                 if better is not None:
@@ -303,9 +318,13 @@ def write_front(
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
-        packed = np.packbits(kept[order], axis=1)
-        rows_of_file = model.source_index.astype(np.int64)
-        write_npz(partial / "front.npz", F=F[order], kept=packed, source_index=rows_of_file)
+        if isinstance(kept, Nested):
+            arrays_of = kept.take(order.tolist()).arrays()
+        else:
+            rows_of_file = np.asarray(model.source_index, np.int64)
+            arrays_of = {"kept": np.packbits(kept[order], axis=1), "source_index": rows_of_file}
+        write_npz(partial / "front.npz", F=F[order], **arrays_of)
+        shape = getattr(model, "shape", None)  # of a height grid
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
@@ -317,6 +336,7 @@ def write_front(
                 **({"found": model.found} if model.found else {}),
                 **({"georeference": model.georeference} if model.georeference else {}),
                 **({"material": True} if model.material is not None else {}),
+                **({"rows": shape[0], "columns": shape[1]} if shape is not None else {}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),
@@ -349,25 +369,16 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     quality, meshes, refitted_meshes = read_front_csv(folder / "front.csv")
     refitted_error = quality.pop("refitted_error", None)
     count = len(meshes)
-    F, packed, source_index = _read_npz(folder / "front.npz")
-    n = len(source_index)
+    F, kept, source_index = _read_npz(folder / "front.npz", count)
     if F.shape != (count, 2) or not (
         np.array_equal(F[:, 0], quality["error"]) and np.array_equal(F[:, 1], quality["triangles"])
     ):
         raise ResultError(f"{folder / 'front.npz'}: its F is not that of front.csv; write the front again")
-    if packed.shape != (count, -(-n // 8)):
-        raise ResultError(
-            f"{folder / 'front.npz'}: kept has the shape {packed.shape}; {count} solutions of {n} vertices need "
-            f"{(count, -(-n // 8))}"
-        )
-    bits = np.unpackbits(packed, axis=1).astype(bool)
-    if bits[:, n:].any():
-        raise ResultError(f"{folder / 'front.npz'}: kept has bits set beyond the {n} vertices of the model")
-    kept = bits[:, :n]
-    too_few = np.flatnonzero(kept.sum(axis=1) < quality["vertices"])
+    sizes = kept.sizes if isinstance(kept, Nested) else kept.sum(axis=1)
+    too_few = np.flatnonzero(sizes < quality["vertices"])
     if too_few.size:
         raise ResultError(
-            f"{folder / 'front.npz'}: solution {too_few[0]} keeps {kept[too_few[0]].sum()} vertices, but "
+            f"{folder / 'front.npz'}: solution {too_few[0]} keeps {sizes[too_few[0]]} vertices, but "
             f"front.csv says its mesh has {quality['vertices'][too_few[0]]}"
         )
     run = read_record(folder / "run.json", count)
@@ -420,32 +431,6 @@ def _are_objectives(names: Any) -> bool:
     return True
 
 
-def mesh_arrays(
-    model: Original, faces: IntArray
-) -> tuple[FloatArray, npt.NDArray[np.int64], dict[str, npt.NDArray[Any]]]:
-    """Return a simplified mesh in the file's own frame.
-
-    Parameters
-    ----------
-    model : Original
-        The original mesh.
-    faces : (M, 3) int array
-        Triangles as indices of the model's vertices in vector order.
-
-    Returns
-    -------
-    vertices : (V, 3) float array
-        The vertices that the triangles use, with the very coordinates of the file.
-    faces : (M, 3) int array
-        The triangles as indices of those.
-    attributes : dict of str to (V, ...) array
-        Colours and whatever else the file says of those vertices.
-    """
-    used, compact = np.unique(np.asarray(faces, dtype=np.int64), return_inverse=True)
-    attributes = {name: values[used] for name, values in model.attributes.items()}
-    return model.file_points[used], compact.reshape(-1, 3), attributes
-
-
 def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
 
@@ -472,7 +457,7 @@ def _look(kind: Format, surface: Surface) -> dict[str, Any]:
     model, up = surface.model, surface.view.rotation[2]
     return shared_frame(
         kind,
-        model.file_points,
+        model.file_box,
         name=model.name,
         georeference=model.georeference,
         up=up,
@@ -593,29 +578,52 @@ def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, 
     return columns, meshes, refitted
 
 
-def _read_npz(path: Path) -> tuple[FloatArray, npt.NDArray[np.uint8], IntArray]:
+def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, IntArray]:
+    """Return F, and the subsets of ``count`` solutions: as chromosomes with their rows in the file, or nested."""
     try:
         with path.open("rb") as stream:
             arrays = read_npz(stream, path.name)
-        F, packed, source_index = arrays["F"], arrays["kept"], arrays["source_index"]
+        F = _of_type(path, "F", arrays, "f", 2)
+        if "level" in arrays:
+            return F, _nested(path, arrays, count), np.empty(0, np.int64)
+        packed, source_index = _of_type(path, "kept", arrays, "u", 2), _of_type(path, "source_index", arrays, "i", 1)
     except KeyError as problem:
         raise ResultError(f"{path}: holds no array {problem}; the file is not ours") from None
     except (OSError, ModelError, MemoryError) as problem:
         raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
-    for name, array, kind, ndim in (
-        ("F", F, "f", 2),
-        ("kept", packed, "u", 2),
-        ("source_index", source_index, "i", 1),
-    ):
-        if array.dtype.kind != kind or array.ndim != ndim:
-            raise ResultError(
-                f"{path}: {name} has the type {array.dtype} and {array.ndim} dimensions; the file is not ours"
-            )
     if packed.dtype != np.uint8:
         raise ResultError(f"{path}: kept has the type {packed.dtype} instead of packed bits (uint8)")
     if len(np.unique(source_index)) != len(source_index) or source_index.min(initial=0) < 0:
         raise ResultError(f"{path}: source_index is not a list of different rows")
-    return F, packed, source_index
+    n = len(source_index)
+    if packed.shape != (count, -(-n // 8)):
+        raise ResultError(
+            f"{path}: kept has the shape {packed.shape}; {count} solutions of {n} vertices need {(count, -(-n // 8))}"
+        )
+    bits = np.unpackbits(packed, axis=1).astype(bool)
+    if bits[:, n:].any():
+        raise ResultError(f"{path}: kept has bits set beyond the {n} vertices of the model")
+    return F, bits[:, :n], source_index
+
+
+def _nested(path: Path, arrays: Mapping[str, AnyArray], count: int) -> Nested:
+    parts = [arrays[name] for name in ("rows", "level", "slope", "moved", "moved_start")]
+    try:
+        nested = Nested.of_arrays(*parts)
+    except ValueError as problem:
+        raise ResultError(f"{path}: {problem}; the file is not ours") from None
+    if len(nested) != count:
+        raise ResultError(f"{path}: holds {len(nested)} subsets for {count} solutions; write the front again")
+    return nested
+
+
+def _of_type(path: Path, name: str, arrays: Mapping[str, AnyArray], kind: str, ndim: int) -> AnyArray:
+    array = arrays[name]
+    if array.dtype.kind != kind or array.ndim != ndim:
+        raise ResultError(
+            f"{path}: {name} has the type {array.dtype} and {array.ndim} dimensions; the file is not ours"
+        )
+    return array
 
 
 def _plain(value: Any) -> Any:

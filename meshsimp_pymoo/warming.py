@@ -128,8 +128,8 @@ def _single_moves() -> None:
 def _tiles() -> None:
     import numpy as np
 
+    from meshsimp_pymoo.opening import open_grid
     from meshsimp_pymoo.tiles.front import LEAST_TILE, tiled_front
-    from meshsimp_pymoo.tiles.grid import open_grid
 
     side = np.arange(2.0 * LEAST_TILE)
     tiled_front(open_grid(np.add.outer(side, side**2 % 7)), tile=LEAST_TILE)

@@ -823,7 +823,7 @@ def test_score_refuses_a_front_of_another_model_or_reading(picked, tmp_path, cap
     assert run("score", "face:300", mesh, "--front", picked) == 2
     assert "is the front of another model than face:300" in one_line(capsys)
     assert run("score", "face:200", mesh, "--front", picked, "--outside", "ignore") == 2
-    assert "its errors are those of --outside nearest; leave --outside out to compare" in one_line(capsys)
+    assert "was made with --outside nearest, and is compared as it was made; leave --outside out" in one_line(capsys)
     upright = load("roof:3").points[:, [0, 2, 1]]
     write_mesh(tmp_path / "wall.ply", upright * [1, 0, 1], load("roof:3").faces)
     assert run("score", "face:200", tmp_path / "wall.ply") == 2

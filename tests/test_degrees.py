@@ -18,12 +18,9 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import build_source
 from meshsimp_pymoo.formats.source.points import cloud_source
 from meshsimp_pymoo.formats.table import read_source, write_mesh
-from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.opening import open_grid, open_model
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.tiles.grid import open_grid
-from meshsimp_pymoo.tiles.output import read_tiled_front
-from meshsimp_pymoo.tiles.weld import weld
 
 QUICK = ("--algorithm", "nsga2_v1", "--generations", "3", "--population", "12", "--threads", "1")
 WEST, SOUTH = 11.0, 46.9
@@ -238,7 +235,7 @@ def test_tiles_have_the_frame_of_the_whole(raster, tmp_path, capsys):
     grid, model = open_grid(raster), open_model(raster)
     np.testing.assert_array_equal(grid.scale, model.scale[:2])
     order = np.argsort(model.source_index)
-    np.testing.assert_array_equal(grid.xy_at(np.arange(grid.n_samples)), model.xy[order])
+    np.testing.assert_array_equal(grid.xy_at(np.arange(grid.n_vertices)), model.xy[order])
     assert (grid.unit, grid.georeference) == (model.unit, model.georeference)
     assert grid.hash != open_grid(raster, scale="none").hash
     out = tmp_path / "tiled"
@@ -248,25 +245,25 @@ def test_tiles_have_the_frame_of_the_whole(raster, tmp_path, capsys):
     assert "EPSG:4326, " in said
     assert " m to a degree" in said
     assert json.loads((out / "run.json").read_text())["model"]["georeference"]["scale"] == list(grid.scale)
-    front = read_tiled_front(out, grid)
+    front = Front.load(out)
     problem = MeshProblem(raster, footprint="hull")
     for row in range(0, len(front), 7):
         kept = np.zeros(model.n_vertices, bool)
-        kept[order[front.kept(row)]] = True
+        kept[order[np.flatnonzero(front.kept[row])]] = True
         whole = problem.quality(kept)
         assert front.quality[row].error == pytest.approx(whole.error, rel=1e-9)
-        assert front.quality[row].triangles == whole.triangles == weld(grid, front.kept(row)).n_triangles
+        assert front.quality[row].triangles == whole.triangles == len(front[row].faces)
     # of a model that was read whole, rows and columns are found again
     again = open_grid(model)
-    np.testing.assert_allclose(again.xy_at(np.arange(again.n_samples)), model.xy[order], rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(again.file_points(np.arange(5)), grid.file_points(np.arange(5)))
+    np.testing.assert_allclose(again.xy_at(np.arange(again.n_vertices)), model.xy[order], rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(again.file_points[np.arange(5)], grid.file_points[np.arange(5)])
     assert main(["pick", str(out), "--max-error", "100", "-o", str(tmp_path / "b.ply")]) == 0
     assert " m, mean " in capsys.readouterr().out
     picked = read_source(tmp_path / "b.ply")
     assert picked.georeference["epsg"] == 4326
     assert main(["score", str(raster), str(tmp_path / "b.ply"), "--json"]) == 0
     scored = json.loads(capsys.readouterr().out)
-    expected = referee(grid.file_points(np.arange(grid.n_samples)), picked.points, picked.faces, grid.scale)
+    expected = referee(grid.file_points[np.arange(grid.n_vertices)], picked.points, picked.faces, grid.scale)
     assert scored["error"] == pytest.approx(expected, rel=1e-9)
 
 

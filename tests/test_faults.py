@@ -42,10 +42,10 @@ from meshsimp_pymoo.comparison import runner
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.files import locked, put_back
+from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.search import checkpoint
 from meshsimp_pymoo.storage import CHECKPOINT, PICTURES, read_front
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.tiles.grid import open_grid
 
 sys.path.insert(0, str(Path(__file__).parent))
 from forker import Forker

@@ -21,9 +21,10 @@ from meshsimp_pymoo.formats.material import IMAGES, Material
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.opening import open_model
-from meshsimp_pymoo.storage import FRONT_COLUMNS, claim_output, mesh_arrays, read_front, write_front
+from meshsimp_pymoo.storage import FRONT_COLUMNS, claim_output, read_front, write_front
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.surface import mesh_arrays
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,30 +16,22 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
+from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
-    DRAWING,
     INTERRUPTED,
-    OK,
-    TARGET_MISSED,
     WRITING,
     Stages,
     answering,
-    described,
     front_in_words,
-    in_unit,
     is_interrupted,
-    place_for_matplotlib,
     say,
     stop_if_interrupted,
-    tell,
-    tell_origin,
-    there,
 )
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
-from meshsimp_pymoo.files import as_argument, locked, put_back
-from meshsimp_pymoo.formats.table import format_to_write, shared_frame
+from meshsimp_pymoo.files import locked, put_back
+from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.checkpoint import (
@@ -57,16 +48,13 @@ from meshsimp_pymoo.search.time_limit import WholeGenerations, spread
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import (
     CHECKPOINT,
-    PICTURES,
     claim_output,
     even_selection,
     is_unfinished,
     package_versions,
-    read_front,
 )
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.surface import Refitted
-from meshsimp_pymoo.surface.units import known_units, reference_system
 from meshsimp_pymoo.warming import SEARCH
 
 # Of the time that is given, the share kept for the best heights of the meshes.
@@ -97,7 +85,8 @@ def _simplify(request: Request, shown: Stages) -> int:
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     else:
         refuse_alone(request.tiling)
-    is_drawn_only = _lacks_pictures(request)
+    what = {"settings": request.recorded | budget(search), "seed": search.seed, "interrupted": False}
+    is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
     measure = OBJECTIVES[request.rules.measure]
@@ -119,27 +108,13 @@ def _simplify(request: Request, shown: Stages) -> int:
     shown.expect("writing", WRITING_SECONDS[0] + WRITING_SECONDS[1] * problem.n_var**0.5)
     keeper = Keeper(problem, request, {"read_seconds": read_seconds, "compile_seconds": compiled.seconds})
     if is_drawn_only:
-        return _hand_over(_stored(keeper), keeper, shown)
+        return hand_over_stored(request, problem.surface, shown)
     with answering(*WRITING):
         found = _search(problem, keeper, shown)
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
             return INTERRUPTED
         return _write(found, keeper, shown)
-
-
-def _lacks_pictures(request: Request) -> bool:
-    """Tell whether the folder holds the results of this very search, but not all pictures: they were not finished."""
-    folder, output = request.output.folder, request.output
-    wanted = PICTURES if output.page else PICTURES[:1]
-    if output.overwrite or not (folder / "front.csv").is_file() or all((folder / name).exists() for name in wanted):
-        return False
-    try:
-        run = read_front(folder).run
-    except ResultError:
-        return False
-    what = {"settings": request.recorded | budget(request.search), "seed": request.search.seed, "interrupted": False}
-    return not difference({name: run.get(name) for name in what}, what)
 
 
 def _claim(output: Output, search: Search) -> None:
@@ -375,47 +350,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
         reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
         say(f"{reason}; the same command goes on from the checkpoint in {folder}")
         return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
-    return _hand_over(found, keeper, shown)
-
-
-def _stored(keeper: Keeper) -> _Found:
-    """Return what a search came back with whose results are in place."""
-    folder = keeper.output.folder
-    try:
-        front = Front.load(folder, model=keeper.problem.surface)
-    except ResultError:
-        claim_output(folder)  # of another model, or by other rules: it is refused
-        raise
-    if not keeper.output.quiet:
-        say(f"{folder} holds the results of this search; making the pictures that are missing")
-    return _Found(front, *(front.run[name] for name in ("generations", "evaluations", "seconds", "interrupted")))
-
-
-def _hand_over(found: _Found, keeper: Keeper, shown: Stages) -> int:
-    """Draw what is in place, as far as that is missing, say what there is, and return the exit code."""
-    output, folder = keeper.output, keeper.output.folder
-    chosen, missed = keeper.request.wish.of(found.front)
-    undrawn = is_interrupted()
-    with answering(*DRAWING):
-        try:
-            stop_if_interrupted()
-            if not undrawn:
-                with shown.stage("writing", "drawing"), place_for_matplotlib(folder):
-                    Front.load(folder, model=keeper.problem.surface).draw(page=output.page, missing=True)
-        except KeyboardInterrupt:
-            undrawn = True
-    shown.close()
-    _summarise(found, keeper, chosen)
-    if found.interrupted:
-        say(f"interrupted after {found.generations} generations; {folder} holds the front so far")
-    if undrawn:
-        say(f"interrupted while it was drawn; {folder} holds the results: meshsimp report {as_argument(folder)}")
-    if found.interrupted or undrawn:
-        return INTERRUPTED
-    if missed:
-        say(f"{folder} holds a front, but no chosen mesh: {missed}; search longer (--generations, --time)")
-        return TARGET_MISSED
-    return OK
+    return hand_over(request, front.surface, shown)
 
 
 def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown: Stages) -> dict[int, Refitted]:
@@ -446,68 +381,3 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
             "write fewer (--meshes)"
         )
     return fitted
-
-
-def _summarise(found: _Found, keeper: Keeper, chosen: FrontSolution | None) -> None:
-    search, output = keeper.search, keeper.output
-    front, folder = found.front, output.folder
-    model, quality = front.model, front.quality
-    kind = format_to_write(output.format)
-    chosen_path = None if chosen is None else str(folder / f"chosen{kind.suffix}")
-    origin = shared_frame(kind, model.file_points, name=model.name, georeference={})["origin"].tolist()
-    if output.json:
-        summary = {
-            "model": {
-                "name": model.name,
-                "vertices": model.n_vertices,
-                "triangles": len(model.faces),
-                "hash": model.hash,
-                **known_units(model.georeference),
-            },
-            "front": str(folder / "front.csv"),
-            "solutions": len(quality),
-            "smallest": asdict(quality[0]),
-            "most_accurate": asdict(quality[-1]),
-            "chosen": None
-            if chosen is None
-            else {"mesh": chosen_path, "solution": chosen.solution, **asdict(chosen.quality)},
-            "evaluations": found.evaluations,
-            "seconds": round(found.seconds, 3),
-            "compile_seconds": round(keeper.before["compile_seconds"], 3),
-            "seed": search.seed,
-        }
-        if any(origin):
-            summary["mesh_origin"] = origin
-        tell(json.dumps(summary, indent=2))
-        return
-    if output.quiet:
-        return
-    few, many = quality[0], quality[-1]
-    unit, system = front.unit, reference_system(model.georeference)
-    whole = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
-    tell(f"{Path(model.name).name}: {whole}" + f"; {system}" * bool(system))
-    tell(
-        f"front: {len(quality)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
-        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} "
-        f"({found.evaluations:,} evaluations, {found.seconds:.1f} s, seed {search.seed})"
-    )
-    if chosen is not None:
-        tell(f"chosen: {chosen_path} (solution {chosen.solution}): {described(chosen.quality, unit)}")
-    written, refitted = (len(list(folder.glob(f"{place}/*{kind.suffix}"))) for place in ("meshes", "refitted"))
-    raised = f", {refitted} in refitted" if refitted else ""
-    files = there(folder, "front.csv", *PICTURES)
-    tell(f"written: {folder}: {files}" + (f", {written} in meshes" if written else "") + raised)
-    if (compiled := keeper.before["compile_seconds"]) >= 1.0:
-        tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
-    if any(origin):
-        tell_origin(origin)
-    if chosen is None:
-        size = _round_size(front)
-        tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")
-
-
-def _round_size(front: Front) -> int:
-    """Return a size worth an example: that of the knee, rounded up."""
-    triangles: int = front.knee().triangles
-    step = 10 ** max(len(str(triangles)) - 2, 0)
-    return -(-triangles // step) * step

@@ -172,7 +172,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
 
     surface = study.surface(case.problem, case.scoring)
     shown = _meshes(study, case, surface)
-    points, exaggeration = surface.view.points, surface.view.exaggeration
+    points, exaggeration = surface.points, surface.view.exaggeration
     flat = points * [1.0, 1.0, exaggeration]
     n = 1 + len(shown)
     width, depth = np.ptp(flat[:, :2], axis=0)
@@ -225,7 +225,7 @@ def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
         mesh = surface.simplify(kept)
         deviation = np.abs(mesh.deviation)
         title = _mesh_title(surface, method, len(mesh.faces), deviation, mesh.covered)
-        shown.append(_Shown(title, surface.view.points, mesh.faces, deviation, mesh.covered))
+        shown.append(_Shown(title, surface.points, mesh.faces, deviation, mesh.covered))
     for (name, method), run in study.classic_runs.items():
         if name == case.problem.name and method == "quadric_collapse":
             sizes = run.arrays["F"][:, 1]
@@ -234,11 +234,7 @@ def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
             scored = surface.score(vertices, faces)
             deviation, covered = scored.deviation, scored.covered
             title = _mesh_title(surface, CLASSIC_NAMES[method], len(faces), deviation, covered)
-            # pictures are centred on the mean of the points: these mirror images, which no face uses, make it
-            # the original's, so that all meshes stand in the same place
-            upright = surface.model.to_local(vertices)
-            mirrored = 2 * surface.view.points.mean(axis=0) - upright
-            shown.append(_Shown(title, np.concatenate([upright, mirrored]), faces, deviation, covered))
+            shown.append(_Shown(title, surface.model.to_local(vertices), faces, deviation, covered))
     return shown
 
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import printable
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, require_rules
@@ -57,6 +57,9 @@ LONGEST_NAME = 40  # characters of a model's name in a title: a longer one would
 # Their places on the logarithm of the size: meshes of a handful of triangles show little.
 PANEL_SHARES = (0.5, 0.7, 0.9)
 ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
+# Vertices of an original that are drawn; a picture shows no more of them, and a browser without a graphics card turns
+# no more of them smoothly.
+DRAWN_VERTICES = 50_000
 # From this many triangles on, edges are not outlined: in a panel of some 400 pixels they would cover the
 # shading.
 OUTLINED_TRIANGLES = 2500
@@ -223,7 +226,11 @@ def plot_mesh(
     from matplotlib.collections import PolyCollection
 
     points, faces, own = _shape(mesh, kept)
+    used, compact = np.unique(faces, return_inverse=True)
+    points, faces = points[used], compact.reshape(-1, 3)
     colour = own if colour is None else np.asarray(colour)
+    if colour is not None and colour.ndim > 1:
+        colour = colour[used]
     ax = ax if ax is not None else _new_axes((6.4, 6.4))
     elevation, turn = VIEWS[view] if isinstance(view, str) else view
     seen = _turned(points * [1.0, 1.0, exaggeration], elevation, turn)
@@ -251,7 +258,7 @@ def plot_mesh(
         ),
         autolim=False,
     )
-    _frame(ax, seen[np.unique(faces)])
+    _frame(ax, seen)
     return ax
 
 
@@ -293,10 +300,17 @@ def plot_error(
     ax = ax if ax is not None else _new_axes((7.0, 6.0))
     greatest = float(size.max())
     end = greatest if largest is None else largest
-    points = surface.view.points
-    x, y = (points - points.mean(axis=0))[:, :2].T  # as plot_mesh places them
+    x, y = np.asarray(surface.points)[:, :2].T
     drawn = ax.tripcolor(
-        x, y, surface.faces, size, shading="gouraud", cmap="magma_r", vmin=0.0, vmax=end or 1.0, rasterized=True
+        x,
+        y,
+        np.asarray(surface.faces),
+        size,
+        shading="gouraud",
+        cmap="magma_r",
+        vmin=0.0,
+        vmax=end or 1.0,
+        rasterized=True,
     )
     if covered is not None:
         bare = ~np.asarray(covered, dtype=bool)
@@ -358,7 +372,7 @@ def front_figure(
     require_rules(surface, "front_figure")
     F = np.asarray(F, dtype=np.float64)
     model, view = surface.model, surface.view
-    width, depth = np.ptp(view.points[:, :2], axis=0)
+    width, depth = view.extent[:2]
     tall = depth > 1.15 * width  # a face: its panels stand side by side; a terrain: two by two
     figure = Figure(figsize=(15.0, 5.6) if tall else (14.0, 6.6), dpi=110, layout="constrained")
     halves = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.8 if tall else 1.35), wspace=0.02)
@@ -372,11 +386,10 @@ def front_figure(
     front.set_title(title or f"{short_name(model.name)}: {size}" + f"\n{system}" * bool(system), loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
-    look: dict[str, Any] = {"exaggeration": view.exaggeration, "colour": model.attributes.get("color")}
-    plot_mesh((view.points, model.faces), panels[0], **look)
+    _plot_rows(surface, original_mesh(surface)[1], panels[0])
     panels[0].set_title(f"original\n{len(model.faces):,} triangles", fontsize=10)
     for letter, panel, (row, faces) in zip("abc", panels[1:], meshes, strict=False):
-        plot_mesh((view.points, faces), panel, **look)
+        _plot_rows(surface, faces, panel)
         error = f"mean error {F[row, 0] / surface.total_weight:.3g}"
         if measure != "error":
             error = f"{MEASURES[measure].label} {F[row, 0]:.3g}"
@@ -389,6 +402,14 @@ def front_figure(
     for panel in panels[1 + len(meshes) :]:
         panel.axis("off")
     return figure
+
+
+def original_mesh(surface: Surface) -> tuple[BoolArray, IntArray]:
+    """Return what pictures draw of the original: its vertices (N,) and triangles (M, 3), thinned if it is large."""
+    if surface.n_vertices <= DRAWN_VERTICES:
+        return np.ones(surface.n_vertices, dtype=bool), np.asarray(surface.faces)
+    drawn = surface.selection(DRAWN_VERTICES)
+    return drawn, surface.triangles(drawn)
 
 
 def panel_rows(triangles: npt.ArrayLike, *wanted: int | None) -> list[int]:
@@ -440,7 +461,7 @@ def error_figure(
     from matplotlib.figure import Figure
 
     require_rules(surface, "error_figure")
-    width, depth = np.ptp(surface.view.points[:, :2], axis=0)
+    width, depth = surface.view.extent[:2]
     share = float(np.clip(depth / width, 0.4, 1.6)) if width > 0 else 1.0
     figure = Figure(figsize=(7.2, 6.0 * share + 0.9), dpi=110, layout="constrained")
     ax = figure.subplots()
@@ -500,8 +521,9 @@ def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray,
     """Return points, faces and vertex colours of whatever is a mesh."""
     surface = getattr(mesh, "surface", mesh)
     if hasattr(surface, "view"):  # a problem or its surface
-        faces = surface.faces if kept is None else surface.simplify(np.asarray(kept) | surface.pinned).faces
-        return surface.view.points, faces, surface.model.attributes.get("color")
+        if kept is None:
+            return _rows_of(surface, original_mesh(surface)[1])
+        return _rows_of(surface, surface.triangles(np.asarray(kept) | surface.pinned))
     if kept is not None:
         raise TypeError(
             f"kept chooses vertices by a problem's rules, which a {type(mesh).__name__} does not have; give the "
@@ -509,7 +531,9 @@ def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray,
         )
     if isinstance(mesh, tuple):
         return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1]), None
-    if hasattr(mesh, "points") and hasattr(mesh, "faces"):  # a model, or a solution of a front
+    if hasattr(mesh, "front"):  # a solution of one
+        return _rows_of(mesh.front.surface, mesh.faces)
+    if hasattr(mesh, "points") and hasattr(mesh, "faces"):  # a model
         return mesh.points, mesh.faces, mesh.attributes.get("color")
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         visual: Any = getattr(mesh, "visual", None)
@@ -520,12 +544,24 @@ def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray,
     )
 
 
+def _plot_rows(surface: Surface, faces: IntArray, ax: Axes) -> None:
+    points, faces, colour = _rows_of(surface, faces)
+    plot_mesh((points, faces), ax, colour=colour, exaggeration=surface.view.exaggeration)
+
+
+def _rows_of(surface: Surface, faces: IntArray) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:
+    """Return points, triangles and colours of those vertices of a surface alone that triangles (M, 3) use."""
+    used, compact = np.unique(faces, return_inverse=True)
+    colour = surface.model.attributes.get("color")
+    return surface.points[used], compact.reshape(-1, 3), None if colour is None else colour[used]
+
+
 def _turned(points: FloatArray, elevation: float, turn: float) -> FloatArray:
-    """Turn points (V, 3) into the frame of the picture: x to the right, y up, z to the viewer."""
+    """Turn points (V, 3) about the origin into the frame of the picture: x to the right, y up, z to the viewer."""
     a, b = np.radians(turn), np.radians(90.0 - elevation)
     about_z = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     about_x = np.array([[1, 0, 0], [0, np.cos(b), np.sin(b)], [0, -np.sin(b), np.cos(b)]])
-    return (points - points.mean(axis=0)) @ about_z.T @ about_x.T
+    return points @ about_z.T @ about_x.T
 
 
 def _frame(ax: Axes, points: FloatArray) -> None:

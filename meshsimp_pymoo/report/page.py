@@ -2,7 +2,8 @@
 
 The page holds the vertices of the original once, and for each solution its triangles and the size of the deviation
 at every vertex, in 8 bits. What would make it larger than PAGE_BYTES is thinned, and the page says so: the meshes (all
-numbers stay in the chart, an even selection keeps its meshes), and above DRAWN_VERTICES the picture of the original.
+numbers stay in the chart, an even selection keeps its meshes), and
+above DRAWN_VERTICES the picture of the original.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import IntArray
+from meshsimp_pymoo.arrays import BoolArray, IntArray
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
-from meshsimp_pymoo.report.figures import UNCOVERED
+from meshsimp_pymoo.report.figures import UNCOVERED, original_mesh
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
@@ -28,8 +29,8 @@ from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.units import length_unit, reference_system
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.problem import MeshProblem
-    from meshsimp_pymoo.surface.surface import Original, Simplified
+    from meshsimp_pymoo.surface.nested import Chromosomes
+    from meshsimp_pymoo.surface.surface import Original, Simplified, Surface
 
 __all__ = ["PAGE_BYTES", "simplification_page"]
 
@@ -40,8 +41,6 @@ SCRIPTS = (
 PAGE_BYTES = 15_000_000
 # The libraries, the texts and the numbers of the solutions.
 FIXED_BYTES = 700_000
-# Vertices of the original that are drawn; a browser without a graphics card turns no more of them smoothly.
-DRAWN_VERTICES = 50_000
 # What one triangle, one deviation and one vertex take, embedded; measured on scans and terrain. Too low an estimate is
 # put right afterwards, too high a one leaves out meshes that would have fitted.
 TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES = 4.0, 1.2, 26.0
@@ -67,7 +66,7 @@ class _Embedded:
         The triangles of the drawn original, as rows of ``vertices``.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, and the largest
-        of all deviations; None where its mesh is left out.
+        of these; None where its mesh is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -83,8 +82,10 @@ class _Embedded:
 
 def simplification_page(
     front: StoredFront,
-    problem: MeshProblem,
+    surface: Surface,
+    kept: BoolArray | Chromosomes,
     *,
+    measure: str,
     folder: str | os.PathLike[str],
     knee: int,
     limit: int = PAGE_BYTES,
@@ -96,8 +97,12 @@ def simplification_page(
     front : StoredFront
         The front as it was written. Its record (``run.json``) says which solution was chosen; the page opens with that
         one, else with the knee. Its ``series`` are drawn faintly behind it.
-    problem : MeshProblem
+    surface : Surface
         What the solutions are solutions of; their meshes are made anew from it.
+    kept : (S, N) bool array, or Chromosomes
+        The solutions, in vector order.
+    measure : str
+        What was minimised beside the triangles.
     folder : path
         The folder of the front, as a shell command shall name it.
     knee : int
@@ -113,26 +118,26 @@ def simplification_page(
     Raises
     ------
     ResultError
-        If the numbers are not those of the problem's meshes: then it is another model, or has other settings.
+        If the numbers are not those of the surface's meshes: then it is another model, or has other settings.
     """
-    surface, chosen = problem.surface, front.run.get("chosen")
+    chosen, count = front.run.get("chosen"), len(kept)
     model, view = surface.model, surface.view
-    count = len(front.kept)
-    whole = model.n_vertices <= DRAWN_VERTICES  # else the largest mesh would take the place of many
+    original = original_mesh(surface)
+    whole = bool(original[0].all())  # else the largest mesh would take the place of many
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
-    held = _embedded(problem, front, order, knee, limit)
+    held = _embedded(surface, kept, front, original, order, knee, limit)
     missing = sum(solution is None for solution in held.solutions)
     columns: dict[str, list[Any]] = {name: front.quality[name].tolist() for name in FRONT_COLUMNS[:-1]}
     if front.refitted_error is not None:
         columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
-    paint = model.attributes.get("color")
+    paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
     exaggeration = float(f"{view.exaggeration:.2g}")
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
         "folder": printable(as_argument(folder)),
-        "measure": problem.objectives[0],
+        "measure": measure,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [{"name": name, **spoken(measure, unit)} for name, measure in MEASURES.items()],
         "columns": columns,
@@ -145,13 +150,13 @@ def simplification_page(
             "vertices": model.n_vertices,
             "triangles": len(model.faces),
             "diagonal": surface.diagonal,
-            "relief": float(np.ptp(view.points[:, 2]) / np.ptp(view.points[:, :2], axis=0).max()),
+            "relief": float(view.extent[2] / view.extent[:2].max()),
             "pivot": view.pivot.tolist(),
             "rotation": view.rotation.tolist(),
             "scale": view.scale.tolist(),
         },
         "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
-        "paint": None if paint is None else embedded_array(paint[held.vertices]) | {"channels": paint.shape[1]},
+        "paint": None if paint is None else embedded_array(paint) | {"channels": paint.shape[1]},
         "faces": held.original,
         "solutions": held.solutions,
         "colours": magma(),
@@ -193,42 +198,44 @@ def spoken(measure: Measure, unit: str = LENGTH) -> dict[str, str]:
     return {"label": measure.label, "meaning": measure.meaning, "unit": unit if measure.unit else ""}
 
 
-def _embedded(problem: MeshProblem, front: StoredFront, order: Sequence[int], knee: int, limit: int) -> _Embedded:
-    """Make the meshes that fit into the page, the most important ones first."""
-    model = problem.model
-    n = model.n_vertices
-    thinned = n > DRAWN_VERTICES
-    if thinned:
-        # the vertices lie along a curve that fills the plane, so every k-th is an even selection
-        drawn = problem.pinned.copy()
-        drawn[:: -(-n // DRAWN_VERTICES)] = True
-        original: IntArray = problem.simplify(drawn).faces
-    else:
-        drawn, original = np.ones(n, dtype=bool), model.faces
+def _embedded(
+    surface: Surface,
+    kept: BoolArray | Chromosomes,
+    front: StoredFront,
+    drawn_mesh: tuple[BoolArray, IntArray],
+    order: Sequence[int],
+    knee: int,
+    limit: int,
+) -> _Embedded:
+    """Make the meshes that fit into the page beside the drawn original, the most important ones first."""
+    drawn, original = drawn_mesh
     measured = np.unique(original)  # the others carry no colour
     n_drawn = len(measured)
     room = limit - FIXED_BYTES - TRIANGLE_BYTES * len(original) - VERTEX_BYTES * n_drawn
     rows = []
     used = drawn.copy()
     for row in order:
-        more = front.kept[row] & ~used
-        cost = TRIANGLE_BYTES * front.quality["triangles"][row] + DEVIATION_BYTES * n_drawn + VERTEX_BYTES * more.sum()
+        cost = TRIANGLE_BYTES * front.quality["triangles"][row] + DEVIATION_BYTES * n_drawn
+        if cost > room:
+            continue
+        more = kept[row] & ~used
+        cost += VERTEX_BYTES * more.sum()
         if cost <= room:
             room -= cost
             rows.append(row)
             used |= more
-    found = {row: _checked(problem, front, row) for row in rows}
+    found = {row: _checked(surface, kept, front, row, measured) for row in rows}
     used = drawn.copy()
     for mesh in found.values():
         used[mesh.faces.ravel()] = True
     vertices = np.flatnonzero(used)
     place = np.cumsum(used) - 1
-    solutions: list[dict[str, Any] | None] = [None] * len(front.kept)
+    solutions: list[dict[str, Any] | None] = [None] * len(kept)
     sizes: dict[int, int] = {}
     for row, mesh in found.items():
         largest = float(mesh.deviation.max())
-        levels = np.rint(LEVELS * np.sqrt(mesh.deviation[measured] / (largest or 1.0))).astype(np.uint8)
-        levels[~mesh.covered[measured]] = UNCOVERED_LEVEL
+        levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
+        levels[~mesh.covered] = UNCOVERED_LEVEL
         triangles, deviation = embedded_faces(place[mesh.faces]), embedded_array(levels)
         solutions[row] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
@@ -238,21 +245,21 @@ def _embedded(problem: MeshProblem, front: StoredFront, order: Sequence[int], kn
         dropped = next(row for row in reversed(rows) if row in sizes)
         solutions[dropped] = None
         del sizes[dropped]
-    at_knee = found[knee] if knee in found else _checked(problem, front, knee)
+    at_knee = found[knee] if knee in found else _checked(surface, kept, front, knee, measured)
     end = float(np.quantile(at_knee.deviation, SCALE_QUANTILE)) or float(front.quality["max_error"].max()) or 1.0
     return _Embedded(vertices, faces, solutions, end, n_drawn)
 
 
-def _checked(problem: MeshProblem, front: StoredFront, row: int) -> Simplified:
-    """Return the mesh of a solution, if it has the numbers that are said of it."""
-    mesh = problem.simplify(front.kept[row])
+def _checked(
+    surface: Surface, kept: BoolArray | Chromosomes, front: StoredFront, row: int, measured: IntArray
+) -> Simplified:
+    """Return the mesh of a solution, its deviation at some vertices, if it has the numbers that are said of it."""
+    mesh = surface.simplify(kept[row] | surface.pinned, rows=measured)
     triangles, error, found = front.quality["triangles"][row], front.quality["error"][row], mesh.quality
-    if found.triangles != triangles or not np.isclose(
-        found.error, error, rtol=1e-6, atol=1e-12 * problem.surface.diagonal
-    ):
+    if found.triangles != triangles or not np.isclose(found.error, error, rtol=1e-6, atol=1e-12 * surface.diagonal):
         raise ResultError(
             f"{front.folder}: solution {row} is said to have {triangles} triangles and the error {error:.9g}, but its "
-            f"mesh on {problem.model.name} has {found.triangles} and {found.error:.9g}; the front is one of another "
+            f"mesh on {surface.model.name} has {found.triangles} and {found.error:.9g}; the front is one of another "
             "model, or was made with other settings"
         )
     return mesh

@@ -22,9 +22,6 @@ from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, require_rules
 
-# A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
-# metres.
-LEAST_RELIEF = 0.12
 # A kept vertex of weight 0 counts this share of the mean all the same, so that its refitted height has a value.
 LEAST_WEIGHT = 1e-9
 
@@ -101,10 +98,7 @@ class HeightSurface:
     @cached_property
     def view(self) -> View:
         """The model upright, a flat relief drawn higher."""
-        width, depth, height = np.ptp(self.points, axis=0)
-        least = LEAST_RELIEF * float(max(width, depth))
-        exaggeration = max(1.0, least / float(height)) if height > 0 else 1.0
-        return View(self.points, exaggeration, self.model.rotation, self.model.pivot, self.model.scale)
+        return View(np.ptp(self.points, axis=0), self.model.rotation, self.model.pivot, self.model.scale)
 
     @cached_property
     def _ground(self) -> Ground:
@@ -132,11 +126,21 @@ class HeightSurface:
         first = np.r_[True, group[order][1:] != group[order][:-1]][: len(rows)]
         return np.sort(rows[order[first]])
 
+    def selection(self, most: int) -> BoolArray:
+        """Return about ``most`` vertices (N,): the vertices lie along a curve that fills the plane, so every k-th."""
+        selected = self.pinned.copy()
+        selected[:: -(-self.n_vertices // most)] = True
+        return selected
+
+    def triangles(self, kept: BoolArray) -> IntArray:
+        """Return the triangles (M, 3) of one subset (N,)."""
+        return self.simplify(kept).faces
+
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table (P, 6 + regions) of numbers of subsets (P, N); see :func:`evaluate_subsets`."""
         return evaluate_subsets(self._ground, kept, n_threads=threads, regions=regions)
 
-    def simplify(self, kept: BoolArray) -> Simplified:
+    def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
         """Triangulate the kept vertices and measure the result: the phenotype of one chromosome (N,).
 
         Raises
@@ -151,7 +155,8 @@ class HeightSurface:
                 f"{int(row.sum())} kept vertices of {self.model.name} span no triangle of the mesh; "
                 "keep more of them, the corners first"
             )
-        return Simplified(faces, as_quality(numbers, self.total_weight), deviation, covered)
+        at = slice(None) if rows is None else rows
+        return Simplified(faces, as_quality(numbers, self.total_weight), deviation[at], covered[at])
 
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh by the same error: decimated, folded, with vertices of its own.

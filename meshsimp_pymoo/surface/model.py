@@ -118,6 +118,11 @@ class OpenModel:
         return len(self.points)
 
     @property
+    def file_box(self) -> FloatArray:
+        """The lowest and the highest corner (2, 3) of the box around the vertices [file units]."""
+        return np.array([self.file_points.min(axis=0), self.file_points.max(axis=0)])
+
+    @property
     def total_weight(self) -> float:
         """Sum of the weights; N without any."""
         return float(self.n_vertices if self.weights is None else self.weights.sum())

@@ -19,6 +19,10 @@ from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality, require_measure
 from meshsimp_pymoo.surface.rules import Rules
 
+# A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
+# metres.
+LEAST_RELIEF = 0.12
+
 
 @dataclass(frozen=True)
 class Simplified:
@@ -31,7 +35,7 @@ class Simplified:
     quality : Quality
         Its numbers.
     deviation : (N,) float array
-        d_p at every original vertex [model units].
+        d_p at every original vertex, or at those that were asked for [model units].
     covered : (N,) bool array
         Whether a triangle covers it.
     """
@@ -91,14 +95,12 @@ class Refitted:
 
 @dataclass(frozen=True)
 class View:
-    """How pictures and the page look at a surface.
+    """How pictures and the page look at a surface, whose ``points`` they draw with z to the viewer.
 
     Attributes
     ----------
-    points : (N, 3) float array
-        The vertices as they are drawn, z to the viewer [model units].
-    exaggeration : float
-        Factor by which z is drawn higher, so that a flat relief shows.
+    extent : (3,) float array
+        Width, depth and height of the box around the points [model units].
     rotation : (3, 3) float array
         Drawn directions are ``rotation @ (scale * direction)`` of the model's file.
     pivot : (3,) float array
@@ -107,15 +109,23 @@ class View:
         Model units to a unit of the file along its axes.
     """
 
-    points: FloatArray
-    exaggeration: float
+    extent: FloatArray
     rotation: FloatArray
     pivot: FloatArray
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
 
+    @property
+    def exaggeration(self) -> float:
+        """Factor by which z is drawn higher, so that a flat relief shows."""
+        least, height = LEAST_RELIEF * float(self.extent[:2].max()), float(self.extent[2])
+        return max(1.0, least / height) if height > 0 else 1.0
+
 
 class Original(Protocol):
-    """The original mesh, as files and records know it; N vertices in vector order."""
+    """The original mesh, as files and records know it; N vertices in vector order.
+
+    Arrays of N or T rows may be `arrays.Rows`, which are made when they are asked for by number.
+    """
 
     @property
     def name(self) -> str:
@@ -135,6 +145,11 @@ class Original(Protocol):
     @property
     def file_points(self) -> FloatArray:
         """Its vertices (N, 3) exactly as in the file [file units]."""
+        ...
+
+    @property
+    def file_box(self) -> FloatArray:
+        """The lowest and the highest corner (2, 3) of the box around them [file units]."""
         ...
 
     @property
@@ -231,12 +246,23 @@ class Surface(Protocol):
         """How pictures and the page look at it."""
         ...
 
+    def selection(self, most: int) -> BoolArray:
+        """Return about ``most`` vertices (N,), spread evenly, whose mesh stands for the original in pictures."""
+        ...
+
+    def triangles(self, kept: BoolArray) -> IntArray:
+        """Return the triangles (M, 3) of one subset (N,) as rows of ``points``; a ValueError if it has none."""
+        ...
+
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table (P, 6 + regions) of numbers of subsets (P, N); see `surface.measures` for its columns."""
         ...
 
-    def simplify(self, kept: BoolArray) -> Simplified:
-        """Return the mesh of one subset (N,); a ValueError if it has none."""
+    def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
+        """Return the mesh of one subset (N,), its deviation at all vertices or at those of ``rows``, ascending.
+
+        A ValueError if it has no triangle.
+        """
         ...
 
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
@@ -257,6 +283,30 @@ class Surface(Protocol):
         Of several kept vertices at one place, a fixed one is the site, else the first.
         """
         ...
+
+
+def mesh_arrays(model: Original, faces: IntArray) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
+    """Return a simplified mesh in the file's own frame.
+
+    Parameters
+    ----------
+    model : Original
+        The original mesh.
+    faces : (M, 3) int array
+        Triangles as indices of the model's vertices in vector order.
+
+    Returns
+    -------
+    vertices : (V, 3) float array
+        The vertices that the triangles use, with the very coordinates of the file.
+    faces : (M, 3) int array
+        The triangles as indices of those.
+    attributes : dict of str to (V, ...) array
+        Colours and whatever else the file says of those vertices.
+    """
+    used, compact = np.unique(np.asarray(faces, dtype=np.int64), return_inverse=True)
+    attributes = {name: values[used] for name, values in model.attributes.items()}
+    return model.file_points[used], compact.reshape(-1, 3), attributes
 
 
 def require_rules(surface: Any, who: str) -> None:

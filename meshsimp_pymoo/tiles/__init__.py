@@ -1,14 +1,14 @@
 """Models too big for one piece: a height grid is thinned tile by tile, in bounded memory, to one front of whole meshes.
 
-======  ================================================================================================
-grid    :class:`~meshsimp_pymoo.tiles.grid.HeightGrid`: samples by windows, from a memory map, a GeoTIFF or in memory
+======  ==================================================================================
 thin    a tile's own front, with all beyond the tile fixed
-front   the phases: tiles merged by marginal analysis, then cut elsewhere, until one tile holds everything
-coarse  the smallest solutions, whose vertices are moved on the whole grid
-weld    the mesh of a solution as one piece or as tiles, and its error over all samples
+front   the phases: tiles merged by marginal analysis, then cut elsewhere, until one tile
+        holds everything; the smallest solutions moved (:mod:`meshsimp_pymoo.search.coarse`)
 memory  what the tiles need, and what there is
-output  what is left on disk, and how a mesh is taken from it
-======  ================================================================================================
+======  ==================================================================================
+
+The grid, read by windows, is a surface (:mod:`meshsimp_pymoo.surface.grid_surface`), and what comes out is a
+:class:`~meshsimp_pymoo.front.Front`.
 
 How the tiles meet. A mesh here is what it is everywhere in this package: the Delaunay triangulation of its vertices,
 one function of the subset. So there is no seam that could crack, whatever the tiles did, and no straight line of

@@ -11,7 +11,7 @@ third of their side, and by two thirds: whatever lay along an edge lies inside a
 on each phase thins to a somewhat larger slope, cut otherwise than the one before. Every phase ends with one row of the
 front, a subset of the row before. When few vertices are left, tiles grow: every second row and column of samples then
 stands for the others, and so on, until one tile holds the whole; it is thinned to the end. The vertices of the
-smallest solutions are moved then, each solution's for itself (see `meshsimp_pymoo.tiles.coarse`): these alone are no
+smallest solutions are moved then, each solution's for itself (see `meshsimp_pymoo.search.coarse`): these alone are no
 subsets of the ones before.
 
 The errors of the front are measured afterwards, for each row over all samples.
@@ -26,7 +26,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -37,11 +37,16 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.files import new_file
+from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.search.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
+from meshsimp_pymoo.settings import plain
+from meshsimp_pymoo.surface.grid import HeightGrid
+from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
-from meshsimp_pymoo.tiles.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
-from meshsimp_pymoo.tiles.grid import HeightGrid
+from meshsimp_pymoo.surface.nested import Nested
+from meshsimp_pymoo.surface.rules import DEFAULT, Rules
+from meshsimp_pymoo.surface.weld import measure, weld
 from meshsimp_pymoo.tiles.thin import Tile, thin_tile
-from meshsimp_pymoo.tiles.weld import measure, weld
 from meshsimp_pymoo.workers import Engine, Serial
 
 #: Samples along one side of a tile.
@@ -65,113 +70,6 @@ LOST = "a finished tile was stored, but is gone or damaged; start the same call 
 
 # Called with (share done, what is being done).
 Progress = Callable[[float, str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class TiledFront:
-    """A front of a height grid, from fine to coarse, nested but for its smallest solutions.
-
-    Attributes
-    ----------
-    grid : HeightGrid
-        The grid.
-    samples : (V,) int array
-        Numbers of the samples that the finest solution keeps, ascending.
-    level : (V,) float array
-        The slope at which each goes: error for each triangle [model units]; infinite: never.
-    slope : (S,) float array
-        The slope of each solution, ascending: it keeps the samples of higher level.
-    quality : tuple of Quality
-        Measured over all samples; triangles descending, error ascending.
-    moved : tuple of (v,) int array or None, optional
-        The samples of each solution whose vertices were moved, ascending; None where they were not.
-    """
-
-    grid: HeightGrid
-    samples: IntArray
-    level: FloatArray
-    slope: FloatArray
-    quality: tuple[Quality, ...]
-    moved: tuple[IntArray | None, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not self.moved:
-            object.__setattr__(self, "moved", (None,) * len(self.quality))
-
-    def __len__(self) -> int:
-        return len(self.quality)
-
-    @property
-    def F(self) -> FloatArray:
-        """The objectives, (S, 2): error [model units] and triangles."""
-        return np.array([[q.error, q.triangles] for q in self.quality])
-
-    def kept(self, row: int) -> IntArray:
-        """Return the numbers of the samples that a solution keeps, ascending."""
-        if not 0 <= row < len(self):
-            raise ValueError(f"there is no solution {row}; the front has the solutions 0 to {len(self) - 1}")
-        moved = self.moved[row]
-        return self.samples[self.level > self.slope[row]] if moved is None else moved
-
-    def slope_of(self, triangles: int) -> float:
-        """Return the least slope whose thinned mesh has at most so many triangles.
-
-        Raises
-        ------
-        ValueError
-            If it is less than 2, the least there is.
-        """
-        if triangles < 2:
-            raise ValueError(f"a mesh of {self.grid.name} has at least 2 triangles, not {triangles}")
-        order = np.argsort(-self.level, kind="stable")
-        count = np.cumsum(_weight(self.grid, self.samples[order])) - 2
-        level = self.level[order]
-        # all samples of one level go together
-        last = np.flatnonzero(np.r_[level[1:] < level[:-1], True])
-        most = last[np.flatnonzero(count[last] <= triangles)[-1]]
-        return float(level[most + 1]) if most + 1 < len(level) else float(self.slope[0])
-
-    def with_slope(self, slope: float, *, threads: int = 1) -> TiledFront:
-        """Return the front with one more solution, of this slope, measured; the same one if it has it already."""
-        if slope in self.slope:
-            return self
-        at = int(np.searchsorted(self.slope, slope))
-        if at == 0:
-            raise ValueError(f"slope {slope:g} is below that of the finest solution, {self.slope[0]:g}")
-        quality = measure(self.grid, weld(self.grid, self.samples[self.level > slope]), n_threads=threads)
-        return replace(
-            self,
-            slope=np.insert(self.slope, at, slope),
-            quality=(*self.quality[:at], quality, *self.quality[at:]),
-            moved=(*self.moved[:at], None, *self.moved[at:]),
-        )
-
-    def with_triangles(self, triangles: int, *, threads: int = 1) -> tuple[TiledFront, int]:
-        """Return the front with a solution of at most so many triangles, and its row.
-
-        Raises
-        ------
-        ValueError
-            If it is less than 2, the least there is.
-        """
-        slope = self.slope_of(triangles)
-        front = self.with_slope(slope, threads=threads)
-        row = front.slope.tolist().index(slope)
-        if front is self or not 2 < triangles <= SEARCHED:
-            return front, row
-        coarse = CoarseGrid(self.grid)
-        samples = np.sort(coarse.samples[move(coarse.task(front.kept(row), triangles))])
-        quality = measure(self.grid, weld(self.grid, samples), n_threads=threads)
-        sizes = [q.triangles for q in self.quality]
-        if quality.error < front.quality[row].error and (
-            (row == 0 or quality.triangles < sizes[row - 1]) and (row == len(sizes) or quality.triangles > sizes[row])
-        ):
-            front = replace(
-                front,
-                quality=(*front.quality[:row], quality, *front.quality[row + 1 :]),
-                moved=(*front.moved[:row], samples, *front.moved[row + 1 :]),
-            )
-        return front, row
 
 
 class Memory:
@@ -255,7 +153,7 @@ class Folder:
 
 def usual_most(grid: HeightGrid) -> int:
     """Return the triangles of the finest solution where nothing else is asked for."""
-    return max(2, min(int(FINEST * grid.n_triangles), MOST_TRIANGLES))
+    return max(2, min(int(FINEST * len(grid.faces)), MOST_TRIANGLES))
 
 
 def settings(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> dict[str, Any]:
@@ -284,19 +182,22 @@ def settings(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> 
 def tiled_front(
     grid: HeightGrid,
     *,
+    rules: Rules = DEFAULT,
     tile: int = TILE,
     most: int | None = None,
     engine: Engine | None = None,
     store: Folder | Memory | None = None,
     threads: int = 1,
     progress: Progress | None = None,
-) -> TiledFront:
-    """Thin a height grid tile by tile to a whole front.
+) -> Front:
+    """Thin a height grid tile by tile to a whole front, nested but for its smallest solutions.
 
     Parameters
     ----------
     grid : HeightGrid
         The grid of N samples.
+    rules : Rules
+        What counts, as far as tiles know it; see :class:`~meshsimp_pymoo.surface.grid_surface.GridSurface`.
     tile : int
         Samples along one side of a tile. Memory: about 600 bytes for each sample of a tile and worker, and 40 bytes
         for each vertex of the finest solution.
@@ -313,19 +214,20 @@ def tiled_front(
 
     Returns
     -------
-    TiledFront
+    Front
+        Of which :meth:`~meshsimp_pymoo.front.Front.best` makes a mesh of nearly any number of triangles.
     """
     setting = settings(grid, tile=tile, most=most)
     work = _Work(grid, tile, engine or Serial(), store or Memory(), progress or (lambda share, text: None))
     n_wanted = setting["most"] // 2
     # A tile with few vertices could thin hardly any: all lie near its edge. So tiles this small begin finer.
-    samples, slope = work.start(max(n_wanted, grid.n_samples // ENOUGH_SAMPLES))
+    samples, slope = work.start(max(n_wanted, grid.n_vertices // ENOUGH_SAMPLES))
     level = np.full(len(samples), np.inf)
     slopes = [slope]
     n_kept, n_row = len(samples), len(samples)
     phase, stride, step = len(SHIFTS), 1, SLOPE_STEP
     while True:
-        while ENOUGH_SAMPLES * stride**2 * n_kept < grid.n_samples:
+        while ENOUGH_SAMPLES * stride**2 * n_kept < grid.n_vertices:
             stride *= 2
         if work.is_one_tile(stride):
             break
@@ -359,26 +261,10 @@ def tiled_front(
             quality[row].triangles > quality[rows[-1]].triangles and quality[row].error < quality[rows[-1]].error
         ):
             rows.append(row)
-    rows.reverse()
-    return TiledFront(
-        grid,
-        samples,
-        level,
-        np.array(slopes)[rows],
-        tuple(quality[row] for row in rows),
-        tuple(moved[row] for row in rows),
-    )
-
-
-def _weight(grid: HeightGrid, samples: IntArray) -> IntArray:
-    """Return how many triangles each sample is worth: V vertices, B of them on the sides, have 2 V - 2 - B triangles.
-
-    So the sum less 2 is the number of Delaunay triangles of a subset with the corners.
-    """
-    rows, columns = grid.shape
-    row, column = np.divmod(samples, columns)
-    weight: IntArray = 1 + ((row > 0) & (row < rows - 1) & (column > 0) & (column < columns - 1))
-    return weight
+    new = [None if kept is None else grid.source_index[kept] for kept in moved]
+    nested = Nested(grid.source_index[samples], level, np.array(slopes), tuple(new)).take(rows)
+    surface = GridSurface(grid, rules)
+    return Front([quality[row] for row in rows], nested, surface=surface, run={"options": plain(grid.options)})
 
 
 def _above(slope: float, level: FloatArray) -> FloatArray:
@@ -512,10 +398,10 @@ class _Work:
         for place, (removed, level) in self.engine.each(_thin, tasks):
             if kept is None:  # nearly all samples of the grid: in half the space
                 level = level.astype(np.float32)
-                removed = removed.astype(np.min_scalar_type(self.grid.n_samples))
+                removed = removed.astype(np.min_scalar_type(self.grid.n_vertices))
             self.store.put(f"{name}_{missing[place]}", removed=removed, level=level)
             n_done += 1
-            n_left = 1.0 if kept is None else len(kept) / self.grid.n_samples
+            n_left = 1.0 if kept is None else len(kept) / self.grid.n_vertices
             share = 0.6 * n_done / len(boxes) if kept is None else 0.6 + 0.2 * (1.0 - n_left) ** 8
             self.progress(share, f"tile {n_done} of {len(boxes)}")
         for k in range(len(boxes)):
@@ -529,7 +415,7 @@ class _Work:
         stored = self.store.get("start")
         if stored is not None:
             return stored["kept"], float(stored["slope"])
-        n = self.grid.n_samples
+        n = self.grid.n_vertices
         histogram = np.zeros(1 << 16, np.int64)
         greatest = 0.0
         for _, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
@@ -581,14 +467,14 @@ class _Work:
         small = [
             k
             for k, kept in enumerate(solutions)
-            if len(kept) > len(self.grid.corners) and int(_weight(self.grid, kept).sum()) - 2 <= SEARCHED
+            if len(kept) > len(self.grid.corners) and int(self.grid.triangles_of(kept).sum()) - 2 <= SEARCHED
         ]
         moved: list[IntArray | None] = [None] * len(solutions)
         if not small:
             return moved
         coarse = CoarseGrid(self.grid)
         missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
-        tasks = (coarse.task(solutions[k], int(_weight(self.grid, solutions[k]).sum()) - 2) for k in missing)
+        tasks = (coarse.task(solutions[k], int(self.grid.triangles_of(solutions[k]).sum()) - 2) for k in missing)
         for place, rows in self.engine.each(_move, tasks):
             self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")

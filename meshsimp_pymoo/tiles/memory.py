@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.memory import free_memory, spelled
-from meshsimp_pymoo.tiles.grid import HeightGrid
+from meshsimp_pymoo.surface.grid import HeightGrid
 
 # Measured, rounded up: the libraries of a process, a sample of a tile, a sample of the whole while the first phase is
 # read back, a triangle of the finest solution while it is measured or written.
@@ -42,7 +42,7 @@ def check_memory(grid: HeightGrid, *, tile: int, most: int, jobs: int, remote: b
 
     def short_of(side: int) -> tuple[float, float] | None:
         """Return what is needed and what is free, if that is less."""
-        own: float = PROCESS_BYTES + SAMPLE_BYTES * grid.n_samples + TRIANGLE_BYTES * most
+        own: float = PROCESS_BYTES + SAMPLE_BYTES * grid.n_vertices + TRIANGLE_BYTES * most
         rows, columns = grid.shape
         tile_bytes = TILE_SAMPLE_BYTES * min(LONGEST * side, rows) * min(LONGEST * side, columns)
         workers = 0 if remote or jobs == 1 else jobs

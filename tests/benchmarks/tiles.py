@@ -27,12 +27,12 @@ from rich.console import Console
 from rich.table import Table
 
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.opening import open_grid
+from meshsimp_pymoo.search.coarse import SEARCHED
 from meshsimp_pymoo.search.greedy import thinning
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.tiles.coarse import SEARCHED
 from meshsimp_pymoo.tiles.front import tiled_front
-from meshsimp_pymoo.tiles.grid import open_grid
 
 CONSOLE = Console(width=110)
 PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -165,7 +165,7 @@ def against(name, tiles):
         few = (triangles > 2) & (triangles <= SEARCHED)  # with 2 there is nothing to choose
         excess = front.F[:, 0] / np.interp(triangles, whole.triangles, whole.error) - 1
         table.add_row(
-            str(tile), str(len(front)), f"{triangles[-1]:.0f} to {triangles[0]:.0f}",
+            str(tile), str(len(front)), f"{triangles[0]:.0f} to {triangles[-1]:.0f}",
             f"{excess[triangles > SEARCHED].max():+.2%}", f"{excess[few].max():+.2%}", f"{excess.mean():+.2%}",
             f"{seconds:.1f}",
         )  # fmt: skip

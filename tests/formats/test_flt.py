@@ -9,7 +9,7 @@ from pyramid import refusal, write
 
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
+from meshsimp_pymoo.opening import count_samples, open_grid
 
 HEADER = "ncols 4\nnrows 3\nxllcorner 100\nyllcorner 200\ncellsize 10\nNODATA_value -9999\n"
 HEIGHTS = np.arange(12, dtype=np.float32).reshape(3, 4) / 3
@@ -25,7 +25,7 @@ def test_both_orders_of_bytes_are_read(tmp_path, order, said, suffix):
     source = read_source(path)
     assert_array_equal(source.points[[0, 11]], [[105, 225, 0], [135, 205, np.float32(11) / np.float32(3)]])
     assert count_samples(path) == 12
-    assert_array_equal(open_grid(path).file_points(np.arange(12)), source.points)
+    assert_array_equal(open_grid(path).file_points[np.arange(12)], source.points)
     assert_array_equal(read_source(path, Options(spacing=1)).points[11, :2], [103.5, 200.5])
 
 

@@ -15,7 +15,7 @@ from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.tiles.grid import open_grid
+from meshsimp_pymoo.opening import open_grid
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402

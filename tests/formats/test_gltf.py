@@ -26,9 +26,10 @@ from meshsimp_pymoo.formats.source import build_source
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
 from meshsimp_pymoo.formats.table import format_to_write, read_source, write_mesh
 from meshsimp_pymoo.opening import open_model
-from meshsimp_pymoo.storage import mesh_arrays, read_front, write_solution
+from meshsimp_pymoo.storage import read_front, write_solution
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.surface import mesh_arrays
 
 UTM = np.array([500_000.25, 5_400_000.5, 300.125])
 

@@ -10,7 +10,7 @@ from pyramid import refusal, write
 from meshsimp_pymoo.errors import ModelWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
+from meshsimp_pymoo.opening import count_samples, open_grid
 
 # A tile of a quarter of a degree a step, where real ones have seconds.
 HEIGHTS = np.arange(25).reshape(5, 5) * 100 - 30
@@ -35,7 +35,7 @@ def test_a_tile_lies_where_its_name_says(tmp_path, name, west, south):
     assert source.georeference.items() >= {"epsg": 4326, "unit": "degree"}.items()
     assert source.georeference["scale"][1] == pytest.approx(111_200, rel=0.01)  # metres to a degree of latitude
     with pytest.warns(ModelWarning, match="degrees"):
-        assert_array_equal(open_grid(path).file_points(np.arange(25)), source.points)
+        assert_array_equal(open_grid(path).file_points[np.arange(25)], source.points)
     assert count_samples(path) == 25
 
 

@@ -12,9 +12,10 @@ from samples import write_solutions
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.source import SourceMesh
-from meshsimp_pymoo.storage import mesh_arrays, read_front, write_front
+from meshsimp_pymoo.storage import read_front, write_front
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.surface import mesh_arrays
 
 UTM = np.array([500_000.25, 5_400_000.5, 300.125])
 

@@ -9,7 +9,7 @@ from pyramid import hostile_array, refusal, write
 
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.tiles.grid import open_grid
+from meshsimp_pymoo.opening import open_grid
 
 
 @pytest.mark.parametrize("load", [read_source, open_grid])

@@ -17,7 +17,7 @@ from meshsimp_pymoo.formats.npz import AXES
 from meshsimp_pymoo.formats.npz import DEGREES as DEGREES_AXES
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.tiles.grid import open_grid
+from meshsimp_pymoo.opening import open_grid
 
 
 def test_an_npz_carries_heights_and_spacing(tmp_path):
@@ -100,7 +100,7 @@ def test_samples_lie_where_the_axes_say_in_any_order(tmp_path_factory, names, fl
     assert source.georeference.get("unit") == ("degree" if names in DEGREES_AXES else None)
     if not any((flips[0], not flips[1])):
         grid = open_grid(path)
-        assert_array_equal(grid.file_points(np.arange(6)), source.points)
+        assert_array_equal(grid.file_points[np.arange(6)], source.points)
     else:
         with pytest.raises(NoFullGrid, match="as tiles want them"):
             open_grid(path)

@@ -18,7 +18,7 @@ from meshsimp_pymoo import memory
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
+from meshsimp_pymoo.opening import count_samples, open_grid
 
 LEVELS = (np.arange(12, dtype=np.uint16) * 5000).reshape(3, 4)
 
@@ -42,7 +42,7 @@ def test_sixteen_bits_of_grey_are_heights_from_north_to_south(tmp_path):
     assert len(read_source(path, Options(nodata=55000)).points) == 11
     assert len(read_source(path, Options(window=(1, 1, 2, 2))).points) == 4
     assert count_samples(path) == 12
-    assert_array_equal(open_grid(path, spacing=(2, 3)).file_points(np.arange(12)), source.points)
+    assert_array_equal(open_grid(path, spacing=(2, 3)).file_points[np.arange(12)], source.points)
 
 
 def test_eight_bits_are_read_with_a_word_of_their_steps(tmp_path):

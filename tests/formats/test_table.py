@@ -30,8 +30,8 @@ from meshsimp_pymoo.formats.table import (
     written_formats,
 )
 from meshsimp_pymoo.settings import settings_of
-from meshsimp_pymoo.storage import mesh_arrays
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.surface import mesh_arrays
 
 BOTH_WAYS = [kind.name for kind in all_formats() if kind.read and kind.write]
 # LandXML is for survey programs alone.

@@ -23,11 +23,13 @@ from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.errors import PictureWarning, ResultError
 from meshsimp_pymoo.formats.table import read_source, write_mesh
 from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.report import figures as figures_module
 from meshsimp_pymoo.report import page as page_module
 from meshsimp_pymoo.report.document import ASSETS, embedded_array, embedded_faces, html_document
 from meshsimp_pymoo.report.page import FIXED_BYTES, PAGE_BYTES, simplification_page
-from meshsimp_pymoo.storage import mesh_arrays, read_front
+from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.surface import mesh_arrays
 
 ERRORS = ["mean_error", "max_error", "rms_error", "error"]
 SIDE = 24  # samples along a side of the model
@@ -456,7 +458,7 @@ def test_names_cannot_run_anything_or_call_anyone(browser, folder, front, tmp_pa
     stored.run["settings"] = {"pick": EVIL}
     path = tmp_path / "report.html"
     path.write_text(
-        simplification_page(stored, front.problem, folder=f"; rm -rf {EVIL}", knee=3),
+        simplification_page(stored, front.surface, front.kept, measure="error", folder=f"; rm -rf {EVIL}", knee=3),
         encoding="utf-8",
     )
     visit = Visit(browser, path)
@@ -511,7 +513,9 @@ def data_of(page):
 def test_a_page_over_its_limit_leaves_out_meshes_and_says_so(browser, folder, front, tmp_path):
     stored = read_front(folder)
     limit = FIXED_BYTES + 35_000
-    page = simplification_page(stored, front.problem, folder=folder, knee=front.knee().solution, limit=limit)
+    page = simplification_page(
+        stored, front.surface, front.kept, measure="error", folder=folder, knee=front.knee().solution, limit=limit
+    )
     assert len(page) <= limit
     held = [row for row, solution in enumerate(data_of(page)["solutions"]) if solution]
     assert 3 <= len(held) < len(front)
@@ -541,8 +545,8 @@ def test_a_page_over_its_limit_leaves_out_meshes_and_says_so(browser, folder, fr
 
 
 def test_a_large_original_is_drawn_thinned_but_its_meshes_stay_exact(browser, folder, front, tmp_path, monkeypatch):
-    monkeypatch.setattr(page_module, "DRAWN_VERTICES", 60)
-    page = simplification_page(read_front(folder), front.problem, folder=folder, knee=3)
+    monkeypatch.setattr(figures_module, "DRAWN_VERTICES", 60)
+    page = simplification_page(read_front(folder), front.surface, front.kept, measure="error", folder=folder, knee=3)
     path = tmp_path / "report.html"
     path.write_text(page, encoding="utf-8")
     visit = Visit(browser, path)
@@ -617,14 +621,17 @@ def test_embedded_deviations_are_those_of_the_mesh_to_eight_bits(folder, front):
 
 
 def test_the_same_front_gives_the_same_bytes(folder, front):
-    pages = {simplification_page(read_front(folder), front.problem, folder="out", knee=3) for _ in range(2)}
+    pages = {
+        simplification_page(read_front(folder), front.surface, front.kept, measure="error", folder="out", knee=3)
+        for _ in range(2)
+    }
     assert len(pages) == 1
 
 
 def test_a_front_of_another_model_is_refused(folder, front):
     other = MeshProblem(replace(front.model, points=front.model.points * [1, 1, 2]))
     with pytest.raises(ResultError, match=r"is said to have \d+ triangles .* the front is one of another model"):
-        simplification_page(read_front(folder), other, folder=folder, knee=3)
+        simplification_page(read_front(folder), other.surface, front.kept, measure="error", folder=folder, knee=3)
 
 
 def test_report_makes_the_page_of_a_front_anew(folder, capsys):

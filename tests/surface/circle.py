@@ -48,6 +48,11 @@ class Curve:
         return fan(np.arange(self.n_vertices))
 
     @property
+    def file_box(self) -> FloatArray:
+        """The box around the points."""
+        return np.array([self.file_points.min(axis=0), self.file_points.max(axis=0)])
+
+    @property
     def source_index(self) -> IntArray:
         """The points are in the order of the file."""
         return np.arange(self.n_vertices)
@@ -111,7 +116,17 @@ class Circle:
     @property
     def view(self) -> View:
         """From above."""
-        return View(self.points, 1.0, np.eye(3), self.points.min(axis=0))
+        return View(np.ptp(self.points, axis=0), np.eye(3), self.points.min(axis=0))
+
+    def selection(self, most: int) -> BoolArray:
+        """Return every k-th point."""
+        selected = self.pinned.copy()
+        selected[:: -(-self.n_vertices // most)] = True
+        return selected
+
+    def triangles(self, kept: BoolArray) -> IntArray:
+        """Return the fan over the kept points."""
+        return self.simplify(kept).faces
 
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table of numbers of subsets (P, N)."""
@@ -128,12 +143,14 @@ class Circle:
         found = list(thread_pool(threads).map(row, rows) if threads > 1 else map(row, rows))
         return np.array(found).reshape(len(rows), REGIONS + regions)
 
-    def simplify(self, kept: BoolArray) -> Simplified:
+    def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
         """Return the fan over the kept points."""
         if kept.sum() < 3:
             raise ValueError(f"{int(kept.sum())} points of {self.model.name} span no triangle")
         quality = as_quality(self.evaluate(kept)[0], self.total_weight)
-        return Simplified(fan(np.flatnonzero(kept)), quality, _deviations(self.places.ravel(), kept), kept.copy())
+        at = slice(None) if rows is None else rows
+        deviation = _deviations(self.places.ravel(), kept)
+        return Simplified(fan(np.flatnonzero(kept)), quality, deviation[at], kept[at].copy())
 
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh in the plane: the distance of each point to its nearest triangle."""

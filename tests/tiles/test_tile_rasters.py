@@ -15,12 +15,11 @@ from meshsimp_pymoo.formats import geotiff as raster_module
 from meshsimp_pymoo.formats.geotiff import RasterHeights
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source
-from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.opening import count_samples, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import grid as grid_module
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
-from meshsimp_pymoo.tiles.output import read_tiled_front
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402
@@ -61,12 +60,12 @@ def test_a_raster_opened_for_tiles_has_its_samples_where_the_model_of_it_has_the
     model = open_model(file, Options(window=window))
     grid = open_grid(file, window=window)
     samples = grid.samples_of_rows(model.source_index)
-    assert np.array_equal(grid.source_rows(samples), model.source_index)
-    assert np.array_equal(np.sort(samples), np.arange(grid.n_samples))
+    assert np.array_equal(grid.source_index[samples], model.source_index)
+    assert np.array_equal(np.sort(samples), np.arange(grid.n_vertices))
     assert np.array_equal(grid.xy_at(samples), model.xy)
-    assert np.array_equal(grid.file_points(samples), model.file_points)
+    assert np.array_equal(grid.file_points[samples], model.file_points)
     assert grid.georeference == model.georeference
-    assert count_samples(file, window=window) == grid.n_samples == model.n_vertices
+    assert count_samples(file, window=window) == grid.n_vertices == model.n_vertices
 
 
 def test_scale_offset_and_spacing_are_those_of_the_raster_read_whole(tmp_path):
@@ -74,7 +73,7 @@ def test_scale_offset_and_spacing_are_those_of_the_raster_read_whole(tmp_path):
     file = write(tmp_path / "dem.tif", whole_numbers, after={"scales": (0.1,), "offsets": (5.0,)})
     model = open_model(file, Options(spacing=(3.0, 4.0)))
     grid = open_grid(file, spacing=(3.0, 4.0))
-    assert np.array_equal(grid.file_points(model.source_index), model.file_points)
+    assert np.array_equal(grid.file_points[model.source_index], model.file_points)
     assert np.ptp(grid.file_x) == 3.0 * (HEIGHTS.shape[1] - 1)
 
 
@@ -84,8 +83,8 @@ def test_a_window_of_a_mapped_array_has_the_places_and_rows_of_the_whole(tmp_pat
     grid = open_grid(tmp_path / "z.npy", spacing=(2.0, 3.0), window=WINDOW)
     samples = grid.samples_of_rows(model.source_index)
     assert isinstance(grid.heights, np.memmap)
-    assert np.array_equal(grid.file_points(samples), model.file_points)
-    assert np.array_equal(grid.source_rows(samples), model.source_index)
+    assert np.array_equal(grid.file_points[samples], model.file_points)
+    assert np.array_equal(grid.source_index[samples], model.source_index)
     with pytest.raises(ModelError, match="does not lie within"):
         open_grid(tmp_path / "z.npy", window=(0, 0, 5, 5000))
 
@@ -132,12 +131,16 @@ def test_a_raster_becomes_a_front_in_its_own_coordinates_and_any_mesh_is_picked(
     assert b"comment crs EPSG:25832" in (out / "chosen.ply").read_bytes()[:400]
     assert find_cracks(chosen.points, chosen.faces) == 0
     problem = MeshProblem(path, window=WINDOW)
-    with np.load(out / "nested.npz") as nested:
-        front = read_tiled_front(out, open_grid(path, window=WINDOW))
-        row = len(front) - 1 - record["chosen"]
-        kept = np.isin(problem.model.source_index, nested["rows"][nested["level"] > front.slope[row]])
+    front, row = Front.load(out), record["chosen"]
+    with np.load(out / "front.npz") as nested:
+        first = nested["moved_start"][row]
+        rows = nested["moved"][first : nested["moved_start"][row + 1]]
+        if not len(rows):
+            rows = nested["rows"][nested["level"] > nested["slope"][row]]
+    kept = np.isin(problem.model.source_index, rows)
     simplified = problem.simplify(kept)
-    assert np.array_equal(chosen.points, problem.model.file_points[kept])
+    order = np.argsort(problem.model.source_index)
+    assert np.array_equal(chosen.points, problem.model.file_points[order][kept[order]])
     assert front.quality[row].error == pytest.approx(simplified.quality.error, rel=1e-9)
     assert front.quality[row].triangles == len(chosen.faces) == simplified.quality.triangles
     assert main(["pick", str(out), "--triangles", "300", "-o", str(tmp_path / "again.ply"), "--quiet"]) == 0

@@ -17,13 +17,11 @@ from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.cli.requests import Search, request_of
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError, UsageError
-from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import read_source, write_mesh
-from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.tiles.grid import open_grid
-from meshsimp_pymoo.tiles.output import read_tiled_front
 from meshsimp_pymoo.tiles.thin import thin_tile
 
 
@@ -44,7 +42,7 @@ def out(path, tmp_path_factory):
 
 
 def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
-    expected = {"front.csv", "front.png", "nested.npz", "meshes", "chosen.ply", "run.json"}
+    expected = {"front.csv", "front.png", "report.html", "front.npz", "meshes", "chosen.ply", "run.json"}
     assert {entry.name for entry in out.iterdir()} == expected
     assert (out / "front.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((out / "meshes").iterdir())) == 4
@@ -52,7 +50,7 @@ def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
     assert 690 <= len(chosen.faces) <= 700
     assert find_cracks(chosen.points, chosen.faces) == 0
     record = json.loads((out / "run.json").read_text())
-    assert set(record["settings"]) == {"triangles", "format", "meshes", "tile", "most"}  # nothing of a search
+    assert set(record["settings"]) == {"triangles", "format", "meshes", "tile", "pieces"}  # nothing of a search
     assert record["model"]["vertices"] == np.load(path).size
 
 
@@ -68,16 +66,16 @@ def test_an_independent_referee_agrees_with_the_front_of_a_mesh_whose_vertices_a
 
 
 def test_the_meshes_are_those_of_the_untiled_problem(out, path):
-    grid = open_grid(path, spacing=30.0)
-    front = read_tiled_front(out, grid)
+    front = Front.load(out)
     problem = MeshProblem(path, spacing=30.0)
-    record = json.loads((out / "run.json").read_text())
-    row = len(front) - 1 - record["chosen"]
-    kept = np.isin(problem.model.source_index, front.kept(row))
+    row = front.run["chosen"]
+    kept = front.kept[row][problem.model.source_index]
     whole = problem.simplify(kept)
     assert whole.quality.error == pytest.approx(front.quality[row].error, rel=1e-9)
     chosen = read_source(out / "chosen.ply")
-    assert np.array_equal(chosen.points, problem.model.file_points[kept])
+    assert np.array_equal(
+        chosen.points, problem.model.file_points[np.argsort(problem.model.source_index)][front.kept[row]]
+    )
     assert len(chosen.faces) == whole.quality.triangles
 
 
@@ -92,13 +90,13 @@ def test_a_mesh_of_any_size_is_picked_from_the_folder(out, path, tmp_path, capsy
     assert "nothing is written" in capsys.readouterr().err
     np.save(tmp_path / "other.npy", np.load(path) + 1)
     assert main(["pick", str(out), "--knee", "--model", str(tmp_path / "other.npy")]) == 2
-    assert "is not a front of" in capsys.readouterr().err
+    assert "is the front of another model than" in capsys.readouterr().err
 
 
 def test_two_processes_write_the_same_bytes(out, path, tmp_path):
     call = ["simplify", str(path), "--tile", "64", "--triangles", "700", "--meshes", "4", "--spacing", "30", "--quiet"]
     assert main([*call, "-o", str(tmp_path / "other"), "--jobs", "2", "--threads", "1"]) == 0
-    for file in ("front.csv", "nested.npz", "chosen.ply"):
+    for file in ("front.csv", "front.npz", "chosen.ply"):
         assert (tmp_path / "other" / file).read_bytes() == (out / file).read_bytes(), file
 
 
@@ -199,7 +197,7 @@ def test_killed_and_started_again_it_goes_on_and_ends_with_the_same_bytes(out, p
     if not (target / "front.csv").exists():
         assert len(list((target / "tiles").glob("*.npz"))) >= 3
         assert main(again(path, target)) == 0
-    for file in ("front.csv", "nested.npz", "chosen.ply"):
+    for file in ("front.csv", "front.npz", "chosen.ply"):
         assert (target / file).read_bytes() == (out / file).read_bytes(), file
     assert not (target / "tiles").exists()
 
@@ -235,14 +233,14 @@ def test_unfinished_tiles_of_other_settings_are_named_and_can_be_overwritten(pat
 
 
 def test_a_front_of_another_grid_is_not_read(out, path):
-    with pytest.raises(ResultError, match="is not a front of"):
-        read_tiled_front(out, open_grid(open_model(path, Options(spacing=(30.0, 31.0)))))
-    (out / "nested.npz").rename(out / "gone.npz")
+    with pytest.raises(ResultError, match="is the front of another model"):
+        Front.load(out, model=open_grid(path, spacing=(30.0, 31.0)))
+    (out / "front.npz").rename(out / "gone.npz")
     try:
-        with pytest.raises(ResultError, match=r"nested\.npz: cannot be read"):
-            read_tiled_front(out, open_grid(path, spacing=30.0))
+        with pytest.raises(ResultError, match=r"front\.npz: cannot be read"):
+            Front.load(out)
     finally:
-        (out / "gone.npz").rename(out / "nested.npz")
+        (out / "gone.npz").rename(out / "front.npz")
 
 
 @pytest.mark.parametrize(
@@ -251,7 +249,7 @@ def test_a_front_of_another_grid_is_not_read(out, path):
         ({"model": {"hash": "0", "file": None}}, "run.json: model.name is not what a front's record holds"),
         ({"model": {"name": "relief.npy", "hash": "0", "file": 3}}, "run.json: model.file is not"),
         ({"solutions": 3}, "run.json: is not the record of this front of"),
-        ({"options": {"spacing": "wide"}}, "run.json: cannot be read (spacing is 'wide': expected a number"),
+        ({"options": {"spacing": "wide"}}, "its record cannot be used: spacing is 'wide': expected a number"),
         ({"options": [1]}, "run.json: options is not"),
     ],
 )

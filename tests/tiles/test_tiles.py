@@ -12,17 +12,16 @@ from hypothesis import strategies as st
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.opening import count_samples, open_grid, open_model
+from meshsimp_pymoo.search.coarse import SEARCHED, CoarseGrid, move, slope_of
 from meshsimp_pymoo.search.greedy import thinning
 from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.tiles.coarse import SEARCHED, CoarseGrid, move
+from meshsimp_pymoo.surface.weld import measure, pieces, weld
 from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_front
 from meshsimp_pymoo.tiles.front import settings as call_settings
-from meshsimp_pymoo.tiles.grid import count_samples, open_grid
 from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
-from meshsimp_pymoo.tiles.weld import measure, pieces, weld
 from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))
@@ -33,13 +32,13 @@ SMALL_GRID = open_grid(SMALL)
 
 
 def subset(grid, share, seed):
-    kept = np.random.default_rng(seed).random(grid.n_samples) < share
+    kept = np.random.default_rng(seed).random(grid.n_vertices) < share
     kept[grid.corners] = True
     return np.flatnonzero(kept)
 
 
 def as_chromosome(grid, samples):
-    kept = np.zeros(grid.n_samples, bool)
+    kept = np.zeros(grid.n_vertices, bool)
     kept[grid.row_of[samples]] = True
     return kept
 
@@ -60,7 +59,7 @@ def test_a_grid_has_its_samples_where_the_model_of_the_same_heights_has_them(tmp
     model = open_model(tmp_path / "z.npy", Options(spacing=(0.1, 0.7)))
     number = model.source_index
     assert np.array_equal(grid.xy_at(number), model.xy)
-    assert np.array_equal(grid.file_points(number), model.file_points)
+    assert np.array_equal(grid.file_points[number], model.file_points)
     again = open_grid(model)
     assert np.array_equal(again.row_of[number], np.arange(len(number)))
     assert np.array_equal(again.xy_at(number), model.xy)
@@ -152,11 +151,11 @@ def test_the_number_of_threads_does_not_change_a_bit_of_the_error():
 
 def test_pieces_are_the_mesh_and_meet_without_cracks():
     mesh = weld(GRID, subset(GRID, 0.05, 2))
-    parts = list(pieces(GRID, mesh, 40))
-    assert len({part[:2] for part in parts}) == len(parts) >= 9
-    faces = np.concatenate([samples[faces] for _, _, samples, faces in parts])
+    parts = list(pieces(GRID, mesh.samples[mesh.faces], 40))
+    assert len({name for name, _ in parts}) == len(parts) >= 9
+    faces = np.concatenate([faces for _, faces in parts])
     assert sorted(map(tuple, faces.tolist())) == sorted(map(tuple, mesh.samples[mesh.faces].tolist()))
-    assert find_cracks(GRID.xy_at(np.arange(GRID.n_samples)), faces) == 0
+    assert find_cracks(GRID.xy_at(np.arange(GRID.n_vertices)), faces) == 0
 
 
 def test_a_crack_and_a_vertex_on_an_edge_are_found():
@@ -213,7 +212,7 @@ def test_all_samples_as_sites_are_the_same_tile_as_no_sites_given():
     work = _Work(GRID, 64, Serial(), Memory(), lambda *_: None)
     box = (20, 60, 30, 80)
     some = thin_tile(work.task(box, 1, np.inf, None))
-    same = thin_tile(work.task(box, 1, np.inf, np.arange(GRID.n_samples)))
+    same = thin_tile(work.task(box, 1, np.inf, np.arange(GRID.n_vertices)))
     assert np.array_equal(some[0], same[0])
     assert np.array_equal(some[1], same[1])
 
@@ -236,18 +235,23 @@ def test_a_hull_cut_at_a_slope_is_the_best_point_of_the_front_for_it(steps, slop
 # --------------------------------------------------------------------------------------------------------- the front
 
 
+def kept_samples(front, row):
+    return np.flatnonzero(front.kept[row])
+
+
 def test_every_solution_but_the_smallest_is_a_subset_of_the_finer_one_and_all_have_the_error_that_is_said(front):
     triangles = front.F[:, 1]
-    assert (np.diff(triangles) < 0).all()
-    assert (np.diff(front.F[:, 0]) > 0).all()
-    assert triangles[0] > 0.08 * GRID.n_triangles
-    assert triangles[-1] == 2
-    assert [moved is not None for moved in front.moved] == ((triangles <= SEARCHED) & (triangles > 2)).tolist()
-    for row in range(1, len(front)):
-        if front.moved[row] is None:
-            assert np.isin(front.kept(row), front.kept(row - 1)).all() or triangles[row] == 2
+    assert (np.diff(triangles) > 0).all()
+    assert (np.diff(front.F[:, 0]) < 0).all()
+    assert triangles[-1] > 0.08 * len(GRID.faces)
+    assert triangles[0] == 2
+    moved = [new is not None for new in front._kept.moved]
+    assert moved == ((triangles <= SEARCHED) & (triangles > 2)).tolist()
+    for row in range(len(front) - 1):
+        if not moved[row]:
+            assert np.isin(kept_samples(front, row), kept_samples(front, row + 1)).all() or triangles[row] == 2
     rows = range(0, len(front), 5)
-    table = SURFACE.evaluate(np.array([as_chromosome(GRID, front.kept(row)) for row in rows]))
+    table = SURFACE.evaluate(np.array([as_chromosome(GRID, kept_samples(front, row)) for row in rows]))
     for row, found in zip(rows, table, strict=True):
         assert found[0] == pytest.approx(front.quality[row].error, rel=1e-9)
         assert found[1] == front.quality[row].triangles
@@ -266,23 +270,26 @@ def test_tiles_lose_at_most_three_percent_against_thinning_in_one_piece():
 
 @pytest.mark.parametrize("wanted", [2, 3, 100, 275, 1234, 2900])
 def test_any_size_can_be_taken_out_of_the_front(front, wanted):
-    more, row = front.with_triangles(wanted)
-    assert 0.9 * wanted - 2 <= more.quality[row].triangles <= wanted
-    assert (np.diff(more.F[:, 1]) < 0).all()
-    thinned = measure(GRID, weld(GRID, front.samples[front.level > more.slope[row]]))
-    assert more.quality[row].error <= thinned.error
-    again, same_row = more.with_triangles(wanted)
-    assert (again is more, same_row) == (True, row)
-    kept = as_chromosome(GRID, more.kept(row))
-    assert SURFACE.evaluate(kept[None])[0, 0] == pytest.approx(more.quality[row].error, rel=1e-9)
+    found = front.best(triangles=wanted)
+    assert 0.9 * wanted - 2 <= found.triangles <= wanted
+    assert (np.diff(found.front.F[:, 1]) > 0).all()
+    nested = found.front._kept
+    thinned = nested.rows[nested.level > nested.slope[found.solution]]
+    assert found.error <= measure(GRID, weld(GRID, GRID.samples_of_rows(thinned))).error
+    again = found.front.best(triangles=wanted)
+    assert again.front is found.front
+    assert again.solution == found.solution
+    kept = as_chromosome(GRID, np.flatnonzero(found.kept))
+    assert SURFACE.evaluate(kept[None])[0, 0] == pytest.approx(found.error, rel=1e-9)
+    assert len(found.mesh.faces) == found.triangles
 
 
 def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size(front):
     coarse = CoarseGrid(GRID)
     assert len(coarse.samples) <= 1 << 13
     assert np.isin(GRID.corners, coarse.samples).all()
-    row = int(np.argmax(front.F[:, 1] <= 900))
-    task = coarse.task(front.kept(row), 200)
+    row = front.best(triangles=900).solution
+    task = coarse.task(kept_samples(front, row), 200)
     rows = move(task)
     assert np.array_equal(move(task), rows)
     moved = weld(GRID, coarse.samples[rows])
@@ -292,24 +299,25 @@ def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size
 
 
 def test_a_grid_that_is_small_is_looked_at_in_whole_and_a_narrow_one_ends():
-    assert np.array_equal(CoarseGrid(SMALL_GRID).samples, np.arange(SMALL_GRID.n_samples))
+    assert np.array_equal(CoarseGrid(SMALL_GRID).samples, np.arange(SMALL_GRID.n_vertices))
     narrow = open_grid(np.random.default_rng(1).normal(size=(2, 30_000)))
     assert len(CoarseGrid(narrow).samples) <= 1 << 13
 
 
 def test_a_front_that_begins_with_small_meshes_is_thinned_from_finer_ones(front):
     small = tiled_front(GRID, tile=64, most=300)
-    assert 200 < small.quality[0].triangles <= 340
-    assert small.quality[0].triangles == pytest.approx(2 * len(small.samples), rel=0.2)
+    assert 200 < small[-1].triangles <= 340
+    assert small[-1].triangles == pytest.approx(2 * len(small._kept.rows), rel=0.2)
     whole = thinning(SURFACE)
-    assert small.quality[0].error < 1.03 * np.interp(small.quality[0].triangles, whole.triangles, whole.error)
+    assert small[-1].error < 1.03 * np.interp(small[-1].triangles, whole.triangles, whole.error)
 
 
-def test_a_mesh_of_one_triangle_and_a_finer_one_than_the_finest_are_refused(front):
+def test_a_mesh_of_one_triangle_is_refused_and_none_is_finer_than_the_finest(front):
+    with pytest.raises(LookupError, match="no solution of jacksboro:3 has at most 1 triangles; the least is 2"):
+        front.best(triangles=1)
     with pytest.raises(ValueError, match="at least 2 triangles, not 1"):
-        front.slope_of(1)
-    with pytest.raises(ValueError, match="below that of the finest"):
-        front.with_slope(front.slope[0] / 2)
+        slope_of(front.surface, front._kept, 1)
+    assert front.best(triangles=10**6) == front[-1]
 
 
 def test_a_plane_is_two_triangles_and_a_roof_four():
@@ -317,14 +325,14 @@ def test_a_plane_is_two_triangles_and_a_roof_four():
     plane = tiled_front(open_grid(x[:, None] + 2 * x), tile=64)
     assert [(round(q.error, 6), q.triangles) for q in plane.quality] == [(0.0, 2)]
     roof = tiled_front(open_grid(np.tile(-np.abs(np.arange(129.0) - 64), (129, 1))), tile=64)
-    assert (roof.quality[0].triangles, round(roof.quality[0].error, 6)) == (4, 0.0)
+    assert (roof[-1].triangles, round(roof[-1].error, 6)) == (4, 0.0)
 
 
 def test_cliffs_end(front):
     z = np.random.default_rng(1).integers(0, 2, (150, 150)) * 1e9
     blocks = tiled_front(open_grid(np.kron(z[:10, :10], np.ones((15, 15)))), tile=64)
-    assert blocks.quality[-1].triangles == 2
-    assert (np.diff(blocks.F[:, 0]) > 0).all()
+    assert blocks[0].triangles == 2
+    assert (np.diff(blocks.F[:, 0]) < 0).all()
 
 
 def test_tiles_cover_the_axis_and_their_cuts_are_apart():
@@ -366,14 +374,8 @@ class Backwards:
 
 
 def same(a, b):
-    return (
-        np.array_equal(a.samples, b.samples)
-        and np.array_equal(a.level, b.level)
-        and np.array_equal(a.slope, b.slope)
-        and a.quality == b.quality
-        and len(a.moved) == len(b.moved)
-        and all(np.array_equal(x, y) for x, y in zip(a.moved, b.moved, strict=True))
-    )
+    one, other = a._kept.arrays(), b._kept.arrays()
+    return a.quality == b.quality and all(np.array_equal(one[name], other[name]) for name in one)
 
 
 def test_the_front_depends_neither_on_the_order_nor_on_the_engine(front):

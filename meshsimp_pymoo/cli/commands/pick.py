@@ -52,16 +52,12 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.cli.arguments import wishes_of
     from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.requests import Wish
-    from meshsimp_pymoo.cli.tiling import pick_tiled
     from meshsimp_pymoo.files import claim_file
     from meshsimp_pymoo.formats.table import written_suffixes
-    from meshsimp_pymoo.tiles.output import is_tiled
 
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
     with said_when_compiling(args.quiet):
-        if is_tiled(args.front):
-            return pick_tiled(args.front, args.model, wish, args.solution, path, **shown)
         return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
 
 
@@ -94,10 +90,12 @@ def _pick(
         return TARGET_MISSED
     if path is not None:
         solution.save(path, overwrite=overwrite)
+    stored = solution.front is front  # else it was made between two that are
     if as_json:
-        mesh = None if path is None else str(path)
-        tell(json.dumps({"mesh": mesh, "solution": solution.solution, **asdict(solution.quality)}, indent=2))
+        mesh, number = (None if path is None else str(path)), solution.solution if stored else None
+        tell(json.dumps({"mesh": mesh, "solution": number, **asdict(solution.quality)}, indent=2))
     elif not quiet:
-        tell(f"solution {solution.solution} of {folder}: {described(solution.quality, front.unit)}")
+        which = f"solution {solution.solution}" if stored else "between two solutions"
+        tell(f"{which} of {folder}: {described(solution.quality, front.unit)}")
         tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK

@@ -33,14 +33,12 @@ def run(args: argparse.Namespace) -> int:
 
     from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.reporting import report_on_experiment, report_on_front
-    from meshsimp_pymoo.cli.tiling import report_on_tiled
     from meshsimp_pymoo.errors import UsageError
-    from meshsimp_pymoo.tiles.output import is_tiled
 
     out, shown = Path(args.output), {"quiet": args.quiet, "as_json": args.json}
     if (out / "front.csv").is_file():
         with said_when_compiling(args.quiet):
-            return (report_on_tiled if is_tiled(out) else report_on_front)(out, args.model, **shown)
+            return report_on_front(out, args.model, **shown)
     if args.model is not None:
         raise UsageError(f"--model is for the page of a front; {out} holds none")
     return report_on_experiment(out, {}, **shown)

@@ -76,20 +76,12 @@ def _scored(
     from meshsimp_pymoo.cli.terminal import described, in_unit
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
-    from meshsimp_pymoo.front import Front
     from meshsimp_pymoo.opening import open_model, open_source
     from meshsimp_pymoo.surface.height import HeightSurface
     from meshsimp_pymoo.surface.units import known_units, length_unit
 
-    surface: Any = HeightSurface(open_model(model, options), rules)
-    front = None
-    if folder is not None:
-        front = Front.load(folder, model=surface.model)
-        surface = front.problem.surface  # with the weights of the front
-        if outside not in (None, surface.rules.outside):
-            raise UsageError(
-                f"{folder}: its errors are those of --outside {surface.rules.outside}; leave --outside out to compare"
-            )
+    front = None if folder is None else _front_of(folder, model, options, rules, outside)
+    surface: Any = HeightSurface(open_model(model, options), rules) if front is None else front.surface
     # judged as it is, in the frame of the model's file, which is measured
     source = open_source(other, Options(repair="none", scale="none"))
     try:
@@ -117,6 +109,28 @@ def _scored(
         summary["picture"] = str(path)
         lines.append(f"written: {path}")
     return summary, lines
+
+
+def _front_of(folder: str, model: str, options: Options, rules: Rules, outside: str | None) -> Front:
+    """Return a stored front of a model, read and measured as when it was made; what is said otherwise is refused."""
+    from meshsimp_pymoo.errors import UsageError
+    from meshsimp_pymoo.front import Front
+    from meshsimp_pymoo.settings import plain
+
+    front = Front.load(folder)
+    usual = plain(type(options)()) | plain(type(rules)())
+    said = {
+        name: value for name, value in (plain(options) | {"weights": rules.weights}).items() if value != usual[name]
+    }
+    if outside is not None:
+        said["outside"] = outside
+    made = usual | front.run.get("options", {}) | front.run.get("rules", {})
+    for name, value in said.items():
+        if value != made[name]:
+            option = f"--{name.replace('_', '-')}"
+            how = f"without {option}" if made[name] is None else f"with {option} {made[name]}"
+            raise UsageError(f"{folder}: was made {how}, and is compared as it was made; leave {option} out")
+    return Front.load(folder, model=model)
 
 
 def _draw(surface: Any, scored: Any, title: str, path: Path) -> None:

@@ -19,6 +19,7 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate_once
+from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -30,7 +31,6 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     as_quality,
 )
-from meshsimp_pymoo.tiles.grid import HeightGrid
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,12 +97,19 @@ def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
 
 
 def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Quality:
-    """Measure a mesh over all samples of the grid.
+    """Measure a mesh over all samples of the grid."""
+    row, _ = measured(grid, mesh, np.empty(0, np.int64), n_threads=n_threads)
+    return as_quality(row, grid.n_vertices)
+
+
+def measured(grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int = 1) -> tuple[FloatArray, FloatArray]:
+    """Return the numbers (6,) of a mesh over all samples of the grid, and its deviation at some, numbered ascending.
 
     The sums are taken row by row and then over the rows, so they do not depend on the number of threads.
     """
-    n_rows = grid.shape[0]
+    n_rows, n_columns = grid.shape
     table = np.zeros((n_rows, 3))
+    deviation = np.empty(len(at))
     flat = np.ascontiguousarray(mesh.xy).ravel()
     bounds = np.linspace(0, n_rows, n_threads + 1).astype(int)
 
@@ -110,9 +117,12 @@ def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Qualit
         t = 0
         for row, band in grid.bands(first=bounds[part], end=bounds[part + 1]):
             rows = slice(row, row + len(band))
+            low, high = np.searchsorted(at, [row * n_columns, (row + len(band)) * n_columns])
+            sizes = np.empty(band.shape if high > low else (0, 0))
             t = _measure_rows(
-                grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table[rows]
+                grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table[rows], sizes
             )
+            deviation[low:high] = sizes.ravel()[at[low:high] - row * n_columns]
 
     if n_threads == 1:
         do(0)
@@ -122,10 +132,10 @@ def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Qualit
     row = np.full(REGIONS, np.nan)
     row[ERROR], row[SQUARES], row[MAXIMUM] = table[:, 0].sum(), table[:, 1].sum(), table[:, 2].max()
     row[TRIANGLES], row[VERTICES], row[UNCOVERED] = mesh.n_triangles, len(mesh.samples), 0
-    return as_quality(row, grid.n_samples)
+    return row, deviation
 
 
-def pieces(grid: HeightGrid, mesh: WeldedMesh, size: int) -> Iterator[tuple[int, int, IntArray, IntArray]]:
+def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, IntArray]]:
     """Cut a mesh into tiles along its own edges: every triangle goes to the tile that its centroid lies in.
 
     Neighbouring pieces share the vertices and edges between them, so they meet without cracks and without vertices in
@@ -135,27 +145,24 @@ def pieces(grid: HeightGrid, mesh: WeldedMesh, size: int) -> Iterator[tuple[int,
     ----------
     grid : HeightGrid
         The grid.
-    mesh : WeldedMesh
-        The mesh.
+    faces : (M, 3) int array
+        The mesh, its corners by sample.
     size : int
         Samples along one side of a tile.
 
     Yields
     ------
-    (int, int, (v,) int array, (m, 3) int array)
-        Row and column of the tile, from the north-west; its samples; its triangles as rows of those. Tiles without a
-        triangle are left out.
+    (str, (m, 3) int array)
+        Row and column of the tile, from the north-west, as a name; its triangles. Tiles without a triangle are left
+        out.
     """
-    faces = mesh.faces
-    row, column = np.divmod(mesh.samples, grid.shape[1])
-    tile_row = row[faces].sum(axis=1) // (3 * size)
-    tile_column = column[faces].sum(axis=1) // (3 * size)
+    row, column = np.divmod(faces, grid.shape[1])
+    tile_row, tile_column = row.sum(axis=1) // (3 * size), column.sum(axis=1) // (3 * size)
     number = tile_row * (grid.shape[1] // size + 1) + tile_column
     order = np.argsort(number, kind="stable")
     starts = np.flatnonzero(np.r_[True, np.diff(number[order]) > 0])
     for group in np.split(order, starts[1:]):
-        used, compact = np.unique(faces[group], return_inverse=True)
-        yield int(tile_row[group[0]]), int(tile_column[group[0]]), mesh.samples[used], compact.reshape(-1, 3)
+        yield f"{tile_row[group[0]]:03}_{tile_column[group[0]]:03}", faces[group]
 
 
 @entry
@@ -169,13 +176,17 @@ def _measure_rows(
     start: int,
     exact_area: float,
     table: np.ndarray,
+    sizes: np.ndarray,
 ) -> int:
     """Fill sum, sum of squares and maximum of the deviations of each row; return a triangle near the last row's begin.
+
+    If there is room for them in ``sizes``, all deviations too.
 
     In each row the surface is linear along x within a triangle, but it is worked out at every sample from the
     triangle's corners, as everywhere.
     """
     begin = start
+    wanted = len(sizes) > 0
     for r in range(len(y)):
         t = begin
         py = y[r]
@@ -200,6 +211,8 @@ def _measure_rows(
             wb = cx * ay - cy * ax
             wc = ax * by - ay * bx
             d = abs((wa * z[i] + wb * z[j] + wc * z[k]) / (wa + wb + wc) - heights[r, c])
+            if wanted:
+                sizes[r, c] = d
             total += d
             squares += d * d
             maximum = max(maximum, d)

@@ -7,6 +7,7 @@ thinned vertices, on every second, fourth, ... row and column of samples. What t
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,14 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.local_search import relocate
+from meshsimp_pymoo.surface.grid import HeightGrid
+from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import Quality
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.tiles.grid import HeightGrid
+from meshsimp_pymoo.surface.weld import measure, weld
 
 #: The most triangles of a mesh whose vertices are moved.
 SEARCHED = 300
@@ -97,6 +102,63 @@ def move(task: Coarse) -> IntArray:
         temperature=TEMPERATURE,
     )
     return np.sort(model.source_index[moved])
+
+
+def slope_of(surface: GridSurface, nested: Nested, triangles: int) -> float:
+    """Return the least slope at which a nested front's thinned mesh has at most so many triangles.
+
+    Raises
+    ------
+    ValueError
+        If it is less than 2, the least there is.
+    """
+    grid = surface.model
+    if triangles < 2:
+        raise ValueError(f"a mesh of {grid.name} has at least 2 triangles, not {triangles}")
+    order = np.argsort(-nested.level, kind="stable")
+    count = np.cumsum(grid.triangles_of(grid.samples_of_rows(nested.rows[order]))) - 2
+    level = nested.level[order]
+    # all samples of one level go together
+    last = np.flatnonzero(np.r_[level[1:] < level[:-1], True])
+    most = last[np.flatnonzero(count[last] <= triangles)[-1]]
+    return float(level[most + 1]) if most + 1 < len(level) else float(nested.slope[-1])
+
+
+def of_size(
+    surface: GridSurface, nested: Nested, slope: float, triangles: int, *, room: tuple[float, float]
+) -> tuple[IntArray | None, Quality]:
+    """Return the mesh of a nested front at a slope, its vertices moved if it is small and that is better.
+
+    Parameters
+    ----------
+    surface : GridSurface
+        The grid.
+    nested : Nested
+        The front.
+    slope : float
+        Of at most so many triangles; see :func:`slope_of`.
+    triangles : int
+        The most that the mesh may have.
+    room : (float, float)
+        The sizes of its neighbours in the front, between which that of a moved mesh has to lie.
+
+    Returns
+    -------
+    moved : (v,) int array or None
+        The rows of the file that it keeps, if they were moved.
+    quality : Quality
+        Measured over all samples.
+    """
+    grid, threads = surface.model, os.cpu_count() or 1
+    kept = grid.samples_of_rows(nested.rows[nested.level > slope])
+    quality = measure(grid, weld(grid, kept), n_threads=threads)
+    if 2 < triangles <= SEARCHED:
+        coarse = CoarseGrid(grid)
+        samples = np.sort(coarse.samples[move(coarse.task(kept, triangles))])
+        found = measure(grid, weld(grid, samples), n_threads=threads)
+        if found.error < quality.error and room[0] < found.triangles < room[1]:
+            return grid.source_index[samples], found
+    return None, quality
 
 
 def strided(first: int, last: int, stride: int) -> IntArray:

@@ -1,0 +1,166 @@
+"""What a search hands over once its results are in place: pictures, a summary and an exit code."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from meshsimp_pymoo.cli.requests import Output, Request
+from meshsimp_pymoo.cli.terminal import (
+    DRAWING,
+    INTERRUPTED,
+    OK,
+    TARGET_MISSED,
+    Stages,
+    answering,
+    described,
+    in_unit,
+    is_interrupted,
+    place_for_matplotlib,
+    say,
+    stop_if_interrupted,
+    tell,
+    tell_origin,
+    there,
+)
+from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.files import as_argument
+from meshsimp_pymoo.formats.table import format_to_write
+from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.search.checkpoint import difference
+from meshsimp_pymoo.storage import PICTURES, claim_output, read_front
+from meshsimp_pymoo.surface.surface import Surface
+from meshsimp_pymoo.surface.units import known_units, reference_system
+
+# What of a record the summary says again.
+SAID = ("evaluations", "seconds", "compile_seconds", "seed", "mesh_origin")
+
+
+def lacks_pictures(output: Output, what: Mapping[str, Any]) -> bool:
+    """Tell whether the folder holds the results of this very search, but not all pictures: they were not finished."""
+    folder = output.folder
+    wanted = PICTURES if output.page else PICTURES[:1]
+    if output.overwrite or not (folder / "front.csv").is_file() or all((folder / name).exists() for name in wanted):
+        return False
+    try:
+        run = read_front(folder).run
+    except ResultError:
+        return False
+    return not difference({name: run.get(name) for name in what}, what)
+
+
+def hand_over_stored(request: Request, surface: Surface, shown: Stages) -> int:
+    """Hand over what a search came back with whose results are in place, if they are of this surface."""
+    folder = request.output.folder
+    try:
+        Front.load(folder, model=surface)
+    except ResultError:
+        claim_output(folder)  # of another model, or by other rules: it is refused
+        raise
+    if not request.output.quiet:
+        say(f"{folder} holds the results of this search; making the pictures that are missing")
+    return hand_over(request, surface, shown)
+
+
+def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
+    """Draw what is in place, as far as that is missing, say what there is, and return the exit code."""
+    output, folder = request.output, request.output.folder
+    front = Front.load(folder, model=surface)
+    undrawn = is_interrupted()
+    with answering(*DRAWING):
+        try:
+            stop_if_interrupted()
+            if not undrawn:
+                with shown.stage("writing", "drawing"), place_for_matplotlib(folder):
+                    front.draw(page=output.page, missing=True)
+        except KeyboardInterrupt:
+            undrawn = True
+    shown.close()
+    _summarise(front, output)
+    if front.run.get("interrupted"):
+        say(f"interrupted after {front.run['generations']} generations; {folder} holds the front so far")
+    if undrawn:
+        say(f"interrupted while it was drawn; {folder} holds the results: meshsimp report {as_argument(folder)}")
+    if front.run.get("interrupted") or undrawn:
+        return INTERRUPTED
+    missed = "" if front.run["chosen"] is not None else request.wish.of(front)[1]
+    if missed:
+        longer = "; search longer (--generations, --time)" if "generations" in front.run else ""
+        say(f"{folder} holds a front, but no chosen mesh: {missed}{longer}")
+        return TARGET_MISSED
+    return OK
+
+
+def _summarise(front: Front, output: Output) -> None:
+    if output.json:
+        tell(json.dumps(_summary(front, output), indent=2))
+    elif not output.quiet:
+        _tell(front, output)
+
+
+def _chosen_path(output: Output) -> Path:
+    """Return where the chosen mesh is: a file, or a folder of its pieces."""
+    pieces = output.folder / "chosen"
+    return pieces if pieces.is_dir() else pieces.with_suffix(format_to_write(output.format).suffix)
+
+
+def _summary(front: Front, output: Output) -> dict[str, Any]:
+    model, chosen = front.model, front.run["chosen"]
+    return {
+        "model": {
+            "name": model.name,
+            "vertices": model.n_vertices,
+            "triangles": len(model.faces),
+            "hash": model.hash,
+            **known_units(model.georeference),
+        },
+        "front": str(output.folder / "front.csv"),
+        "solutions": len(front),
+        "smallest": asdict(front.quality[0]),
+        "most_accurate": asdict(front.quality[-1]),
+        "chosen": None
+        if chosen is None
+        else {"mesh": str(_chosen_path(output)), "solution": chosen, **asdict(front.quality[chosen])},
+    } | {name: front.run[name] for name in SAID if name in front.run}
+
+
+def _tell(front: Front, output: Output) -> None:
+    model, run, folder = front.model, front.run, output.folder
+    few, many, chosen = front.quality[0], front.quality[-1], run["chosen"]
+    unit, system = front.unit, reference_system(model.georeference)
+    whole = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
+    if "rows" in run["model"]:
+        whole = f"{run['model']['rows']:,} x {run['model']['columns']:,} samples, thinned tile by tile"
+    tell(f"{Path(model.name).name}: {whole}" + f"; {system}" * bool(system))
+    effort = [f"{run['seconds']:.1f} s"]
+    if "evaluations" in run:
+        effort = [f"{run['evaluations']:,} evaluations", *effort, f"seed {run['seed']}"]
+    tell(
+        f"front: {len(front)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
+        f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} ({', '.join(effort)})"
+    )
+    if chosen is not None:
+        path = _chosen_path(output)
+        tell(f"chosen: {path} (solution {chosen}): {described(front.quality[chosen], unit)}")
+    suffix = format_to_write(output.format).suffix
+    written, refitted = (len(list(folder.glob(f"{place}/*{suffix}"))) for place in ("meshes", "refitted"))
+    files = [there(folder, "front.csv", *PICTURES)]
+    files += [f"{n} in {place}" for n, place in ((written, "meshes"), (refitted, "refitted")) if n]
+    tell(f"written: {folder}: {', '.join(files)}")
+    if (compiled := run["compile_seconds"]) >= 1.0:
+        tell(f"compiled once for this machine: {compiled:.0f} s, not counted as search")
+    if "mesh_origin" in run:
+        tell_origin(run["mesh_origin"])
+    if chosen is None:
+        size = _round_size(front)
+        tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")
+
+
+def _round_size(front: Front) -> int:
+    """Return a size worth an example: that of the knee, rounded up."""
+    triangles: int = front.knee().triangles
+    step = 10 ** max(len(str(triangles)) - 2, 0)
+    return -(-triangles // step) * step

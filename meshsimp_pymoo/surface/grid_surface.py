@@ -1,0 +1,203 @@
+"""The surface of a height grid that is read by windows: a subset means what it means on a height surface.
+
+Its arrays of N rows are made when they are asked for; what pictures, pages and files take of a mesh is bounded by the
+mesh. All that asks for a whole array (``points``, ``faces`` and ``places`` by :func:`numpy.asarray`, ``score``) takes
+as much memory as a model in one piece.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import AbstractContextManager
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, Rows
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.source.heights import MESH_SAMPLE_BYTES, grid_mesh
+from meshsimp_pymoo.memory import check_free
+from meshsimp_pymoo.plane.faces import canonical_faces, one_rings
+from meshsimp_pymoo.surface.grid import HeightGrid
+from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import REGIONS, as_quality
+from meshsimp_pymoo.surface.model import OpenModel, build_model
+from meshsimp_pymoo.surface.rules import DEFAULT, Rules
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View
+from meshsimp_pymoo.surface.weld import measured, weld
+
+#: Rules that may be anything: a grid without gaps fills its hull. The others are as they are where nothing is said.
+FREE_RULES = ("footprint", "outside")
+
+
+class GridSurface:
+    """A height grid and the rules for it; see `surface.Surface` for what its attributes are.
+
+    Parameters
+    ----------
+    grid : HeightGrid
+        The grid of N samples.
+    rules : Rules
+        What counts.
+
+    Raises
+    ------
+    ModelError
+        If the rules name what a grid read by windows does not know: another measure, weights, pins.
+    """
+
+    def __init__(self, grid: HeightGrid, rules: Rules = DEFAULT) -> None:
+        for name, value in vars(rules).items():
+            if name not in FREE_RULES and value != getattr(DEFAULT, name):
+                raise ModelError(f"{grid.name}: {name}={value!r} is not for a grid read by windows; leave it out")
+        self.model = grid
+        self.rules = rules
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of samples."""
+        return self.model.n_vertices
+
+    @property
+    def points(self) -> Any:
+        """The samples (N, 3) from a local origin [model units]."""
+        grid = self.model
+        if grid.model is not None:
+            row_of, points = grid.row_of, grid.model.points
+            return Rows(lambda samples: points[row_of[samples]], self.n_vertices)  # type: ignore[index]
+        return Rows(lambda samples: grid.file_points[samples] * self.view.scale - self.view.pivot, self.n_vertices)
+
+    @property
+    def faces(self) -> Any:
+        """The original triangles (T, 3)."""
+        return self.model.faces
+
+    @cached_property
+    def pinned(self) -> BoolArray:
+        """The four corners."""
+        pinned = np.zeros(self.n_vertices, bool)
+        pinned[self.model.corners] = True
+        return pinned
+
+    @property
+    def total_weight(self) -> float:
+        """All samples count alike."""
+        return float(self.n_vertices)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box in space [model units]."""
+        return float(np.linalg.norm(self.view.extent))
+
+    @cached_property
+    def neighbours(self) -> Csr:
+        """The one-rings of the original mesh."""
+        return one_rings(np.asarray(self.faces), self.n_vertices)
+
+    @property
+    def border(self) -> IntArray:
+        """The samples of the first and last rows and columns."""
+        rows, columns = self.model.shape
+        inside = np.zeros((rows, columns), bool)
+        inside[1:-1, 1:-1] = True
+        return np.flatnonzero(~inside)
+
+    @property
+    def places(self) -> Any:
+        """The samples (N, 2) in the unit square."""
+        return Rows(self.model.xy_at, self.n_vertices)
+
+    @cached_property
+    def view(self) -> View:
+        """The grid from above, a flat relief drawn higher."""
+        grid = self.model
+        if grid.model is not None:
+            model = grid.model
+            return View(np.ptp(model.points, axis=0), model.rotation, model.pivot, model.scale)
+        scale = np.array([*grid.scale, 1.0])
+        low, high = grid.file_box * scale
+        return View(high - low, np.eye(3), low, scale)
+
+    def selection(self, most: int) -> BoolArray:
+        """Return at most so many samples (N,), spread evenly, the corners among them."""
+        (rows, columns), stride = self.model.shape, 1
+        while (-(-(rows - 1) // stride) + 1) * (-(-(columns - 1) // stride) + 1) > most:
+            stride += 1
+        selected = np.zeros((rows, columns), bool)
+        at = [np.r_[0 : n - 1 : stride, n - 1] for n in (rows, columns)]
+        selected[np.ix_(*at)] = True
+        return selected.ravel()
+
+    def triangles(self, kept: BoolArray) -> IntArray:
+        """Return the triangles (M, 3) of one subset (N,)."""
+        mesh = weld(self.model, np.flatnonzero(self._checked(kept)))
+        return canonical_faces(mesh.samples[mesh.faces])
+
+    def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
+        """Return the table (P, 6) of numbers of subsets (P, N)."""
+        if regions:
+            raise ValueError(f"{self.model.name}: a grid read by windows has no errors of regions; leave regions out")
+        none = np.empty(0, np.int64)
+        found = [
+            measured(self.model, weld(self.model, np.flatnonzero(self._checked(row))), none, n_threads=threads)[0]
+            for row in np.atleast_2d(kept)
+        ]
+        return np.array(found).reshape(-1, REGIONS)
+
+    def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
+        """Return the mesh of one subset (N,), and its deviation at all samples or at those of ``rows``, ascending."""
+        mesh = weld(self.model, np.flatnonzero(self._checked(kept)))
+        at = np.arange(self.n_vertices) if rows is None else rows
+        numbers, deviation = measured(self.model, mesh, at, n_threads=os.cpu_count() or 1)
+        faces = canonical_faces(mesh.samples[mesh.faces])
+        return Simplified(faces, as_quality(numbers, self.total_weight), deviation, np.ones(len(at), bool))
+
+    def score(self, points: FloatArray, faces: IntArray) -> Scored:
+        """Measure any mesh in the frame of the file by the same error, with the grid as a model in one piece."""
+        model, row_of = self._whole
+        found = HeightSurface(model, self.rules).score(points, faces)
+        return Scored(found.quality, found.deviation[row_of], found.covered[row_of])
+
+    @cached_property
+    def _whole(self) -> tuple[OpenModel, IntArray]:
+        """The grid as a model in one piece, and the row of each sample in it."""
+        grid = self.model
+        if grid.model is not None and grid.row_of is not None:
+            return grid.model, grid.row_of
+        check_free(
+            self.n_vertices * MESH_SAMPLE_BYTES,
+            f"{grid.name}: {grid.shape[1]} x {grid.shape[0]} samples in one piece",
+            "measure against a part of it (--window)",
+        )
+        source = grid_mesh(
+            np.asarray(grid.heights[:, :]),
+            np.zeros(grid.shape, bool),
+            lambda i, j: (grid.file_x[j], grid.file_y[i]),
+            nodata=None,
+            name=grid.name,
+            corner=(0, 0),
+            file_columns=grid.shape[1],
+            georeference=grid.georeference,
+        )
+        model = build_model(source, up="z")
+        return model, np.argsort(model.source_index)
+
+    def refit(self, kept: BoolArray, *, until: float | None = None) -> Refitted:
+        """Refuse: the heights of a mesh are fitted with a model in one piece."""
+        raise ModelError(f"{self.model.name}: the heights of meshes of tiles are not fitted; simplify it in one piece")
+
+    def ground(self) -> None:
+        """Return that meshes are evaluated here, but not moved."""
+
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> AbstractContextManager[Any]:
+        """Refuse, as :meth:`ground` says."""
+        raise ModelError(f"{self.model.name}: a grid read by windows has no moves; open it in one piece")
+
+    def _checked(self, kept: BoolArray) -> BoolArray:
+        if kept.dtype != np.bool_ or kept.shape != (self.n_vertices,):
+            raise ValueError(
+                f"a subset of {self.model.name} is a bool array of shape ({self.n_vertices},), one entry a sample, not "
+                f"{kept.dtype} of {kept.shape}"
+            )
+        return kept
