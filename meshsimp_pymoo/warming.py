@@ -188,7 +188,7 @@ PARTS = (
         "tiles",
         (
             "plane.triangulation:triangulate_once", "tiles.thin:_hull_levels", "tiles.thin:_fix_foreign",
-            "tiles.weld:_measure_rows",
+            "surface.weld:_measure_rows",
         ),
         _tiles, 2.5, False,
     ),

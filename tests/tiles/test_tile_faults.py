@@ -261,7 +261,7 @@ def test_a_disk_that_is_full_or_read_only_is_named_and_what_was_finished_stays(
 
 @pytest.mark.parametrize(
     "name",
-    ["tiles.output.write_mesh", "tiles.output.write_csv", "tiles.output.write_npz", "files._put_in_place"],
+    ["storage.write_mesh", "storage.write_csv", "storage.write_npz", "files._put_in_place"],
 )
 def test_a_disk_that_is_full_when_the_result_is_written_leaves_all_tiles(
     path, whole, tmp_path, capsys, monkeypatch, name
@@ -273,7 +273,7 @@ def test_a_disk_that_is_full_when_the_result_is_written_leaves_all_tiles(
 
     monkeypatch.setattr(f"meshsimp_pymoo.{name}", full)
     assert main(command(path, out)) == 2
-    refused(capsys, str(out), "No space left on device", "the same call goes on")
+    refused(capsys, str(out), "No space left on device", "the same command goes on")
     monkeypatch.undo()
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
     before = pieces(out)

@@ -18,8 +18,8 @@ from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.opening import count_samples, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.surface import grid as grid_module
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.tiles import grid as grid_module
 
 rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402

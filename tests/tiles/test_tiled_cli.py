@@ -80,10 +80,13 @@ def test_the_meshes_are_those_of_the_untiled_problem(out, path):
 
 
 def test_a_mesh_of_any_size_is_picked_from_the_folder(out, path, tmp_path, capsys):
-    assert main(["pick", str(out), "--triangles", "333", "-o", str(tmp_path / "small.ply"), "--json"]) == 0
+    assert main(["pick", str(out), "--triangles", "555", "-o", str(tmp_path / "small.ply"), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     mesh = read_source(tmp_path / "small.ply")
-    assert 325 <= len(mesh.faces) == said["triangles"] <= 333
+    assert 545 <= len(mesh.faces) == said["triangles"] <= 555
+    assert said["solution"] is None
+    assert main(["pick", str(out), "--triangles", "555"]) == 0
+    assert capsys.readouterr().out.startswith("between two solutions of ")
     assert find_cracks(mesh.points, mesh.faces) == 0
     assert main(["pick", str(out), "--solution", "1", "-o", str(tmp_path / "one.obj")]) == 0
     assert main(["pick", str(out), "--max-error", "0", "-o", str(tmp_path / "none.ply")]) == 1
