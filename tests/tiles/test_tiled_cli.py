@@ -16,11 +16,12 @@ from meshsimp_pymoo.cli import tiling as tiled_command
 from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.cli.requests import Search, request_of
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ResultError, UsageError
+from meshsimp_pymoo.errors import ModelError, ResultError, UsageError
 from meshsimp_pymoo.formats.table import read_source, write_mesh
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.thin import thin_tile
 
@@ -94,6 +95,59 @@ def test_a_mesh_of_any_size_is_picked_from_the_folder(out, path, tmp_path, capsy
     np.save(tmp_path / "other.npy", np.load(path) + 1)
     assert main(["pick", str(out), "--knee", "--model", str(tmp_path / "other.npy")]) == 2
     assert "is the front of another model than" in capsys.readouterr().err
+
+
+def test_a_tiled_front_is_scored_against_drawn_and_reported_as_any_other(out, path, tmp_path, capsys):
+    front = Front.load(out)
+    knee = front.knee()
+    knee.save(tmp_path / "knee.ply")
+    assert np.array_equal(read_source(tmp_path / "knee.ply").points, knee.mesh.vertices)
+    assert main(["score", str(path), str(tmp_path / "knee.ply"), "--front", str(out), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["error"] == pytest.approx(knee.error, rel=1e-9)
+    assert said["front"]["solution"] == knee.solution
+    assert said["front"]["error_ratio"] == pytest.approx(1)
+    for how in (["--spacing", "31"], ["--outside", "ignore"]):
+        assert main(["score", str(path), str(tmp_path / "knee.ply"), "--front", str(out), *how]) == 2
+        assert f"and is compared as it was made; leave {how[0]} out" in capsys.readouterr().err
+    shutil.copytree(out, tmp_path / "out")
+    model = ["--model", str(path)]
+    for name in ("front.png", "report.html"):
+        (tmp_path / "out" / name).unlink()
+    assert main(["report", str(tmp_path / "out"), *model]) == 0
+    assert "front.png, report.html" in capsys.readouterr().out
+    assert (tmp_path / "out" / "front.png").read_bytes() == (out / "front.png").read_bytes()
+    page = (tmp_path / "out" / "report.html").read_text()
+    data = json.loads(page[page.index('id="data"') :].split(">", 1)[1].split("</script>")[0])
+    assert data["columns"]["error"] == [q.error for q in front.quality]
+    assert all(solution is not None for solution in data["solutions"])
+    assert data["knee"] == knee.solution
+    assert len(front.to_frame()) == len(front)
+    ends = front[:: len(front) - 1]
+    assert [solution.quality for solution in ends] == [front[0].quality, front[-1].quality]
+    assert knee.plot_error().collections
+    with pytest.raises(ModelError, match="not fitted"):
+        knee.refit()
+    assert front.problem.evaluate(front.kept[3]).tolist() == [front[3].error, front[3].triangles]
+
+
+def test_pictures_of_a_big_grid_are_drawn_from_some_of_its_samples(path, out, monkeypatch):
+    monkeypatch.setattr(figures, "DRAWN_VERTICES", 400)
+    surface = Front.load(out).surface
+    drawn, faces = figures.original_mesh(surface)
+    rows, columns = surface.model.shape
+    assert 200 < drawn.sum() <= 400
+    assert drawn[surface.model.corners].all()
+    assert len(faces) == 2 * (len(np.unique(np.flatnonzero(drawn) // columns)) - 1) * (
+        len(np.unique(np.flatnonzero(drawn) % columns)) - 1
+    )
+    whole = surface.simplify(drawn)
+    some = np.arange(3, rows * columns, 17)
+    part = surface.simplify(drawn, rows=some)
+    assert part.quality == whole.quality
+    assert np.array_equal(part.deviation, whole.deviation[some])
+    assert whole.deviation.sum() == pytest.approx(whole.quality.error)
+    assert np.array_equal(part.faces, whole.faces)
 
 
 def test_two_processes_write_the_same_bytes(out, path, tmp_path):
