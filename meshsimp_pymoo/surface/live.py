@@ -19,9 +19,6 @@ References
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -1331,25 +1328,6 @@ def make_live(n_vertices: int) -> Live:
         tally=np.zeros(13, np.int64),
         amount=np.zeros(3, np.float64),
     )
-
-
-_local = threading.local()
-
-
-@contextmanager
-def lent_live(n_vertices: int) -> Iterator[Live]:
-    """Lend books for a model of that size, with anything in them, to this thread until the context ends.
-
-    Each thread keeps the books that it had last; whoever asks while they are lent gets others.
-    """
-    held = getattr(_local, "live", None)
-    _local.live = None
-    if held is None or held[0] != n_vertices:
-        held = (n_vertices, make_live(n_vertices))
-    try:
-        yield held[1]
-    finally:
-        _local.live = held
 
 
 def build(ground: Ground, live: Live, sites: IntArray, name: str) -> None:
