@@ -18,11 +18,11 @@ from meshsimp_pymoo.indicators import (
     Coverage,
     HypervolumeRatio,
     MultiplicativeEpsilon,
-    better,
     cardinality,
     coverage,
     epsilon,
     hypervolume_ratio,
+    merged_front,
     non_dominated,
 )
 
@@ -131,7 +131,6 @@ def test_weak_dominance_is_what_epsilon_and_coverage_say_it_is():
         dominates = naive_coverage(A, B) == 1
         assert (epsilon(A, B) <= 1) == dominates
         assert (coverage(A, B) == 1) == dominates
-        assert better(A, B) == (dominates and naive_coverage(B, A) < 1)
 
 
 def test_improving_a_front_never_lowers_its_hypervolume_ratio():
@@ -210,9 +209,11 @@ def test_given_bounds_fix_the_normalisation():
     )
 
 
-def test_no_front_is_better_than_itself():
-    for A, _ in random_fronts(50, seed=10):
-        assert not better(A, A)
+def test_merging_fronts_is_reducing_all_of_their_solutions():
+    for A, B in random_fronts(50, seed=10):
+        assert_array_equal(merged_front([A, B, A]), naive_front(np.vstack([A, B])))
+    with pytest.raises(ValueError, match="front 1 is empty"):
+        merged_front([[[1.0, 2]], []])
 
 
 def test_solutions_infinitely_far_beyond_the_reference_point_count_nothing():

@@ -546,7 +546,7 @@ def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
 
 
 @inner
-def _settle_thin(g: Ground, live: Live, seed: int) -> None:
+def _settle_thin(live: Live, seed: int) -> None:
     """Decide for the chain of thin triangles around ``seed`` whether it is peeled: whether it reaches the outside."""
     mesh = live.mesh
     kind = live.kind
@@ -631,11 +631,11 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         for q in range(n_first):
             t = region[q]
             if kind[t >> 3] & THIN:
-                _settle_thin(g, live, t)
+                _settle_thin(live, t)
             for k in range(3):
                 s = mesh[t + 4 + k] & TRIANGLE
                 if kind[s >> 3] & THIN:
-                    _settle_thin(g, live, s)
+                    _settle_thin(live, s)
     for q in range(count[N_REGION]):
         t = region[q]
         head[t >> 3] = -1

@@ -68,7 +68,7 @@ class OpenModel:
     unit : float
         Side of the unit square, a power of two [model units].
     facts : dict
-        What was found while checking the surface (see :func:`meshsimp_pymoo.surface.orient.check_open_surface`).
+        What was found while checking the surface (see :class:`~meshsimp_pymoo.surface.orient.SurfaceFacts`).
     weights : (N,) float array, optional
         How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
     feet : (K,) int array
