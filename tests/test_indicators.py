@@ -12,6 +12,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from pymoo.core.indicator import Indicator
 
+import meshsimp_pymoo
+from meshsimp_pymoo import indicators
 from meshsimp_pymoo.indicators import (
     REFERENCE,
     Cardinality,
@@ -89,6 +91,13 @@ def naive_ratio(F, optimal):
         for small, high in zip(low, optimal.max(axis=0), strict=True)
     ]
     return naive_volume(F, low, scale) / naive_volume(optimal, low, scale)
+
+
+def test_all_indicators_of_pymoos_kind_are_public_names():
+    own = {name: kind for name, kind in vars(indicators).items() if isinstance(kind, type) and name[0] != "_"}
+    own = {name: kind for name, kind in own.items() if issubclass(kind, Indicator) and kind is not Indicator}
+    assert len(own) == 4
+    assert {name: getattr(meshsimp_pymoo, name) for name in own if name in meshsimp_pymoo.__all__} == own
 
 
 def test_a_thousand_random_fronts_agree_with_brute_force():

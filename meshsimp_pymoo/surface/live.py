@@ -42,7 +42,7 @@ EMITTED, THIN, PEELED, INSIDE, VISITED = 1, 2, 4, 8, 16
 PLAIN = EMITTED | INSIDE
 
 # A tentative change that touches more triangles than this is done and undone instead.
-MOST = 48
+MOST_TOUCHED = 48
 
 # Entries of ``tally``.
 (
@@ -102,9 +102,9 @@ class Live(NamedTuple):
     edge: np.ndarray
     ears: np.ndarray  # (2 N, 3)
     ear_edges: np.ndarray  # (2 N, 3)
-    gone: np.ndarray  # (2 MOST,) triangles that a tentative change takes away
-    forms: np.ndarray  # (2 MOST, 12) sides and planes of those that would come, see _enter_form
-    saved: np.ndarray  # (10 MOST,) what the records held before
+    gone: np.ndarray  # (2 MOST_TOUCHED,) triangles that a tentative change takes away
+    forms: np.ndarray  # (2 MOST_TOUCHED, 12) sides and planes of those that would come, see _enter_form
+    saved: np.ndarray  # (10 MOST_TOUCHED,) what the records held before
     tally: np.ndarray  # numbers of things, see the names above
     amount: np.ndarray  # errors, see the names above
 
@@ -955,8 +955,8 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
     among = False
     for k in range(n_star):
         among = among or gone[k] == t0
-        saved[8 * MOST + k] = rim[k]
-        saved[9 * MOST + k] = mesh[rim[k] + 4]
+        saved[8 * MOST_TOUCHED + k] = rim[k]
+        saved[9 * MOST_TOUCHED + k] = mesh[rim[k] + 4]
         for e in range(8):
             saved[8 * k + e] = mesh[gone[k] + e]
     for k in range(n_ears):
@@ -981,7 +981,7 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
         for e in range(8):
             mesh[gone[k] + e] = saved[8 * k + e]
     for k in range(n_star):
-        mesh[saved[8 * MOST + k] + 4] = saved[9 * MOST + k]
+        mesh[saved[8 * MOST_TOUCHED + k] + 4] = saved[9 * MOST_TOUCHED + k]
     return n_cavity, n_rim
 
 
@@ -1006,7 +1006,7 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
     change = 0.0
     if v >= 0:
         n_star = triangles_around(mesh, live.place[v], v, cavity, live.rim, ring)
-        if n_star > MOST:
+        if n_star > MOST_TOUCHED:
             return unknown
         for k in range(n_star):
             t = np.int64(cavity[k])
@@ -1025,7 +1025,7 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
     n_rim = 0
     if w >= 0:
         n_cavity, n_rim = _replaced(live, n_star, n_ears, w, g)
-        if n_star + n_cavity > 2 * MOST or n_ears + n_rim > 2 * MOST:
+        if n_star + n_cavity > 2 * MOST_TOUCHED or n_ears + n_rim > 2 * MOST_TOUCHED:
             return unknown
         for k in range(n_cavity):
             t = np.int64(cavity[k])
@@ -1322,9 +1322,9 @@ def make_live(n_vertices: int) -> Live:
         edge=np.empty(2 * n, np.int32),
         ears=np.empty((2 * n, 3), np.uint32),
         ear_edges=np.empty((2 * n, 3), np.int32),
-        gone=np.empty(2 * MOST, np.int64),
-        forms=np.empty((2 * MOST, 12), np.float64),
-        saved=np.empty(10 * MOST, np.uint32),
+        gone=np.empty(2 * MOST_TOUCHED, np.int64),
+        forms=np.empty((2 * MOST_TOUCHED, 12), np.float64),
+        saved=np.empty(10 * MOST_TOUCHED, np.uint32),
         tally=np.zeros(13, np.int64),
         amount=np.zeros(3, np.float64),
     )
