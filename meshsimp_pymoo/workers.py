@@ -5,8 +5,8 @@ which they are finished. The function must depend on its arguments alone, so tha
 nor on that order; and it may be called twice for the same task: where a worker dies, its tasks are done again, and only
 a task that was being done at every one of ``TRIES`` deaths ends the work.
 
-The processes are the standard library's: loky's stay for ever where the parent is killed and take twice as long to start,
-and what is here beside a pool – tasks tried again, processes that end with their parent – loky would need too.
+The processes are the standard library's: loky's stay for ever where the parent is killed, take twice as long to start,
+and would need what is here beside a pool too: tasks tried again, processes that end with their parent.
 
 A few tasks more than there are workers are made ahead, never all of them: memory is bounded by the tasks in flight.
 """
