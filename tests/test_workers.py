@@ -49,8 +49,10 @@ def test_what_is_in_reserve_is_used_by_one_at_a_time_and_kept_by_its_owner():
     with pytest.raises(KeyError), reserve.one() as again:  # noqa: PT012
         assert again is first
         raise KeyError
-    with reserve.one() as again:
+    with reserve.one() as again, reserve.one() as another:
+        assert (again, another) == ([1], [])
         assert again is first
+        assert another is second
         with pickle.loads(pickle.dumps(reserve)).one() as other:
             assert other == []
 
