@@ -22,134 +22,21 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
     warming        what has to be compiled once on a machine
     cli/           the shell command ``meshsimp``
 
-Public names are imported when they are first used, so that ``import meshsimp_pymoo`` is quick.
+Public names are those of ``__init__.pyi``; each is imported when it is first used, so that ``import meshsimp_pymoo`` is
+quick.
 """
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
-    from meshsimp_pymoo.formats.options import Options
-    from meshsimp_pymoo.front import Front, FrontSolution
-    from meshsimp_pymoo.opening import open_grid
-    from meshsimp_pymoo.problem import MeshProblem
-    from meshsimp_pymoo.report.figures import plot_error, plot_front, plot_mesh
-    from meshsimp_pymoo.search.display import FrontOutput
-    from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-    from meshsimp_pymoo.search.memetic import memetic
-    from meshsimp_pymoo.search.moead import moead
-    from meshsimp_pymoo.search.nsga import nsga2_v1, nsga2_v2, nsga3
-    from meshsimp_pymoo.search.operators import (
-        OAX,
-        HalfPlaneCrossover,
-        NeighbourShift,
-        NestedSubsets,
-        PackedDuplicates,
-        PinnedCorners,
-        RandomSubset,
-        RegionCrossover,
-        Relocation,
-        SizeStep,
-        SubsetUniformCrossover,
-    )
-    from meshsimp_pymoo.search.weighted import weighted_ga_v1, weighted_ga_v2
-    from meshsimp_pymoo.storage import read_front, write_front
-    from meshsimp_pymoo.surface.height import HeightSurface, refit_heights
-    from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
-    from meshsimp_pymoo.surface.measures import Quality
-    from meshsimp_pymoo.surface.model import OpenModel
-    from meshsimp_pymoo.surface.rules import Rules
-    from meshsimp_pymoo.surface.surface import Refitted
-    from meshsimp_pymoo.tiles.front import tiled_front
-    from meshsimp_pymoo.workers import DaskEngine, Processes
+_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+_HOME = {name.name: str(line.module) for line in _STUB.body if isinstance(line, ast.ImportFrom) for name in line.names}
 
-_HOMES = {
-    "search.memetic": ("memetic",),
-    "search.nsga": ("nsga2_v1", "nsga2_v2", "nsga3"),
-    "search.moead": ("moead",),
-    "search.weighted": ("weighted_ga_v1", "weighted_ga_v2"),
-    "surface.measures": ("Quality",),
-    "errors": ("ModelError", "ModelWarning", "ResultError"),
-    "surface.model": ("OpenModel",),
-    "surface.live_triangulation": ("LiveTriangulation",),
-    "surface.height": ("HeightSurface", "refit_heights"),
-    "surface.rules": ("Rules",),
-    "surface.surface": ("Refitted",),
-    "formats.options": ("Options",),
-    "search.greedy": ("greedy_insertion", "thinning"),
-    "search.operators": (
-        "OAX",
-        "HalfPlaneCrossover",
-        "NeighbourShift",
-        "NestedSubsets",
-        "PackedDuplicates",
-        "PinnedCorners",
-        "RandomSubset",
-        "RegionCrossover",
-        "Relocation",
-        "SizeStep",
-        "SubsetUniformCrossover",
-    ),
-    "problem": ("MeshProblem",),
-    "search.display": ("FrontOutput",),
-    "front": ("Front", "FrontSolution"),
-    "report.figures": ("plot_error", "plot_front", "plot_mesh"),
-    "storage": ("read_front", "write_front"),
-    "tiles.front": ("tiled_front",),
-    "opening": ("open_grid",),
-    "workers": ("DaskEngine", "Processes"),
-}
-_HOME = {name: home for home, names in _HOMES.items() for name in names}
-
-__all__ = [
-    "OAX",
-    "DaskEngine",
-    "Front",
-    "FrontOutput",
-    "FrontSolution",
-    "HalfPlaneCrossover",
-    "HeightSurface",
-    "LiveTriangulation",
-    "MeshProblem",
-    "ModelError",
-    "ModelWarning",
-    "NeighbourShift",
-    "NestedSubsets",
-    "OpenModel",
-    "Options",
-    "PackedDuplicates",
-    "PinnedCorners",
-    "Processes",
-    "Quality",
-    "RandomSubset",
-    "Refitted",
-    "RegionCrossover",
-    "Relocation",
-    "ResultError",
-    "Rules",
-    "SizeStep",
-    "SubsetUniformCrossover",
-    "greedy_insertion",
-    "memetic",
-    "moead",
-    "nsga2_v1",
-    "nsga2_v2",
-    "nsga3",
-    "open_grid",
-    "plot_error",
-    "plot_front",
-    "plot_mesh",
-    "read_front",
-    "refit_heights",
-    "thinning",
-    "tiled_front",
-    "weighted_ga_v1",
-    "weighted_ga_v2",
-    "write_front",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
@@ -159,7 +46,7 @@ def __getattr__(name: str) -> Any:
         return version("meshsimp-pymoo")
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    value = getattr(import_module(_HOME[name]), name)
     globals()[name] = value
     return value
 

@@ -20,6 +20,7 @@ class                     function              better when     value for the re
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import moocore
@@ -35,13 +36,13 @@ __all__ = [
     "Coverage",
     "HypervolumeRatio",
     "MultiplicativeEpsilon",
-    "better",
     "cardinality",
     "checked_objectives",
     "coverage",
     "epsilon",
     "hypervolume_ratio",
     "knee",
+    "merged_front",
     "non_dominated",
 ]
 
@@ -84,6 +85,34 @@ def non_dominated(F: ArrayLike, name: str = "F") -> FloatArray:
         return points.min(axis=0, keepdims=True)
     front = points[moocore.is_nondominated(points, keep_weakly=False)]
     return front[np.lexsort(front.T)]
+
+
+def merged_front(fronts: Iterable[ArrayLike]) -> FloatArray:
+    """Return what several runs found together: their solutions as one front.
+
+    Parameters
+    ----------
+    fronts : iterable of (n, m) array-like
+        Objectives, all minimised, such as ``result.F`` of each run.
+
+    Returns
+    -------
+    (k, m) float array
+        As from `non_dominated`.
+
+    Raises
+    ------
+    ValueError
+        If there is none, one of them is empty or not finite, or they differ in the number of objectives.
+
+    Examples
+    --------
+    >>> merged_front([[[3.0, 2], [1.0, 6]], [[2.0, 4], [1.0, 8]]])
+    array([[3., 2.],
+           [2., 4.],
+           [1., 6.]])
+    """
+    return non_dominated(np.vstack([checked_objectives(F, f"front {k}") for k, F in enumerate(fronts)]))
 
 
 def hypervolume_ratio(
@@ -224,22 +253,6 @@ def epsilon(A: ArrayLike, B: ArrayLike, *, shift: ArrayLike = 0.0) -> float:
     return float(factor.min(axis=0).max())
 
 
-def better(A: ArrayLike, B: ArrayLike) -> bool:
-    """Return whether A is better than B: A covers all of B and B does not cover all of A.
-
-    For the multiplicative epsilon this is ``epsilon(A, B) <= 1 < epsilon(B, A)``, the condition of Zitzler et
-    al. 2003 under which one front can be called better than another without any preference.
-
-    Examples
-    --------
-    >>> better([[1, 2], [0, 4]], [[1, 2], [1, 4]])
-    True
-    >>> better([[1, 2], [0, 4]], [[1, 2], [0, 4]])
-    False
-    """
-    return epsilon(A, B) <= 1 < epsilon(B, A)
-
-
 def coverage(A: ArrayLike, B: ArrayLike) -> float:
     """Return the coverage C(A, B): the share of B's solutions that some solution of A weakly dominates.
 
@@ -342,6 +355,12 @@ class HypervolumeRatio(_FrontIndicator):
         The (pseudo-)optimal front.
     ideal, nadir, reference
         The fixed normalisation and reference point, as in `hypervolume_ratio`.
+
+    Examples
+    --------
+    >>> hvr = HypervolumeRatio([[0, 20], [1, 15], [2, 10]])
+    >>> round(hvr([[1, 15]]), 6)                   # or hvr(result.F)
+    0.782609
     """
 
     def __init__(
@@ -371,6 +390,11 @@ class MultiplicativeEpsilon(_FrontIndicator):
         The front to be covered.
     shift : float or (m,) array-like
         Added to all objectives first.
+
+    Examples
+    --------
+    >>> MultiplicativeEpsilon([[2.0, 4]])([[2.5, 4]])
+    1.25
     """
 
     def __init__(self, pf: ArrayLike, *, shift: ArrayLike = 0.0) -> None:
@@ -390,6 +414,11 @@ class Coverage(_FrontIndicator):
     ----------
     pf : (p, m) array-like
         The front to be covered.
+
+    Examples
+    --------
+    >>> Coverage([[1, 2], [0, 4]])([[1, 2]])
+    0.5
     """
 
     def __init__(self, pf: ArrayLike) -> None:
@@ -401,7 +430,13 @@ class Coverage(_FrontIndicator):
 
 
 class Cardinality(_FrontIndicator):
-    """Number of distinct non-dominated solutions: see `cardinality`."""
+    """Number of distinct non-dominated solutions: see `cardinality`.
+
+    Examples
+    --------
+    >>> Cardinality()([[0, 4], [0, 4], [1, 2], [2, 2]])
+    2.0
+    """
 
     def _do(self, F: ArrayLike) -> float:
         return float(cardinality(F))

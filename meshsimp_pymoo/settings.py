@@ -385,10 +385,10 @@ def documentation(*kinds: type[Any], indent: str = "    ") -> str:
     return "\n".join(lines)
 
 
-def _wrapped(text: str, indent: str, width: int = 120) -> Iterable[str]:
+def _wrapped(text: str, indent: str) -> Iterable[str]:
     line = indent
     for word in text.split():
-        if len(line) + len(word) >= width and line.strip():
+        if len(line) + len(word) >= 120 and line.strip():
             yield line.rstrip()
             line = indent
         line += word + " "

@@ -5,6 +5,9 @@ which they are finished. The function must depend on its arguments alone, so tha
 nor on that order; and it may be called twice for the same task: where a worker dies, its tasks are done again, and only
 a task that was being done at every one of ``TRIES`` deaths ends the work.
 
+The processes are the standard library's: loky's stay for ever where the parent is killed, take twice as long to start,
+and would need what is here beside a pool too: tasks tried again, processes that end with their parent.
+
 A few tasks more than there are workers are made ahead, never all of them: memory is bounded by the tasks in flight.
 """
 
@@ -19,11 +22,11 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from meshsimp_pymoo.errors import reason_of, way_to_install
 
-__all__ = ["DaskEngine", "Engine", "EngineError", "Processes", "Serial", "open_engine", "thread_pool"]
+__all__ = ["DaskEngine", "Engine", "EngineError", "Processes", "Reserve", "Serial", "open_engine", "thread_pool"]
 
 # How often a task is tried whose worker dies.
 TRIES = 3
@@ -40,12 +43,43 @@ HELD = (signal.SIGINT,)
 # Called as work(task, shared).
 Work = Callable[[Any, Any], Any]
 
+Item = TypeVar("Item")
+
+
+class Reserve(Generic[Item]):
+    """Objects that take long to make and serve one thread at a time: made when all that there are are in use, and kept.
+
+    Parameters
+    ----------
+    make : callable
+        Makes one; a function of a module, or a partial one, so that an owner can be pickled: without the objects.
+    """
+
+    def __init__(self, make: Callable[[], Item]) -> None:
+        self._make = make
+        self._idle: list[Item] = []
+
+    @contextlib.contextmanager
+    def one(self) -> Iterator[Item]:
+        """Give one, as whoever had it last left it; it is nobody else's until the context ends."""
+        try:
+            item = self._idle.pop()
+        except IndexError:
+            item = self._make()
+        try:
+            yield item
+        finally:
+            self._idle.append(item)
+
+    def __reduce__(self) -> Any:
+        return Reserve, (self._make,)
+
 
 _executors: dict[int, ThreadPoolExecutor] = {}
 
 
 def thread_pool(n_threads: int | None = None) -> ThreadPoolExecutor:
-    """Return one pool of threads a process and size, so that the threads and their workspaces are made once."""
+    """Return one pool of threads a process and size, so that the threads are started once."""
     n_threads = n_threads or os.cpu_count() or 1
     if n_threads not in _executors:
         _executors[n_threads] = ThreadPoolExecutor(n_threads, thread_name_prefix="meshsimp")

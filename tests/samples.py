@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelWarning
 from meshsimp_pymoo.formats.options import Options
@@ -18,6 +19,7 @@ from meshsimp_pymoo.opening import Source, open_model
 from meshsimp_pymoo.storage import write_front
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import OpenModel, build_model
+from meshsimp_pymoo.surface.orient import FOLD_SHARE, SurfaceFacts, open_faces, surface_facts
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Simplified
 
@@ -25,6 +27,12 @@ from meshsimp_pymoo.surface.surface import Simplified
 def surface(model: Source | OpenModel, *, up: Any = "auto", **rules: Any) -> HeightSurface:
     """Return the height surface of a built-in name, a mesh or a model, with these rules."""
     return HeightSurface(open_model(model, Options(up=up)), Rules(**rules))
+
+
+def check_open_surface(source: SourceMesh, upright: FloatArray) -> tuple[IntArray, SurfaceFacts]:
+    """Return the faces as seen from above and what is known of them, or refuse them."""
+    facts = surface_facts(source, upright, until=FOLD_SHARE)
+    return open_faces(source, facts), facts
 
 
 def stepped_model(source: SourceMesh) -> OpenModel:

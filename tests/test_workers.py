@@ -1,6 +1,7 @@
 """Engines: the same results wherever the work is done, and after deaths."""
 
 import os
+import pickle
 import subprocess
 import sys
 import time
@@ -9,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 
 import pytest
 
-from meshsimp_pymoo.workers import DaskEngine, EngineError, Processes, Serial, open_engine
+from meshsimp_pymoo.workers import DaskEngine, EngineError, Processes, Reserve, Serial, open_engine
 
 
 def square(task, shared):
@@ -38,6 +39,22 @@ def die(task, shared):
 
 def refuse(task, shared):
     raise ValueError(f"no task {task}")
+
+
+def test_what_is_in_reserve_is_used_by_one_at_a_time_and_kept_by_its_owner():
+    reserve = Reserve(list)
+    with reserve.one() as first, reserve.one() as second:
+        assert first is not second
+        first.append(1)
+    with pytest.raises(KeyError), reserve.one() as again:  # noqa: PT012
+        assert again is first
+        raise KeyError
+    with reserve.one() as again, reserve.one() as another:
+        assert (again, another) == ([1], [])
+        assert again is first
+        assert another is second
+        with pickle.loads(pickle.dumps(reserve)).one() as other:
+            assert other == []
 
 
 @pytest.fixture(scope="module")

@@ -48,6 +48,7 @@ from meshsimp_pymoo.indicators import (
     coverage,
     epsilon,
     hypervolume_ratio,
+    merged_front,
     non_dominated,
 )
 
@@ -344,7 +345,7 @@ def unary_scores(
     best = optimal.front if isinstance(optimal, OptimalFront) else non_dominated(optimal, "the optimal front")
     scores = {}
     for method, seeds in fronts.items():
-        merged = _merged(seeds)
+        merged = merged_front(seeds.values())
         scores[method] = Scores(
             seeds=np.array(list(seeds), dtype=np.int64),
             hvr=np.array([hypervolume_ratio(F, best) for F in seeds.values()]),
@@ -755,11 +756,6 @@ def _fronts(runs: Runs) -> dict[str, dict[int, FloatArray]]:
             if fronts[method][seed].shape[1] != 2:
                 raise ValueError(f"{name} has {fronts[method][seed].shape[1]} columns: give (error, triangles)")
     return fronts
-
-
-def _merged(fronts: Mapping[int, FloatArray]) -> FloatArray:
-    """Return the front of some fronts."""
-    return non_dominated(np.vstack(list(fronts.values())))
 
 
 def _front(front: ArrayLike) -> FloatArray:

@@ -19,7 +19,7 @@ from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.analysis import attainment_surfaces
 from meshsimp_pymoo.comparison.figures import method_look
 from meshsimp_pymoo.comparison.study import SCORINGS, Case, Study
-from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.indicators import merged_front
 from meshsimp_pymoo.report.document import html_document, slug
 
 __all__ = ["experiment_page"]
@@ -139,7 +139,7 @@ def _series(study: Study, case: Case) -> Iterator[dict[str, Any]]:
             "colour": None if classic else colour,
             "mark": MARKS[mark],
             "half": None if half is None else _xy(half),
-            **_xy(non_dominated(np.vstack(list(runs.values())))),
+            **_xy(merged_front(runs.values())),
         }
 
 

@@ -133,7 +133,7 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         attributes = {key: values for key, values in attributes.items() if key in ("color", "intensity")}
         texts = {f"no. {k + 1}" for k, field in enumerate(head.fields) if not _is_number(field)}
         if options.columns is None:
-            _warn_of_counting(points[:, 0], head, layout, name)
+            _warn_of_counting(points[:, 0], head, name)
     if texts:
         warn_of(f"{name}: columns without numbers stay behind: {', '.join(sorted(texts))}")
     facts = {"unit": layout.unit} if layout.unit else {}
@@ -303,7 +303,7 @@ def _column(wanted: str | int, names: list[str], width: int, name: str) -> int:
     raise ModelError(f"{name}: has no column {wanted!r}, {has}; give other --columns, by name or number from 1")
 
 
-def _warn_of_counting(x: FloatArray, head: Head, layout: Layout, name: str) -> None:
+def _warn_of_counting(x: FloatArray, head: Head, name: str) -> None:
     """Warn if what is taken for x, since nobody says what it is, only numbers the points."""
     import numpy as np
 

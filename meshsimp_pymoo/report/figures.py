@@ -343,7 +343,6 @@ def front_figure(
     chosen: int | None = None,
     measure: str = "error",
     series: Mapping[str, npt.ArrayLike] | None = None,
-    title: str | None = None,
 ) -> Figure:
     """Draw the front of a simplification beside the original and a few of the simplified meshes.
 
@@ -359,8 +358,6 @@ def front_figure(
         Rows of ``F`` to mark.
     measure, series
         What the first column of F is, and other fronts to draw behind it; see :func:`plot_front`.
-    title : str, optional
-        By default the model's name and size.
 
     Returns
     -------
@@ -383,7 +380,7 @@ def front_figure(
     unit, system = length_unit(model.georeference), printable(reference_system(model.georeference))
     plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series, unit=unit)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
-    front.set_title(title or f"{short_name(model.name)}: {size}" + f"\n{system}" * bool(system), loc="left")
+    front.set_title(f"{short_name(model.name)}: {size}" + f"\n{system}" * bool(system), loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
     _plot_rows(surface, original_mesh(surface)[1], panels[0])

@@ -68,15 +68,12 @@ ENTRIES = 2e8
 class SizeLadder(Survival):
     """On every rung the individual of least error among those of at most so many triangles.
 
-    Parameters
-    ----------
-    rungs : (R,) int array, optional
-        Numbers of triangles; by default those of the first population.
+    Rungs are numbers of triangles, those of the first population unless they are set before.
     """
 
-    def __init__(self, rungs: NDArray[np.integer] | None = None) -> None:
+    def __init__(self) -> None:
         super().__init__(filter_infeasible=False)
-        self.rungs = None if rungs is None else np.unique(rungs)
+        self.rungs: NDArray[Any] | None = None
 
     def best(self, problem: Any, pop: Population) -> NDArray[np.int64]:
         """Return for each rung the row of its best individual in the population, -1 where none is small enough."""
@@ -168,7 +165,7 @@ class DownTheLadder(Mating):
         parents = rows[turn if fresh else turn + 1]
         work = self._work(problem, pop, rows)
         left = sum(work[chain[self.step :]].sum() for chain in chains)
-        moves = np.ceil(self._pace(problem, algorithm, work.sum(), left) * work[turn]).astype(int)
+        moves = np.ceil(self._pace(algorithm, work.sum(), left) * work[turn]).astype(int)
         limit = time_limit(algorithm)
         begun = time.perf_counter()
         children = relocate_all(
@@ -196,7 +193,7 @@ class DownTheLadder(Mating):
         kept = (pop.get("X") & ~problem.pinned).sum(axis=1)[np.maximum(rows, 0)]
         return np.minimum(np.maximum(kept, 1), FULL_SHARE * problem.n_var)
 
-    def _pace(self, problem: Any, algorithm: Any, whole: float, left: float) -> float:
+    def _pace(self, algorithm: Any, whole: float, left: float) -> float:
         """Return the moves for each kept vertex, given the work of a whole sweep and of what is left of it."""
         deadline = time_limit(algorithm)
         if deadline is None:

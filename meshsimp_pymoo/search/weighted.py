@@ -97,6 +97,15 @@ class WeightedSum(Problem):
     ------
     ValueError
         If ``w`` is not in [0, 1] or the problem has other than two objectives.
+
+    Examples
+    --------
+    All four corners of a roof: its ridge of three vertices falls by 1 each, and two triangles are left.
+
+    >>> from meshsimp_pymoo import MeshProblem
+    >>> problem = WeightedSum(MeshProblem("roof:3"), 0.5)
+    >>> problem.evaluate(problem.pinned[None]).tolist()
+    [[2.5]]
     """
 
     def __init__(self, problem: Problem, w: float) -> None:

@@ -11,13 +11,12 @@ its mean and its root mean square are weighted by w, and its maximum is that of 
 of 1 are the same as none; other weights change numbers, never triangles.
 
 One compiled call does it for one subset or for many: gather, triangulate, emit (slivers, footprint), measure. It
-allocates nothing of the order of N; all it needs is in a :class:`Workspace`, one for each thread.
+allocates nothing of the order of N; all it needs is in a workspace, which a thread has while it is at it.
 """
 
 from __future__ import annotations
 
 import itertools
-import threading
 
 import numpy as np
 
@@ -29,7 +28,7 @@ from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.plane.triangulation import RECORD, locate, triangulate
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, REGIONS, SQUARES, TRIANGLES, UNCOVERED, VERTICES
-from meshsimp_pymoo.workers import thread_pool
+from meshsimp_pymoo.workers import Reserve, thread_pool
 
 # A vertex counts as covered up to this far outside a triangle, in barycentric coordinates: rounding of rotated borders.
 COVER_TOLERANCE = 1e-9
@@ -41,34 +40,23 @@ NO_DEVIATION = np.empty(0, np.float64)
 NO_COVER = np.empty(0, np.bool_)
 
 
-class Workspace:
-    """The arrays one thread needs to evaluate subsets of a model of N vertices; 135 N bytes, made once."""
-
-    def __init__(self, n_vertices: int) -> None:
-        n = n_vertices + 1
-        self.arrays = (
-            np.empty(n, np.int32),  # sites: rows of the kept vertices
-            np.empty(n, np.int32),  # dropped: rows of the others
-            np.empty(2 * n, np.float64),  # their coordinates, flat
-            np.empty(n, np.float64),  # their heights
-            np.empty(n, np.uint8),  # inserted
-            np.empty(16 * n, np.uint32),  # the triangles' records
-            np.empty(2 * n, np.uint8),  # emitted triangles
-            np.empty(2 * n, np.uint32),  # stack
-            np.empty(n, np.uint32),  # a triangle of each site
-        )
+Workspace = tuple[np.ndarray, ...]
 
 
-_local = threading.local()
-
-
-def _workspace(n_vertices: int) -> Workspace:
-    """Return this thread's workspace, made anew when the model's size changes."""
-    kept = getattr(_local, "workspace", None)
-    if kept is None or kept[0] != n_vertices:
-        kept = (n_vertices, Workspace(n_vertices))
-        _local.workspace = kept
-    return kept[1]
+def make_workspace(n_vertices: int) -> Workspace:
+    """Return the arrays that one thread needs to evaluate subsets of a model of N vertices; 135 N bytes."""
+    n = n_vertices + 1
+    return (
+        np.empty(n, np.int32),  # sites: rows of the kept vertices
+        np.empty(n, np.int32),  # dropped: rows of the others
+        np.empty(2 * n, np.float64),  # their coordinates, flat
+        np.empty(n, np.float64),  # their heights
+        np.empty(n, np.uint8),  # inserted
+        np.empty(16 * n, np.uint32),  # the triangles' records
+        np.empty(2 * n, np.uint8),  # emitted triangles
+        np.empty(2 * n, np.uint32),  # stack
+        np.empty(n, np.uint32),  # a triangle of each site
+    )
 
 
 @inner(inline=True)
@@ -334,13 +322,17 @@ def _evaluate(
     return end
 
 
-def evaluate_subsets(ground: Ground, kept: BoolArray, *, n_threads: int = 1, regions: int = 0) -> FloatArray:
+def evaluate_subsets(
+    ground: Ground, workspaces: Reserve[Workspace], kept: BoolArray, *, n_threads: int = 1, regions: int = 0
+) -> FloatArray:
     """Evaluate many subsets; this is the call that a search spends its time in.
 
     Parameters
     ----------
     ground : Ground
         The model of N vertices and the rules.
+    workspaces : Reserve
+        Of :func:`make_workspace` for N vertices.
     kept : (P, N) bool array
         One subset a row, in vector order.
     n_threads : int
@@ -366,7 +358,8 @@ def evaluate_subsets(ground: Ground, kept: BoolArray, *, n_threads: int = 1, reg
     table = np.empty((len(rows), REGIONS + regions))
 
     def evaluate(part: slice) -> None:
-        _evaluate(ground, _workspace(n).arrays, rows[part], table[part], NO_DEVIATION, NO_COVER)
+        with workspaces.one() as workspace:
+            _evaluate(ground, workspace, rows[part], table[part], NO_DEVIATION, NO_COVER)
 
     if n_threads <= 1 or len(rows) < 2 * n_threads:
         evaluate(slice(0, len(rows)))
@@ -377,13 +370,15 @@ def evaluate_subsets(ground: Ground, kept: BoolArray, *, n_threads: int = 1, reg
     return table
 
 
-def triangulate_subset(ground: Ground, kept: BoolArray) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
+def triangulate_subset(
+    ground: Ground, workspaces: Reserve[Workspace], kept: BoolArray
+) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
     """Triangulate one subset (N,) and measure it everywhere.
 
     Parameters
     ----------
-    ground : Ground
-        The model of N vertices and the rules.
+    ground, workspaces
+        As in :func:`evaluate_subsets`.
     kept : (N,) bool array
         The subset, contiguous and writeable.
 
@@ -397,10 +392,10 @@ def triangulate_subset(ground: Ground, kept: BoolArray) -> tuple[IntArray, Float
         d_p at every vertex [model units], and whether a triangle covers it.
     """
     n = len(ground.z)
-    arrays = _workspace(n).arrays
     row, deviation, covered = np.empty(REGIONS), np.zeros(n), np.zeros(n, np.bool_)
-    end = _evaluate(ground, arrays, kept[None], row[None], deviation, covered)
-    sites, mesh, emitted = arrays[0], arrays[5], arrays[6]
-    records = mesh[:end].reshape(-1, RECORD)[emitted[: end // RECORD] == 1, :3].astype(np.int64)
-    faces = canonical_faces(records) if row[TRIANGLES] else records[:0]
-    return sites[faces], row, deviation, covered
+    with workspaces.one() as workspace:
+        end = _evaluate(ground, workspace, kept[None], row[None], deviation, covered)
+        sites, mesh, emitted = workspace[0], workspace[5], workspace[6]
+        records = mesh[:end].reshape(-1, RECORD)[emitted[: end // RECORD] == 1, :3].astype(np.int64)
+        faces = canonical_faces(records) if row[TRIANGLES] else records[:0]
+        return sites[faces], row, deviation, covered

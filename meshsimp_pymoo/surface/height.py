@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray
-from meshsimp_pymoo.surface.evaluate import evaluate_subsets, triangulate_subset
+from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.ground import Ground, make_ground
-from meshsimp_pymoo.surface.live import Live, build, lent_live
+from meshsimp_pymoo.surface.live import Live, build, make_live
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.pins import pinned_vertices
@@ -21,6 +21,7 @@ from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, require_rules
+from meshsimp_pymoo.workers import Reserve
 
 # A kept vertex of weight 0 counts this share of the mean all the same, so that its refitted height has a value.
 LEAST_WEIGHT = 1e-9
@@ -54,6 +55,8 @@ class HeightSurface:
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
         self.rules = rules
         self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
+        self._workspaces = Reserve(partial(make_workspace, self.n_vertices))
+        self._books = Reserve(partial(make_live, self.n_vertices))
 
     @property
     def n_vertices(self) -> int:
@@ -111,7 +114,7 @@ class HeightSurface:
     @contextmanager
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Live]:
         """Lend the live triangulation of a subset; of several kept vertices at one place, a fixed one is the site."""
-        with lent_live(self.n_vertices) as live:
+        with self._books.one() as live:
             build(self._ground, live, self.sites(kept, fixed), self.model.name)
             yield live
 
@@ -138,7 +141,7 @@ class HeightSurface:
 
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table (P, 6 + regions) of numbers of subsets (P, N); see :func:`evaluate_subsets`."""
-        return evaluate_subsets(self._ground, kept, n_threads=threads, regions=regions)
+        return evaluate_subsets(self._ground, self._workspaces, kept, n_threads=threads, regions=regions)
 
     def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
         """Triangulate the kept vertices and measure the result: the phenotype of one chromosome (N,).
@@ -149,7 +152,7 @@ class HeightSurface:
             If no triangle is emitted: fewer than 3 vertices, all on one line, or all triangles outside the footprint.
         """
         row = self._checked(kept)
-        faces, numbers, deviation, covered = triangulate_subset(self._ground, row)
+        faces, numbers, deviation, covered = triangulate_subset(self._ground, self._workspaces, row)
         if numbers[TRIANGLES] == 0:
             raise ValueError(
                 f"{int(row.sum())} kept vertices of {self.model.name} span no triangle of the mesh; "

@@ -19,9 +19,6 @@ References
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +42,7 @@ EMITTED, THIN, PEELED, INSIDE, VISITED = 1, 2, 4, 8, 16
 PLAIN = EMITTED | INSIDE
 
 # A tentative change that touches more triangles than this is done and undone instead.
-MOST = 48
+MOST_TOUCHED = 48
 
 # Entries of ``tally``.
 (
@@ -105,9 +102,9 @@ class Live(NamedTuple):
     edge: np.ndarray
     ears: np.ndarray  # (2 N, 3)
     ear_edges: np.ndarray  # (2 N, 3)
-    gone: np.ndarray  # (2 MOST,) triangles that a tentative change takes away
-    forms: np.ndarray  # (2 MOST, 12) sides and planes of those that would come, see _enter_form
-    saved: np.ndarray  # (10 MOST,) what the records held before
+    gone: np.ndarray  # (2 MOST_TOUCHED,) triangles that a tentative change takes away
+    forms: np.ndarray  # (2 MOST_TOUCHED, 12) sides and planes of those that would come, see _enter_form
+    saved: np.ndarray  # (10 MOST_TOUCHED,) what the records held before
     tally: np.ndarray  # numbers of things, see the names above
     amount: np.ndarray  # errors, see the names above
 
@@ -549,7 +546,7 @@ def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
 
 
 @inner
-def _settle_thin(g: Ground, live: Live, seed: int) -> None:
+def _settle_thin(live: Live, seed: int) -> None:
     """Decide for the chain of thin triangles around ``seed`` whether it is peeled: whether it reaches the outside."""
     mesh = live.mesh
     kind = live.kind
@@ -634,11 +631,11 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         for q in range(n_first):
             t = region[q]
             if kind[t >> 3] & THIN:
-                _settle_thin(g, live, t)
+                _settle_thin(live, t)
             for k in range(3):
                 s = mesh[t + 4 + k] & TRIANGLE
                 if kind[s >> 3] & THIN:
-                    _settle_thin(g, live, s)
+                    _settle_thin(live, s)
     for q in range(count[N_REGION]):
         t = region[q]
         head[t >> 3] = -1
@@ -958,8 +955,8 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
     among = False
     for k in range(n_star):
         among = among or gone[k] == t0
-        saved[8 * MOST + k] = rim[k]
-        saved[9 * MOST + k] = mesh[rim[k] + 4]
+        saved[8 * MOST_TOUCHED + k] = rim[k]
+        saved[9 * MOST_TOUCHED + k] = mesh[rim[k] + 4]
         for e in range(8):
             saved[8 * k + e] = mesh[gone[k] + e]
     for k in range(n_ears):
@@ -984,7 +981,7 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
         for e in range(8):
             mesh[gone[k] + e] = saved[8 * k + e]
     for k in range(n_star):
-        mesh[saved[8 * MOST + k] + 4] = saved[9 * MOST + k]
+        mesh[saved[8 * MOST_TOUCHED + k] + 4] = saved[9 * MOST_TOUCHED + k]
     return n_cavity, n_rim
 
 
@@ -1009,7 +1006,7 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
     change = 0.0
     if v >= 0:
         n_star = triangles_around(mesh, live.place[v], v, cavity, live.rim, ring)
-        if n_star > MOST:
+        if n_star > MOST_TOUCHED:
             return unknown
         for k in range(n_star):
             t = np.int64(cavity[k])
@@ -1028,7 +1025,7 @@ def _try_inside(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[fl
     n_rim = 0
     if w >= 0:
         n_cavity, n_rim = _replaced(live, n_star, n_ears, w, g)
-        if n_star + n_cavity > 2 * MOST or n_ears + n_rim > 2 * MOST:
+        if n_star + n_cavity > 2 * MOST_TOUCHED or n_ears + n_rim > 2 * MOST_TOUCHED:
             return unknown
         for k in range(n_cavity):
             t = np.int64(cavity[k])
@@ -1325,31 +1322,12 @@ def make_live(n_vertices: int) -> Live:
         edge=np.empty(2 * n, np.int32),
         ears=np.empty((2 * n, 3), np.uint32),
         ear_edges=np.empty((2 * n, 3), np.int32),
-        gone=np.empty(2 * MOST, np.int64),
-        forms=np.empty((2 * MOST, 12), np.float64),
-        saved=np.empty(10 * MOST, np.uint32),
+        gone=np.empty(2 * MOST_TOUCHED, np.int64),
+        forms=np.empty((2 * MOST_TOUCHED, 12), np.float64),
+        saved=np.empty(10 * MOST_TOUCHED, np.uint32),
         tally=np.zeros(13, np.int64),
         amount=np.zeros(3, np.float64),
     )
-
-
-_local = threading.local()
-
-
-@contextmanager
-def lent_live(n_vertices: int) -> Iterator[Live]:
-    """Lend books for a model of that size, with anything in them, to this thread until the context ends.
-
-    Each thread keeps the books that it had last; whoever asks while they are lent gets others.
-    """
-    held = getattr(_local, "live", None)
-    _local.live = None
-    if held is None or held[0] != n_vertices:
-        held = (n_vertices, make_live(n_vertices))
-    try:
-        yield held[1]
-    finally:
-        _local.live = held
 
 
 def build(ground: Ground, live: Live, sites: IntArray, name: str) -> None:

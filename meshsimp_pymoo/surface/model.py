@@ -26,8 +26,6 @@ from meshsimp_pymoo.surface.places import below_others, feet, highest, warn_of_p
 
 # What weights may add up to: their products with squares of deviations are numbers then.
 MOST_WEIGHT = 1e100
-# Lazy attributes of a model that do not depend on its weights.
-GEOMETRY_ONLY = ("neighbours", "border", "footprint", "hull")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ class OpenModel:
     unit : float
         Side of the unit square, a power of two [model units].
     facts : dict
-        What was found while checking the surface (see :func:`meshsimp_pymoo.surface.orient.check_open_surface`).
+        What was found while checking the surface (see :class:`~meshsimp_pymoo.surface.orient.SurfaceFacts`).
     weights : (N,) float array, optional
         How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
     feet : (K,) int array
@@ -238,10 +236,7 @@ class OpenModel:
                 f"{self.name}: the {len(values)} {label} add up to {total:g}, beyond {MOST_WEIGHT:g}; "
                 "divide them all by one number"
             )
-        weighted = dataclasses.replace(self, weights=values)
-        # What was found out about the geometry holds for this one too.
-        weighted.__dict__.update({key: self.__dict__[key] for key in GEOMETRY_ONLY if key in self.__dict__})
-        return weighted
+        return dataclasses.replace(self, weights=values)
 
     def to_local(self, points: npt.ArrayLike) -> FloatArray:
         """Turn points (M, 3) of the file's frame into this model's upright local frame [model units]."""
@@ -254,8 +249,7 @@ class OpenModel:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        lazy = (*GEOMETRY_ONLY, "hash")
-        return {name: value for name, value in self.__dict__.items() if name not in lazy}
+        return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
 
 
 def placed_model(

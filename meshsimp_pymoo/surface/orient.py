@@ -2,7 +2,7 @@
 
 An open model is (nearly) a height field over the plane across its `up` direction. Here that direction is
 found, the model is turned so that it points along z, everything that would contradict a height field is
-counted (:func:`surface_facts`), judged (:func:`check_open_surface`), or cut away (:func:`front_patch`).
+counted (:func:`surface_facts`), judged (:func:`open_faces`), or cut away (:func:`front_patch`).
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
     if given is not None:
         direction = _given_direction(given)
         return direction, seen_from(direction)
-    normals = _area_vectors(points, source.faces)
+    normals = area_vectors(points, source.faces)
     areas = np.linalg.norm(normals, axis=1)
     area = float(areas.sum())
     total = normals.sum(axis=0)
@@ -375,22 +375,10 @@ def surface_facts(source: SourceMesh, upright: FloatArray, *, until: float = 1.0
     return _Sheet(source).seen(upright, until, _blur(source, upright))
 
 
-def check_open_surface(source: SourceMesh, upright: FloatArray) -> tuple[IntArray, SurfaceFacts]:
-    """Refuse what is no open surface over the (x, y) plane; see :class:`SurfaceFacts`.
+def open_faces(source: SourceMesh, facts: SurfaceFacts) -> IntArray:
+    """Return the faces (F, 3) counter-clockwise as seen from above, or refuse them.
 
     Vertices in which two fans of faces touch, vertical faces, several parts and unused vertices are no fault.
-
-    Parameters
-    ----------
-    source : SourceMesh
-    upright : (V, 3) float array
-        Its points turned so that the viewer is at +z, ``source.points @ upright_rotation(up).T``.
-
-    Returns
-    -------
-    faces : (F, 3) int64 array
-        The faces counter-clockwise as seen from above: all flipped if the net projected area is negative.
-    facts : SurfaceFacts
 
     Raises
     ------
@@ -403,12 +391,6 @@ def check_open_surface(source: SourceMesh, upright: FloatArray) -> tuple[IntArra
     ModelWarning
         If at most 1 % of the faces are folded over, with their number.
     """
-    facts = surface_facts(source, upright, until=FOLD_SHARE)
-    return open_faces(source, facts), facts
-
-
-def open_faces(source: SourceMesh, facts: SurfaceFacts) -> IntArray:
-    """Return the faces counter-clockwise as seen from above, or refuse them, as :func:`check_open_surface` does."""
     if facts.refusal is not None:
         raise ModelError(facts.refusal)
     if facts.remark is not None:
@@ -457,9 +439,9 @@ def front_patch(source: SourceMesh, up: Up = "auto") -> SourceMesh:
     blur = _blur(source, source.points @ rotation.T)
     points = _local_points(source) @ rotation.T
     faces = source.faces
-    normals = _area_vectors(points, faces)
+    normals = area_vectors(points, faces)
     areas = np.linalg.norm(normals, axis=1)
-    vertical = _vertical(points, faces, normals, areas, blur)
+    vertical = _vertical(points, faces, normals, blur)
     solid = np.flatnonzero(~vertical)
     fronts, backs = _seen_sides(points[faces[solid]], normals[solid, 2] > 0, RAYS) if len(solid) else (0, 0)
     if backs > fronts or (backs == fronts and normals[:, 2].sum() < 0):
@@ -542,14 +524,14 @@ def _local_points(source: SourceMesh) -> FloatArray:
     return source.points - (low + (high - low) / 2)
 
 
-def _area_vectors(points: FloatArray, faces: IntArray) -> FloatArray:
+def area_vectors(points: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the normals (F, 3) of faces, as long as their areas."""
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
     return np.cross(b - a, c - a) / 2
 
 
-def edge_on(points: FloatArray, faces: IntArray) -> BoolArray:
-    """Tell which faces (F, 3) of upright points (V, 3) are seen edge-on from above, to rounding: (F,)."""
-    normals = _area_vectors(points, faces)
+def edge_on(normals: FloatArray) -> BoolArray:
+    """Tell which faces are so steep, by their :func:`area_vectors`, that rounding decides on which side one sees."""
     return np.asarray(np.abs(normals[:, 2]) <= VERTICAL_SHARE * np.linalg.norm(normals, axis=1))
 
 
@@ -611,14 +593,14 @@ class _Sheet:
     def seen(self, upright: FloatArray, until: float, blur: float) -> SurfaceFacts:
         """Describe it as seen from above; see :func:`surface_facts` and :func:`_blur`."""
         faces = self.source.faces
-        normals = _area_vectors(upright, faces)
+        normals = area_vectors(upright, faces)
         areas = np.linalg.norm(normals, axis=1)
         net = float(normals[:, 2].sum())
         flipped = net < 0
         if flipped:
             faces = faces[:, ::-1]
             normals = -normals
-        vertical = _vertical(upright, faces, normals, areas, blur)
+        vertical = _vertical(upright, faces, normals, blur)
         folded = ~vertical & (normals[:, 2] < 0)
         folds = int(folded.sum())
         most = int(until * len(faces)) - folds  # hidden faces that do not matter
@@ -650,9 +632,9 @@ def _blur(source: SourceMesh, upright: FloatArray) -> float:
     return single_precision(source.points[used], upright[used, :2])
 
 
-def _vertical(upright: FloatArray, faces: IntArray, normals: FloatArray, areas: FloatArray, blur: float) -> BoolArray:
-    """Tell which faces are seen edge-on."""
-    vertical = np.abs(normals[:, 2]) <= VERTICAL_SHARE * areas
+def _vertical(upright: FloatArray, faces: IntArray, normals: FloatArray, blur: float) -> BoolArray:
+    """Tell which faces are seen edge-on: steep, and no wider than single precision tells."""
+    vertical = edge_on(normals)
     steep = np.flatnonzero(vertical)
     corners = upright[faces[steep], :2]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)

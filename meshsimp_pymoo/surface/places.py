@@ -7,7 +7,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import warn_of
 from meshsimp_pymoo.plane.order import unit_square
-from meshsimp_pymoo.surface.orient import edge_on
+from meshsimp_pymoo.surface.orient import area_vectors, edge_on
 
 # Coordinates in steps of more than this share of the usual distance of neighbours may have put vertices together.
 COARSE_STEP = 0.01
@@ -47,7 +47,7 @@ def feet(points: FloatArray, faces: IntArray, below: BoolArray) -> IntArray:
     if not below.any():
         return np.empty(0, np.int64)
     holds = np.zeros(len(points), bool)
-    holds[faces[~edge_on(points, faces)]] = True
+    holds[faces[~edge_on(area_vectors(points, faces))]] = True
     return np.flatnonzero(below & ~holds)
 
 

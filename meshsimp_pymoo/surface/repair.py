@@ -74,8 +74,8 @@ def mend(source: SourceMesh) -> tuple[SourceMesh, Mended]:
     >>> mesh.faces.tolist(), str(mended)
     ([[0, 1, 2], [0, 2, 3]], '1 face listed twice and dropped, 1 face wound against the others turned')
     """
-    if source.up == "z":
-        return source, Mended()  # samples of heights, whose faces were made here
+    if source.sort != "mesh":
+        return source, Mended()  # a grid's or cloud's faces were made here
     faces = source.faces
     edges = Edges.of(faces)
     repeated = _repeated(edges)

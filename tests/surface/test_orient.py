@@ -11,6 +11,7 @@ import trimesh
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from samples import check_open_surface
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
@@ -20,7 +21,6 @@ from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.surface.orient import (
     FOLD_SHARE,
     SurfaceFacts,
-    check_open_surface,
     front_patch,
     seen_upright,
     surface_facts,

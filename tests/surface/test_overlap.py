@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
+from samples import check_open_surface
 
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.surface import overlap
-from meshsimp_pymoo.surface.orient import FOLD_SHARE, check_open_surface, surface_facts
+from meshsimp_pymoo.surface.orient import FOLD_SHARE, surface_facts
 from meshsimp_pymoo.surface.overlap import hidden_faces
 
 

@@ -167,7 +167,6 @@ def grid_source(
     nodata: float | None = None,
     name: str = "grid",
     origin: tuple[float, float] = (0.0, 0.0),
-    window: Window | None = None,
 ) -> SourceMesh:
     """Turn a height grid into a triangle mesh, two counter-clockwise triangles per cell.
 
@@ -188,8 +187,6 @@ def grid_source(
         What messages call it.
     origin : (float, float)
         Position of sample (0, 0).
-    window : (column, row, columns, rows), optional
-        The part to take; positions and ``rows`` stay those of the whole grid.
 
     Returns
     -------
@@ -208,7 +205,7 @@ def grid_source(
     >>> grid_source([[0.0, 1.0, 4.0], [2.0, 3.0, float("nan")]]).faces.tolist()
     [[0, 3, 4], [0, 4, 1], [1, 4, 2]]
     """
-    return even_grid(elevation, dx, dy, nodata=nodata, name=name, origin=origin).mesh(name, window)
+    return even_grid(elevation, dx, dy, nodata=nodata, name=name, origin=origin).mesh(name)
 
 
 def check_window(window: Window | None, shape: tuple[int, int], name: str) -> tuple[int, int, int, int]:

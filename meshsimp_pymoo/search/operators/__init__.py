@@ -2,7 +2,7 @@
 
 ``OPERATORS[kind][name]`` is the table behind the names in configuration files. An operator is one file, its row here,
 and its name where names are spelled out for type checkers: in ``__all__`` here and, since all operators are public, in
-``meshsimp_pymoo/__init__.py``.
+``meshsimp_pymoo/__init__.pyi``.
 
 All of them draw from pymoo's ``random_state`` alone, never change their input, and take from the problem only
 ``n_var``, ``pinned`` and ``surface``; `RegionCrossover` also takes ``regions``, and `OAX` has the problem evaluate what

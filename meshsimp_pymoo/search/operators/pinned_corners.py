@@ -12,7 +12,7 @@ from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool
 
 
 class PinnedCorners(Repair):
-    """Keep the pinned vertices (the corners, and whatever else the problem pins) in every chromosome.
+    """Keep the pinned vertices in every chromosome: whatever the problem pins, the corners if nothing else is said.
 
     The objectives count pinned vertices as kept in any case; the repair makes the chromosome say so too, so
     that equal meshes have equal chromosomes. Draws nothing, so it may also be attached to a single operator.

@@ -1,0 +1,54 @@
+"""The public names, each with its home: type checkers read this file, and so does the package itself."""
+
+from meshsimp_pymoo.errors import ModelError as ModelError
+from meshsimp_pymoo.errors import ModelWarning as ModelWarning
+from meshsimp_pymoo.errors import ResultError as ResultError
+from meshsimp_pymoo.formats.options import Options as Options
+from meshsimp_pymoo.front import Front as Front
+from meshsimp_pymoo.front import FrontSolution as FrontSolution
+from meshsimp_pymoo.indicators import Cardinality as Cardinality
+from meshsimp_pymoo.indicators import Coverage as Coverage
+from meshsimp_pymoo.indicators import HypervolumeRatio as HypervolumeRatio
+from meshsimp_pymoo.indicators import MultiplicativeEpsilon as MultiplicativeEpsilon
+from meshsimp_pymoo.indicators import merged_front as merged_front
+from meshsimp_pymoo.opening import open_grid as open_grid
+from meshsimp_pymoo.problem import MeshProblem as MeshProblem
+from meshsimp_pymoo.report.figures import plot_error as plot_error
+from meshsimp_pymoo.report.figures import plot_front as plot_front
+from meshsimp_pymoo.report.figures import plot_mesh as plot_mesh
+from meshsimp_pymoo.search.display import FrontOutput as FrontOutput
+from meshsimp_pymoo.search.greedy import greedy_insertion as greedy_insertion
+from meshsimp_pymoo.search.greedy import thinning as thinning
+from meshsimp_pymoo.search.memetic import memetic as memetic
+from meshsimp_pymoo.search.moead import moead as moead
+from meshsimp_pymoo.search.nsga import nsga2_v1 as nsga2_v1
+from meshsimp_pymoo.search.nsga import nsga2_v2 as nsga2_v2
+from meshsimp_pymoo.search.nsga import nsga3 as nsga3
+from meshsimp_pymoo.search.operators import OAX as OAX
+from meshsimp_pymoo.search.operators import HalfPlaneCrossover as HalfPlaneCrossover
+from meshsimp_pymoo.search.operators import NeighbourShift as NeighbourShift
+from meshsimp_pymoo.search.operators import NestedSubsets as NestedSubsets
+from meshsimp_pymoo.search.operators import PackedDuplicates as PackedDuplicates
+from meshsimp_pymoo.search.operators import PinnedCorners as PinnedCorners
+from meshsimp_pymoo.search.operators import RandomSubset as RandomSubset
+from meshsimp_pymoo.search.operators import RegionCrossover as RegionCrossover
+from meshsimp_pymoo.search.operators import Relocation as Relocation
+from meshsimp_pymoo.search.operators import SizeStep as SizeStep
+from meshsimp_pymoo.search.operators import SubsetUniformCrossover as SubsetUniformCrossover
+from meshsimp_pymoo.search.weighted import WeightedSum as WeightedSum
+from meshsimp_pymoo.search.weighted import weighted_ga_v1 as weighted_ga_v1
+from meshsimp_pymoo.search.weighted import weighted_ga_v2 as weighted_ga_v2
+from meshsimp_pymoo.storage import read_front as read_front
+from meshsimp_pymoo.storage import write_front as write_front
+from meshsimp_pymoo.surface.height import HeightSurface as HeightSurface
+from meshsimp_pymoo.surface.height import refit_heights as refit_heights
+from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation as LiveTriangulation
+from meshsimp_pymoo.surface.measures import Quality as Quality
+from meshsimp_pymoo.surface.model import OpenModel as OpenModel
+from meshsimp_pymoo.surface.rules import Rules as Rules
+from meshsimp_pymoo.surface.surface import Refitted as Refitted
+from meshsimp_pymoo.tiles.front import tiled_front as tiled_front
+from meshsimp_pymoo.workers import DaskEngine as DaskEngine
+from meshsimp_pymoo.workers import Processes as Processes
+
+__version__: str
