@@ -442,6 +442,7 @@ def test_problems_pickle_without_memory_of_the_run_and_copies_are_shared():
     np.testing.assert_array_equal(again.evaluate(subsets(problem, 50))[0], F)
     np.testing.assert_array_equal(again.evaluate(subsets(problem, 50))[1], G)
     assert copy.deepcopy(problem) is problem
+    assert copy.deepcopy(problem.surface) is problem.surface
     runner = pickle.loads(pickle.dumps(ThreadRunner(2)))
     assert runner.n_threads == 2
 

@@ -328,6 +328,15 @@ def test_what_is_no_configuration_is_refused_without_harm(text, expected, tmp_pa
         read_experiment_file(path)
 
 
+def test_what_does_not_fit_into_memory_is_named_with_its_place(tmp_path, monkeypatch):
+    def too_large(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr("meshsimp_pymoo.problem.MeshProblem.__init__", too_large)
+    line = message(changed(tmp_path, problems="[{name: A, model: 'pyramid:9'}]"))
+    assert re.search(r"line 2: problems\[0\]\S*: .*does not fit into memory; make it smaller", line)
+
+
 def test_a_binary_file_and_a_missing_one_are_named(tmp_path):
     (tmp_path / "x.yaml").write_bytes(b"\xff\xfe\x00\x80")
     assert "UTF-8" in message(tmp_path / "x.yaml")

@@ -6,10 +6,12 @@ import contextlib
 import io
 import itertools
 import json
+import math
 import pickle
 import time
 import zipfile
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -207,6 +209,30 @@ def test_a_checkpoint_is_little_more_than_its_bits(tmp_path):
     saved(first, tmp_path / "c.npz")
     n = problem.n_var
     assert 16 * n / 8 < (tmp_path / "c.npz").stat().st_size < 16 * n / 8 + 30_000
+
+
+class Pair(NamedTuple):
+    one: object
+    other: object
+
+
+def test_values_of_every_kind_that_an_algorithm_may_hold_come_back(problems, tmp_path):
+    held = {
+        "plain": [None, True, 3, 0.1, "text", -math.inf, np.float32(0.1), np.int64(7)],
+        "inside each other": (Pair({"b", "a"}, {1, 2.5}), {(1, 2): [{3}, ()]}),
+        "arrays": [np.arange(6.0).reshape(2, 3), np.arange(11) % 3 == 0],
+    }
+    first, second = (set_up("nsga2_v1", problems["usual"]) for _ in range(2))
+    first.next()
+    first.data["held"] = held
+    second.data["held"] = {"inside each other": (Pair(0, 0), {})}
+    restore(saved(first, tmp_path / "c.npz"), second)
+    found = second.data["held"]
+    for here, there in zip(found.pop("arrays"), held.pop("arrays"), strict=True):
+        assert here.dtype == there.dtype
+        np.testing.assert_array_equal(here, there)
+    assert found == held
+    assert [type(value) for value in found["plain"]] == [type(value) for value in held["plain"]]
 
 
 class Other:

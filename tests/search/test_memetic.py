@@ -7,9 +7,11 @@ import itertools
 import numpy as np
 import pytest
 from enumerable_models import GENERATIONS, MOST_FREE, nondominated, random_problem, same_front, true_front
+from pymoo.core.population import Population
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo import MeshProblem, NestedSubsets, PackedDuplicates, memetic, thinning
+from meshsimp_pymoo.search import memetic as module
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import IDLE, DownTheLadder, SizeLadder
 
@@ -90,6 +92,30 @@ def test_where_all_vertices_are_not_the_best_mesh_the_front_still_ends_with_the_
     result = minimize(problem, memetic(20, moves_per_vertex=0), ("n_gen", 2), seed=1)
     assert result.F[:, 0].min() <= thinned.error.min() * (1 + 1e-9)
     assert result.F[:, 0].min() < result.algorithm.pop.get("F")[:, 0].min()  # the last rungs have none of it
+
+
+def test_a_rung_on_which_no_individual_fits_has_none():
+    problem = MeshProblem("roof:5")
+    pop = Population.new("F", np.array([[5.0, 9], [0.5, 12], [5.0, 8], [0.5, 14]]))
+    assert SizeLadder(np.array([7, 8, 11, 20])).best(problem, pop).tolist() == [-1, 2, 2, 1]
+
+
+def test_what_is_filled_in_between_two_rungs_fits_into_memory(monkeypatch):
+    problem = MeshProblem("face:200")
+    X = np.array([thinning(problem.surface).kept(k) for k in (60, 0)])
+    F = problem.evaluate(X)
+    n_rows = []
+    for most in (1, 2, 1000):
+        monkeypatch.setattr(module, "ENTRIES", most * X.size)
+        n_rows.append(len(module.between_the_rungs(problem.surface, X, F, most=0)))
+    assert n_rows == [1, 2, module.BETWEEN]
+
+
+def test_between_rungs_of_one_error_there_is_nothing_to_find():
+    roof = MeshProblem("roof:5")
+    front = thinning(roof.surface)
+    X = np.array([front.kept(k) for k in (np.flatnonzero(front.error == 0)[0], len(front) - 1)])
+    assert len(module.between_the_rungs(roof.surface, X, roof.evaluate(X), most=0)) == 0
 
 
 def test_the_memetic_front_is_never_worse_than_thinning_and_soon_better(problem):

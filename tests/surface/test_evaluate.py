@@ -118,6 +118,14 @@ def test_everything_kept_has_no_error(model):
     assert row[ERROR] == 0
 
 
+@pytest.mark.parametrize("axes", [[0, 1], [1, 0]])
+def test_a_bay_within_the_last_cells_of_the_unit_square_is_no_part_of_the_model(axes):
+    xy = np.array([[0, 0], [1, 0], [0.95, 0.5], [1, 1], [0, 1]])[:, axes]
+    faces = np.array([[0, 1, 2], [0, 2, 4], [2, 3, 4]])
+    model = build_model(SourceMesh(np.column_stack([xy, np.zeros(5)]), faces, {}, "bay"), up="z")
+    assert surface(model).evaluate(np.ones(5, bool))[0, TRIANGLES] == 3
+
+
 def test_a_roof_of_four_triangles_is_exact_and_of_two_loses_its_ridge():
     roof = build_model(load("roof:17"))
     corners = np.isin(np.arange(roof.n_vertices), roof.corners)

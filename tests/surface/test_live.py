@@ -15,7 +15,7 @@ from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.measures import measured
-from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.model import build_model, placed_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
 
 
@@ -200,6 +200,43 @@ def test_a_maximum_is_no_sum_and_is_refused():
             call(surface(MODELS["grid"], measure="max_error"))
     with pytest.raises(ValueError, match="lower a sum over the vertices, and 'max_error' is none"):
         LiveTriangulation(surface(MODELS["grid"], measure="max_error"), np.ones(81, bool))
+
+
+def test_what_was_tried_before_leaves_nothing_behind_in_what_is_tried_next():
+    """Not even where a site of three triangles goes, so that one triangle takes all its vertices."""
+    model = MODELS["terrain"]
+    rng = np.random.default_rng(1)
+    n_found = 0
+    for _ in range(12):
+        kept = rng.random(model.n_vertices) < 0.1
+        kept[model.corners] = True
+        live = LiveTriangulation(surface(model, footprint="hull"), kept)
+        free = np.setdiff1d(np.flatnonzero(kept), model.corners).tolist()
+        for v in (v for v in free if (live.faces == v).any(axis=1).sum() == 3):
+            expected = live.remove(v)
+            live.insert(v)
+            for w in free:
+                live.try_remove(w)
+                assert live.try_remove(v)[0] == pytest.approx(expected, rel=1e-9)
+            n_found += 1
+    assert n_found > 5
+
+
+def test_a_sliver_far_from_what_changes_is_peeled_and_drawn_as_it_comes_to_reach_the_outside_or_not():
+    """Sliver (1, 3, 2) lies on sliver (1, 4, 3), and that on the hull; site 0 is in the circle of the latter alone."""
+    xy = np.array([[0.4, 0], [0.3, 0.95], [0.300025, 0.95 + 1.35e-9], [0.30005, 0.95 + 0.9e-9], [0.5, 0.95],
+                   [0, 1], [1, 1], [0.4, 1]])  # fmt: skip
+    xy = np.round(xy * 2.0**52) / 2.0**52
+    points, rows = np.column_stack([xy, np.arange(8.0) ** 2]), np.arange(8)
+    model = placed_model(
+        "slivers", points, np.array([[0, 6, 5]]), np.array([0, 5, 6]), xy=xy, unit=1.0, source_index=rows
+    )
+    live = LiveTriangulation(surface(model, footprint="hull"), rows > 0)
+    for change in (live.insert, live.remove, live.insert):
+        assert [1, 3, 2] not in live.faces.tolist() or live.kept[0]
+        change(0)
+        assert_as_from_scratch(live, "hull", "nearest")
+    assert [1, 3, 2] in live.faces.tolist()
 
 
 def test_removing_everything_but_the_corners_and_putting_it_back_restores_the_mesh():

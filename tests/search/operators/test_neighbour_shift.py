@@ -111,6 +111,10 @@ def test_blocks_of_rows_make_no_difference_to_the_rules(monkeypatch: pytest.Monk
     shifted = NeighbourShift(0.5)._do(problem, X, random_state=np.random.default_rng(7))
     assert_array_equal(shifted.sum(axis=1), X.sum(axis=1))
     assert (shifted != X).any(axis=1).mean() > 0.9
+    alone = np.zeros((7, 36), dtype=bool)
+    alone[:, 15] = True
+    shifted = NeighbourShift(1.0)._do(problem, alone, random_state=np.random.default_rng(7))
+    assert set(np.flatnonzero(shifted) % 36) == {14, 16}  # one step each, in whatever block
 
 
 @pytest.mark.parametrize(
@@ -125,6 +129,16 @@ def test_successes_are_binomial_ascending_and_in_range(n: int, rate: float) -> N
     deviation = np.sqrt(n * rate * (1 - rate))
     assert abs(counts.mean() - n * rate) <= 4 * deviation / 20
     assert abs(counts.std() - deviation) <= 0.2 * deviation + 1e-9
+
+
+def test_draws_that_do_not_reach_the_end_go_on_where_the_last_one_ended() -> None:
+    class Steps:
+        """Gaps of two, as few as a draw may have."""
+
+        def geometric(self, rate: float, size: int) -> np.ndarray:
+            return np.full(size, 2)
+
+    assert_array_equal(bernoulli_positions(1000, 0.01, Steps()), np.arange(1, 1000, 2))  # type: ignore[arg-type]
 
 
 def test_every_position_is_equally_likely_to_succeed() -> None:
