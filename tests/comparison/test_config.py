@@ -183,6 +183,19 @@ MISTAKES = {
         {"problems": "[{model: pyramid, fotprint: hull}]"},
         ["problems[0].fotprint", "unknown key", "'footprint'"],
     ),
+    "unknown key with its line and value": (
+        {"title": "a\nproblem:\n  footprint: hull\n  max_edges: 3", "problem": None},
+        ["line 8", "problem.max_edges: 3: unknown key", "'max_edge'", "known here: up, "],
+    ),
+    "MeshLab is nothing": ({"baselines": "{meshlab: }"}, ["baselines.meshlab: nothing: expected a mapping"]),
+    "a number for true or false": (
+        {"baselines": "{meshlab: {down_to_fronts: 1}}"},
+        ["baselines.meshlab.down_to_fronts: 1: expected true or false"],
+    ),
+    "tag on a list": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: !!python/tuple [1]}}]"},
+        ["algorithms[0].parameters.pop_size", "the tag", "python/tuple' is not understood"],
+    ),
     "option value unknown": ({"problem": "{footprint: hul}"}, ["problem.footprint", "'hul'", "'hull'"]),
     "option of wrong type": ({"problem": "{max_error: small}"}, ["problem.max_error", "'small'", "number"]),
     "objective unknown": ({"problem": "{objectives: [errror, triangles]}"}, ["problem.objectives", "rms_error"]),
@@ -317,10 +330,11 @@ def test_the_configuration_of_the_mistakes_is_good_without_them(tmp_path):
         ("a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
             f"{chr(98 + k)}: &{chr(98 + k)} [{', '.join(['*' + chr(97 + k)] * 10)}]\n" for k in range(8)
         ), "once aliases are replaced"),
+        ("".join(f"a{k}: &a{k} [{f'*a{k - 1}' if k else ''}]\n" for k in range(60)), "nested too deeply"),
         ("seeds: [" + "1, " * 400_000 + "]", "bytes"),
         ("title: \x00", "is no YAML"),
     ],
-    ids=["empty", "open list", "indentation", "tag", "depth", "cycle", "aliases", "size", "control"],
+    ids=["empty", "open list", "indentation", "tag", "depth", "cycle", "aliases", "deep aliases", "size", "control"],
 )  # fmt: skip
 def test_what_is_no_configuration_is_refused_without_harm(text, expected, tmp_path):
     path = write(tmp_path, text)
