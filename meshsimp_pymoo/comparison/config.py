@@ -25,31 +25,37 @@ one line: file, line, place, value, what was expected. The file is data: only pl
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import difflib
 import importlib
 import inspect
 import math
 import os
+import re
 import sys
 import typing
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
+import yaml
+from pydantic import AfterValidator, BaseModel, Field, PlainValidator, ValidationError, create_model, model_validator
+from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
-from meshsimp_pymoo.errors import InputError, ModelError, reason_of
+from meshsimp_pymoo.errors import InputError, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.presets import PRESETS
-from meshsimp_pymoo.settings import Kind, Real, Whole, plain, settings_of
+from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.model import OpenModel
@@ -57,7 +63,6 @@ from meshsimp_pymoo.surface.rules import Rules
 
 if TYPE_CHECKING:
     from pymoo.core.algorithm import Algorithm
-    from yaml.nodes import Node
 
 __all__ = [
     "AlgorithmConfig",
@@ -81,14 +86,6 @@ MAX_FILE_NAME = 255
 # Parameters that decide how much memory and time a trial takes, and the most of them that can be meant.
 MOST = {"pop_size": 5_000, "n_offsprings": 5_000, "ref_dirs": 5_000, "n_neighbors": 5_000, "moves_per_vertex": 1_000}
 
-# Keys of `problem`: how a model is read, what counts, and these arguments of MeshProblem.
-LIMITS: dict[str, Kind] = {"max_triangles": Whole(1), "max_error": Real(0), "regions": Whole(1)}
-PROBLEM_OPTIONS = (
-    *settings_of(Options),
-    *(name for name, known in settings_of(Rules).items() if not known.derived),
-    "objectives",
-    *LIMITS,
-)
 # What a pymoo algorithm calls the operator of a kind.
 ARGUMENT_OF_KIND = {kind: "eliminate_duplicates" if kind == "duplicates" else kind for kind in OPERATORS}
 # The operators an algorithm gets by import path where the file names none: the paper's.
@@ -98,6 +95,14 @@ DEFAULT_OPERATORS = {
     "mutation": "neighbour_shift",
     "repair": "pinned_corners",
     "duplicates": "packed",
+}
+# What pymoo's operators of a kind derive from.
+BASES = {
+    "sampling": "pymoo.core.sampling.Sampling",
+    "crossover": "pymoo.core.crossover.Crossover",
+    "mutation": "pymoo.core.mutation.Mutation",
+    "repair": "pymoo.core.repair.Repair",
+    "duplicates": "pymoo.core.duplicate.DuplicateElimination",
 }
 BUDGET_KINDS = ("generations", "evaluations", "seconds")
 # Every algorithm is tried out on this model, and on problems that are even smaller.
@@ -114,40 +119,171 @@ class ConfigError(InputError):
     """The configuration cannot be used: one line with the file, the place, the value and what was expected."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class OperatorConfig:
-    """An operator: its name in `OPERATORS` or import path, and its arguments."""
+# ------------------------------------------------------------------------------------------ values and their mistakes
 
-    name: str
-    parameters: Mapping[str, Any] = field(default_factory=dict)
+
+class _Mistake(ValueError):
+    """What is wrong with a value, or with a part of it: ``at`` are its keys and numbers of items."""
+
+    def __init__(self, text: str, *at: str | int) -> None:
+        super().__init__(text)
+        self.at = at
+
+
+@contextlib.contextmanager
+def _blaming(*at: str | int, what: str = "") -> Iterator[None]:
+    """Say of whatever goes wrong which value is to blame, and what could not be done."""
+    try:
+        yield
+    except _Mistake as mistake:
+        mistake.at = (*at, *mistake.at)
+        raise
+    except MemoryError as problem:
+        raise _Mistake(f"{what or 'this'} does not fit into memory; make it smaller", *at) from problem
+    except Exception as problem:
+        name = "" if isinstance(problem, ValueError) else f"{type(problem).__name__}: "
+        reason = " ".join(str(problem).split()) or type(problem).__name__
+        raise _Mistake(f"{what}{what and ': '}{name}{reason}", *at) from problem
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError("expected a text; put it in quotes if it is one")
+    if not value.strip():
+        raise ValueError("expected a text")
+    return value
+
+
+def _name(value: Any) -> str:
+    name = _text(value).strip()
+    if len(name) > MAX_NAME or not name.isprintable():
+        raise ValueError(f"expected a name of at most {MAX_NAME} printable characters")
+    return name
+
+
+def _different(things: tuple[Any, ...]) -> tuple[Any, ...]:
+    names = [getattr(thing, "name", thing) for thing in things]
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            way_out = f"the name {name!r} is there twice; give each a 'name' of its own"
+            raise _Mistake(way_out if hasattr(things[place], "name") else "is there twice", place)
+    return things
+
+
+def _single(values: dict[str, Any]) -> dict[str, Any]:
+    if len(values) != 1:
+        raise ValueError(f"has {len(values)} keys; give one parameter and the list of its values")
+    return values
+
+
+def _algorithm_path(value: Any) -> str:
+    from pymoo.core.algorithm import Algorithm
+
+    path = _text(value)
+    if "." not in path:
+        raise ValueError("expected an import path such as pymoo.algorithms.moo.spea2.SPEA2")
+    with _blaming():
+        found = _imported(path)
+    if not (inspect.isclass(found) and issubclass(found, Algorithm)):
+        raise ValueError("this is no pymoo algorithm (a class derived from pymoo.core.algorithm.Algorithm)")
+    return path
+
+
+def _objectives(value: Any) -> list[str]:
+    if not isinstance(value, list) or len(value) != 2 or value[0] not in OBJECTIVES or value[1] != "triangles":
+        several = "; an experiment compares fronts of two objectives, more are for nsga3() in Python"
+        is_longer = isinstance(value, list) and len(value) > 2
+        raise ValueError(f"expected [one of {', '.join(OBJECTIVES)}, triangles]{several if is_longer else ''}")
+    return value
+
+
+def _of(read: Kind | Callable[[Any], Any]) -> Any:
+    """Return what pydantic asks to read a value."""
+    return PlainValidator(read if callable(read) else read.from_plain)
+
+
+Thing = TypeVar("Thing")
+Text = Annotated[str, _of(_text)]
+Name = Annotated[str, _of(_name)]
+Count = Annotated[int, _of(Whole(1))]
+Different = Annotated[tuple[Thing, ...], Field(min_length=1), AfterValidator(_different)]
+
+# ------------------------------------------------------------------------------------------ the parts of a file
+
+
+class Part(BaseModel):
+    """A mapping with known keys, its fields. Where there is a ``word``, a bare text is the value of that key."""
+
+    model_config = {"frozen": True, "extra": "forbid"}
+    word: ClassVar[str] = ""
+    # Of these keys exactly one is given; and what messages call them.
+    one_of: ClassVar[Mapping[str, str]] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, given: Any) -> Any:
+        names = [known.alias or name for name, known in cls.model_fields.items()]
+        if cls.word and isinstance(given, str):
+            return {cls.word: given}
+        if not isinstance(given, dict):
+            raise ValueError(f"expected a mapping with the keys {', '.join(names)}")
+        for name in given:
+            if name not in names:
+                raise _Mistake(f"unknown key{_suggestion(name, names)}; known here: {', '.join(names)}", name)
+        found = [name for name in cls.one_of if name in given]
+        if cls.one_of and len(found) != 1:
+            raise ValueError(f"give one of {', '.join(cls.one_of.values())}, not {' and '.join(found) or 'none'}")
+        return given
+
+    def given(self) -> dict[str, Any]:
+        """Return what the file says, by key."""
+        return {name: value for name, value in self if name in self.model_fields_set}
+
+
+def _with_keys(known: Mapping[str, Any]) -> Any:
+    """Return a class of parts with keys that may be left out, each with what reads its value."""
+    fields: dict[str, Any] = {name: (Annotated[Any, read], None) for name, read in known.items()}
+    return create_model("Part", __base__=Part, **fields)
+
+
+# Keys of `problem`: how a model is read, what counts, and these arguments of MeshProblem.
+LIMITS: dict[str, Kind] = {"max_triangles": Whole(1), "max_error": Real(0), "regions": Whole(1)}
+PROBLEM_OPTIONS = {
+    **{
+        name: _of(known.kind)
+        for name, known in (settings_of(Options) | settings_of(Rules)).items()
+        if not known.derived
+    },
+    "objectives": _of(_objectives),
+    **{name: _of(kind) for name, kind in LIMITS.items()},
+}
+_Options: Any = _with_keys(PROBLEM_OPTIONS)
+
+
+class ProblemOptions(_Options):
+    """How a model is read and what counts."""
+
+
+class _Problem(ProblemOptions):
+    word = "model"
+    own_name: Name = Field("", alias="name")
+    model: Text
+
+    @property
+    def name(self) -> str:
+        return self.own_name or Path(self.model).stem
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ProblemConfig:
-    """A model, and how it is simplified.
+    """A model, and how it is simplified."""
 
-    Attributes
-    ----------
-    name : str
-        What tables call it.
-    source : str
-        The file or built-in name, as the configuration has it.
-    options : Options
-        How it is read.
-    rules : Rules
-        What counts; their measure is what is minimised beside the triangles.
-    limits : dict
-        Other arguments of `MeshProblem`; see LIMITS.
-    model : OpenModel
-        The model, opened; it holds the weights.
-    """
-
-    name: str
-    source: str
-    options: Options
-    rules: Rules
-    limits: Mapping[str, Any]
-    model: OpenModel
+    name: str  # what tables call it
+    source: str  # the file or built-in name, as the configuration has it
+    options: Options  # how it is read
+    rules: Rules  # what counts; their measure is what is minimised beside the triangles
+    limits: Mapping[str, Any]  # other arguments of `MeshProblem`; see LIMITS
+    model: OpenModel  # the model, opened; it holds the weights
 
     def build(self) -> MeshProblem:
         """Return the problem, evaluated by one thread: an experiment's runs are what is done in parallel."""
@@ -159,35 +295,80 @@ class ProblemConfig:
         return {"model": self.model.hash, "rules": plain(self.rules), "limits": dict(self.limits)}
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class AlgorithmConfig:
-    """An algorithm with its settings.
-
-    Attributes
-    ----------
-    name : str
-        What tables call it.
-    preset : str
-        A key of `PRESETS`; empty if it is given by import path.
-    path : str
-        Import path of a pymoo algorithm; empty if it is a preset.
-    parameters : dict
-        Its arguments.
-    operators : dict of str to OperatorConfig
-        By kind.
-    merged_parameter : str
-        An argument that has several values, whose runs are merged to one front; empty if there is none.
-    merged_values : tuple
-        Its values; (None,) if there is none.
-    """
+@dataclass(frozen=True, kw_only=True)
+class OperatorConfig:
+    """An operator: its name in `OPERATORS` or import path, and its arguments."""
 
     name: str
-    preset: str = ""
-    path: str = ""
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    operators: Mapping[str, OperatorConfig] = field(default_factory=dict)
-    merged_parameter: str = ""
-    merged_values: tuple[Any, ...] = (None,)
+
+    @classmethod
+    def read(cls, kind: str, given: Any) -> OperatorConfig:
+        """Return what a file says of the operator of a kind, once it has been made."""
+        parameters = {"name": given} if isinstance(given, str) else dict(given) if isinstance(given, dict) else {}
+        if "name" not in parameters:
+            raise ValueError(f"give the operator's 'name', one of {', '.join(OPERATORS[kind])}, or an import path")
+        with _blaming("name"):
+            name = _text(parameters.pop("name"))
+            target = _class_of(kind, name if "." in name else Choice(tuple(OPERATORS[kind])).from_plain(name))
+            if not (inspect.isclass(target) and issubclass(target, _imported(BASES[kind]))):
+                raise ValueError(f"this is no pymoo {kind} operator (a class derived from {BASES[kind]})")
+        _check_arguments(parameters, target, name)
+        with _blaming(what=f"the {kind} operator {name!r} cannot be made"):
+            target(**parameters)
+        return cls(name=name, parameters=parameters)
+
+
+_Operators: Any = _with_keys({kind: _of(partial(OperatorConfig.read, kind)) for kind in OPERATORS})
+
+
+class Operators(_Operators):
+    """An algorithm's operators."""
+
+
+class AlgorithmConfig(Part):
+    """An algorithm with its settings: a preset or an import path of pymoo's, its arguments and its operators."""
+
+    word = "preset"
+    one_of = {"preset": f"'preset' (one of {', '.join(PRESETS)})", "class": "'class' (an import path)"}
+    own_name: Name = Field("", alias="name")
+    preset: Annotated[str, _of(Choice(tuple(PRESETS)))] = ""
+    path: Annotated[str, _of(_algorithm_path)] = Field("", alias="class")
+    parameters: dict[str, Any] = {}
+    own_operators: Operators = Field(Operators(), alias="operators")
+    # a parameter with several values, whose runs are merged to one front
+    merged_over: Annotated[dict[str, Different[Any]], AfterValidator(_single)] = {}
+
+    @property
+    def name(self) -> str:
+        """What tables call it."""
+        return self.own_name or self.preset or self.path.rpartition(".")[2]
+
+    @property
+    def target(self) -> Any:
+        """The function or class that makes it."""
+        return PRESETS[self.preset].function if self.preset else _imported(self.path)
+
+    @property
+    def operators(self) -> dict[str, OperatorConfig]:
+        """Its operators by kind: those that the file names, and the paper's for an algorithm by import path."""
+        known = _parameters(self.target)
+        default = {
+            kind: OperatorConfig(name=name)
+            for kind, name in DEFAULT_OPERATORS.items()
+            if self.path and (known is None or ARGUMENT_OF_KIND[kind] in known)
+        }
+        return default | self.own_operators.given()
+
+    @property
+    def merged_parameter(self) -> str:
+        """The argument that has several values; empty if there is none."""
+        return next(iter(self.merged_over), "")
+
+    @property
+    def merged_values(self) -> tuple[Any, ...]:
+        """Its values; (None,) if there is none."""
+        return self.merged_over.get(self.merged_parameter, (None,))
 
     def build(self, merged_value: Any = None) -> Algorithm:
         """Return the algorithm, made anew.
@@ -199,8 +380,7 @@ class AlgorithmConfig:
             arguments[self.merged_parameter] = merged_value
         for kind, operator in self.operators.items():
             arguments[ARGUMENT_OF_KIND[kind]] = _class_of(kind, operator.name)(**operator.parameters)
-        target = PRESETS[self.preset].function if self.preset else _imported(self.path)
-        return copy.deepcopy(target(**arguments))
+        return copy.deepcopy(self.target(**arguments))
 
     def description(self, merged_value: Any = None) -> dict[str, Any]:
         """Return what decides the results: the algorithm, its parts and all their settings in effect."""
@@ -217,27 +397,77 @@ class AlgorithmConfig:
             described["merged"] = {self.merged_parameter: merged_value}
         return described
 
+    @model_validator(mode="after")
+    def _can_be_made(self) -> AlgorithmConfig:
+        for kind, argument in ARGUMENT_OF_KIND.items():
+            if argument in self.parameters:
+                raise _Mistake(f"operators stand under 'operators', this one as {kind!r}", "parameters", argument)
+        for key, arguments in (("parameters", self.parameters), ("merged_over", self.merged_over)):
+            with _blaming(key):
+                _check_arguments(arguments, self.target, self.preset or self.path)
+        if self.merged_parameter in self.parameters:
+            way_out = f"{self.merged_parameter!r} is in 'parameters' too; give it in one place"
+            raise _Mistake(way_out, "merged_over", self.merged_parameter)
+        for value in self.merged_values:
+            at = f" with {self.merged_parameter} = {value!r}" if self.merged_over else ""
+            with _blaming(what=f"the algorithm {self.name!r} cannot be made{at}"):
+                self.build(value)
+        return self
 
-@dataclass(frozen=True, kw_only=True)
-class Budget:
-    """When a run ends: after the generation that reaches an amount of generations, evaluations or seconds."""
 
-    name: str
-    kind: str
-    amount: float
+class Budget(Part):
+    """When a run ends: after the generation that reaches a number of generations, of evaluations, or of seconds."""
 
-    def description(self) -> dict[str, Any]:
-        """Return what decides the results."""
-        return {self.kind: self.amount}
+    one_of = {kind: kind for kind in BUDGET_KINDS}
+    own_name: Name = Field("", alias="name")
+    generations: Count = 0
+    evaluations: Count = 0
+    seconds: Annotated[float, _of(Real(0, strict=True))] = 0
+
+    @property
+    def name(self) -> str:
+        """What tables call it."""
+        return self.own_name or f"{self.amount:g} {self.kind}"
+
+    @property
+    def kind(self) -> str:
+        """The one of BUDGET_KINDS that is limited."""
+        return next(kind for kind in BUDGET_KINDS if getattr(self, kind))
+
+    @property
+    def amount(self) -> float:
+        """How many of them."""
+        return getattr(self, self.kind)
 
 
-@dataclass(frozen=True, kw_only=True)
-class MeshLabConfig:
+class MeshLabConfig(Part):
     """MeshLab's methods: which, and whether also down to the fewest triangles of the evolutionary fronts."""
 
-    methods: tuple[str, ...]
-    down_to_fronts: bool = True
-    steps: int = 10
+    methods: Different[Annotated[str, _of(Choice(tuple(MESHLAB_METHODS)))]] = tuple(MESHLAB_METHODS)
+    down_to_fronts: bool = Field(True, strict=True)
+    steps: Count = 10
+
+    @classmethod
+    def read(cls, given: Any) -> MeshLabConfig | None:
+        """Return what a file says of them: true for all of them, false for none, or more."""
+        return None if given is False else cls.model_validate({} if given is True else given)
+
+
+class Baselines(Part):
+    """The methods that are compared with."""
+
+    meshlab: Annotated[MeshLabConfig | None, _of(MeshLabConfig.read)] = None
+
+
+class _File(Part):
+    title: Text = ""
+    folder: Text = ""
+    problem: ProblemOptions = ProblemOptions()
+    problems: Different[_Problem]
+    algorithms: Different[AlgorithmConfig]
+    seeds: Different[Annotated[int, _of(Whole(0))]]
+    budgets: Different[Budget]
+    baselines: Baselines = Baselines()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -269,29 +499,29 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
     ConfigError
         If anything in it is wrong; nothing has been run then but two generations on a tiny model.
     """
-    root = _read(Path(path)).mapping(
-        ("title", "folder", "problem", "problems", "algorithms", "seeds", "budgets", "baselines"),
-        required=("problems", "algorithms", "seeds", "budgets"),
-    )
-    title = root["title"].text() if "title" in root else Path(path).stem
-    # everything that is cheap to check comes before the models, which may take a while
-    algorithms = _distinct(root["algorithms"], _algorithm, "algorithm")
-    seeds = _seeds(root["seeds"])
-    budgets = _distinct(root["budgets"], _budget, "budget")
-    meshlab = _baselines(root["baselines"]) if "baselines" in root else None
-    shared = _options(root["problem"], PROBLEM_OPTIONS) if "problem" in root else {}
-    models = _models_folder(root.get("folder"), Path(path), folder)
-    problems = _distinct(root["problems"], lambda entry: _problem(entry, shared, models), "problem")
-    for entry, algorithm in zip(root["algorithms"].items(), algorithms, strict=True):
-        _try_out(entry, algorithm, problems)
+    path = Path(path)
+    source = _Source(path)
+    try:
+        # everything that is cheap to check comes before the models, which may take a while
+        file = _File.model_validate(source.value)
+        models = _models_folder(file.folder, path, folder)
+        problems = []
+        for place, entry in enumerate(file.problems):
+            with _blaming("problems", place):
+                problems.append(_opened(entry, file, models))
+        for place, algorithm in enumerate(file.algorithms):
+            with _blaming("algorithms", place):
+                _try_out(algorithm, problems)
+    except (ValidationError, _Mistake) as error:
+        raise source.answer(error) from error.__cause__
     return Experiment(
-        path=Path(path),
-        title=title,
-        problems=problems,
-        algorithms=algorithms,
-        seeds=seeds,
-        budgets=budgets,
-        meshlab=meshlab,
+        path=path,
+        title=file.title or path.stem,
+        problems=tuple(problems),
+        algorithms=file.algorithms,
+        seeds=file.seeds,
+        budgets=file.budgets,
+        meshlab=file.baselines.meshlab,
     )
 
 
@@ -335,310 +565,99 @@ def settings(part: Any) -> dict[str, Any]:
     return found
 
 
-# ------------------------------------------------------------------------------------------ the parts of a file
+# ----------------------------------------------------------------------------------- whether what it says can be done
 
 
-def _algorithm(entry: Entry) -> AlgorithmConfig:
-    if entry.is_text():
-        entry.choice(PRESETS, "preset")
-        config = AlgorithmConfig(name=entry.text(), preset=entry.text())
-        _check_build(entry, config)
-        return config
-    keys = entry.mapping(("name", "preset", "class", "parameters", "operators", "merged_over"))
-    if ("preset" in keys) == ("class" in keys):
-        entry.fail("give either 'preset' (one of " + ", ".join(PRESETS) + ") or 'class' (an import path)")
-    preset = keys["preset"].choice(PRESETS, "preset") if "preset" in keys else ""
-    path = keys["class"].text() if "class" in keys else ""
-    target = PRESETS[preset].function if preset else _algorithm_class(keys["class"])
-    known = _parameters(target)
-    name = keys["name"].name() if "name" in keys else preset or path.rpartition(".")[2]
-
-    parameters: dict[str, Any] = {}
-    if "parameters" in keys:
-        parameters = _arguments(keys["parameters"], target, preset or path)
-    operators: dict[str, OperatorConfig] = {}
-    if path:
-        operators = {
-            kind: OperatorConfig(name=default)
-            for kind, default in DEFAULT_OPERATORS.items()
-            if known is None or ARGUMENT_OF_KIND[kind] in known
-        }
-    if "operators" in keys:
-        for kind, operator in keys["operators"].mapping(OPERATORS).items():
-            operators[kind] = _operator(operator, kind)
-    merged = ""
-    values: tuple[Any, ...] = (None,)
-    if "merged_over" in keys:
-        merged, values = _merged_over(keys["merged_over"], known, parameters, preset or path)
-    config = AlgorithmConfig(
-        name=name,
-        preset=preset,
-        path=path,
-        parameters=parameters,
-        operators=operators,
-        merged_parameter=merged,
-        merged_values=values,
-    )
-    _check_build(entry, config)
-    return config
+def _models_folder(folder: str, path: Path, given: str | os.PathLike[str] | None) -> Path:
+    if given is None:
+        _check_inside(folder, "of the configuration", "folder")
+        # whether it exists is asked when a model is looked for in it: built-in models need no folder
+        return path.parent / folder
+    if not Path(given).is_dir():
+        raise ConfigError(f"{given}: no such folder of models; name the one that the files are in")
+    return Path(given)
 
 
-def _operator(entry: Entry, kind: str) -> OperatorConfig:
-    if entry.is_text():
-        name = entry
-        rest: dict[str, Entry] = {}
-    else:
-        rest = entry.mapping(None)
-        if "name" not in rest:
-            entry.fail(f"give the operator's 'name', one of {', '.join(OPERATORS[kind])}, or an import path")
-        name = rest.pop("name")
-    spelled = name.text()
-    if "." not in spelled:
-        name.choice(OPERATORS[kind], f"{kind} operator")
-    else:
-        name.try_to(lambda: _imported(spelled))
-    target = _class_of(kind, spelled)
-    base = _pymoo_class(kind)
-    if not (inspect.isclass(target) and issubclass(target, base)):
-        name.fail(f"this is no pymoo {kind} operator (a class derived from {base.__module__}.{base.__name__})")
-    _check_names(rest, target, spelled)
-    parameters = {key: _limited(key, value) for key, value in rest.items()}
-    entry.try_to(lambda: target(**parameters), f"the {kind} operator {spelled!r} cannot be made")
-    return OperatorConfig(name=spelled, parameters=parameters)
-
-
-def _merged_over(
-    entry: Entry, known: set[str] | None, parameters: Mapping[str, Any], owner: str
-) -> tuple[str, tuple[Any, ...]]:
-    keys = entry.mapping(None)
-    if len(keys) != 1:
-        entry.fail(f"has {len(keys)} keys; give one parameter and the list of its values")
-    ((name, values),) = keys.items()
-    if known is not None and name not in known:
-        values.fail(f"{owner} has no parameter {name!r}{_suggestion(name, known)}")
-    if name in parameters:
-        values.fail(f"{name!r} is in 'parameters' too; give it in one place")
-    items = [_limited(name, item) for item in values.items()]
-    if not items:
-        values.fail("the list is empty; give at least one value")
-    for place, item in enumerate(items):
-        if item in items[:place]:
-            values.items()[place].fail(f"the value {item!r} is there twice")
-    return name, tuple(items)
-
-
-def _arguments(entry: Entry, target: Any, owner: str) -> dict[str, Any]:
-    keys = entry.mapping(None)
-    operators = {argument: kind for kind, argument in ARGUMENT_OF_KIND.items()}
-    for name, value in keys.items():
-        if name in operators:
-            value.fail(f"operators stand under 'operators', this one as {operators[name]!r}")
-    _check_names(keys, target, owner)
-    return {name: _limited(name, value) for name, value in keys.items()}
-
-
-def _limited(name: str, entry: Entry) -> Any:
-    """Return a parameter's value, unless it would let a trial take all memory or time."""
-    value = entry.plain()
-    if name in MOST and isinstance(value, (int, float)) and value > MOST[name]:
-        entry.fail(f"expected at most {MOST[name]:,}")
-    return value
-
-
-def _is_many(name: str, value: Any) -> bool:
-    return name in MOST and isinstance(value, int) and value > TRIAL_POPULATION
-
-
-def _check_names(keys: Mapping[str, Entry], target: Any, owner: str) -> None:
-    known = _parameters(target)
-    for name, value in keys.items():
-        if known is not None and name not in known:
-            listed = ", ".join(sorted(known)) or "none"
-            value.fail(f"{owner} has no such parameter{_suggestion(name, known)}; it takes: {listed}")
-
-
-def _check_build(entry: Entry, config: AlgorithmConfig) -> None:
-    for value in config.merged_values:
-        at = f" with {config.merged_parameter} = {value!r}" if config.merged_parameter else ""
-        entry.try_to(
-            lambda value=value: config.build(value),  # type: ignore[misc]
-            f"the algorithm {config.name!r} cannot be made{at}",
-        )
-
-
-def _try_out(entry: Entry, config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None:
-    """Let an algorithm run on a tiny model, and set it up for every problem, before anything is run."""
-    for problem in problems:
-        entry.try_to(
-            lambda problem=problem: config.build(config.merged_values[0]).setup(  # type: ignore[misc]
-                problem.build(), termination=("n_gen", 1), seed=1
-            ),
-            f"the algorithm {config.name!r} cannot be used on the problem {problem.name!r}",
-        )
-    few = {key: min(value, TRIAL_POPULATION) for key, value in config.parameters.items() if _is_many(key, value)}
-    small = replace(config, parameters={**config.parameters, **few})
-    built = [problem.build() for problem in problems]
-    wanted = dict.fromkeys((problem.objectives, problem.regions) for problem in built)
-    trials = [MeshProblem(TRIAL_MODEL, objectives=names, regions=n, n_threads=1) for names, n in wanted]
-    trials += [problem.build() for problem in problems if problem.model.n_vertices < TRIAL_VERTICES]
-    for trial in trials:
-
-        def run(trial: MeshProblem = trial) -> None:
-            from pymoo.optimize import minimize
-
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
-                result = minimize(
-                    trial,
-                    small.build(config.merged_values[0]),
-                    ("n_gen", TRIAL_GENERATIONS),
-                    seed=1,
-                    copy_algorithm=False,
-                )
-            if result.opt is not None and result.opt.get("F").shape[1:] != (2,):  # None: nothing feasible yet
-                raise ValueError("its result is no front of (error, triangles)")
-
-        entry.try_to(run, f"the algorithm {config.name!r} fails on {trial.model.name!r}, a trial")
-
-
-def _seeds(entry: Entry) -> tuple[int, ...]:
-    items = entry.items()
-    if not items:
-        entry.fail("the list is empty; give at least one seed, as in [1, 2, 3]")
-    seeds = [item.whole(0) for item in items]
-    seen: set[int] = set()
-    for item, seed in zip(items, seeds, strict=True):
-        if seed in seen:
-            item.fail(f"the seed {seed} is there twice; a run is not to be counted twice")
-        seen.add(seed)
-    return tuple(seeds)
-
-
-def _budget(entry: Entry) -> Budget:
-    keys = entry.mapping(("name", *BUDGET_KINDS))
-    kinds = [kind for kind in BUDGET_KINDS if kind in keys]
-    if len(kinds) != 1:
-        entry.fail(f"give one of {', '.join(BUDGET_KINDS)}, not {' and '.join(kinds) or 'none'}")
-    kind = kinds[0]
-    amount: float = keys[kind].real(0, strict=True) if kind == "seconds" else keys[kind].whole(1)
-    name = keys["name"].name() if "name" in keys else f"{amount:g} {kind}"
-    return Budget(name=name, kind=kind, amount=amount)
-
-
-def _baselines(entry: Entry) -> MeshLabConfig | None:
-    keys = entry.mapping(("meshlab",))
-    if "meshlab" not in keys:
-        return None
-    meshlab = keys["meshlab"]
-    if meshlab.is_bool():
-        return MeshLabConfig(methods=tuple(MESHLAB_METHODS)) if meshlab.yes_no() else None
-    inner = meshlab.mapping(("methods", "down_to_fronts", "steps"))
-    methods = tuple(MESHLAB_METHODS)
-    if "methods" in inner:
-        items = inner["methods"].items()
-        if not items:
-            inner["methods"].fail(f"the list is empty; give some of {', '.join(MESHLAB_METHODS)}")
-        methods = tuple(item.choice(MESHLAB_METHODS, "MeshLab method") for item in items)
-        for place, name in enumerate(methods):
-            if name in methods[:place]:
-                items[place].fail(f"the method {name!r} is there twice")
-    return MeshLabConfig(
-        methods=methods,
-        down_to_fronts=inner["down_to_fronts"].yes_no() if "down_to_fronts" in inner else True,
-        steps=inner["steps"].whole(1) if "steps" in inner else 10,
-    )
-
-
-def _models_folder(entry: Entry | None, path: Path, given: str | os.PathLike[str] | None) -> tuple[Path, Entry | None]:
-    if given is not None:
-        folder = Path(given)
-        if not folder.is_dir():
-            raise ConfigError(f"{folder}: no such folder of models; name the one that the files are in")
-        return folder, entry
-    if entry is None:
-        return path.parent, None
-    _check_inside(entry, "of the configuration")
-    # whether it exists is asked when a model is looked for in it: built-in models need no folder
-    return path.parent / entry.text(), entry
-
-
-def _check_inside(entry: Entry, whose: str) -> None:
+def _check_inside(text: str, whose: str, at: str) -> None:
     """Refuse a path that leads out of a folder, by any system's rules."""
-    text = entry.text()
     if "\0" in text or any(path.anchor or ".." in path.parts for path in (PurePosixPath(text), PureWindowsPath(text))):
-        entry.fail(f"leads out of the folder {whose}; name the folder of the models by --models FOLDER instead")
+        raise _Mistake(f"leads out of the folder {whose}; name the folder of the models by --models FOLDER instead", at)
     if max(map(len, PurePosixPath(text).parts), default=0) > MAX_FILE_NAME:
-        entry.fail(f"is too long; names of files have at most {MAX_FILE_NAME} characters")
+        raise _Mistake(f"is too long; names of files have at most {MAX_FILE_NAME} characters", at)
 
 
-def _problem(entry: Entry, shared: Mapping[str, Any], models: tuple[Path, Entry | None]) -> ProblemConfig:
-    if entry.is_text():
-        model, name, given = entry, None, dict(shared)
-    else:
-        keys = entry.mapping(("name", "model", *PROBLEM_OPTIONS), required=("model",))
-        model, name = keys["model"], keys.get("name")
-        given = dict(shared) | {key: _option(key, value) for key, value in keys.items() if key in PROBLEM_OPTIONS}
-    source = model.text()
-    where = _model_path(model, source, models)
-    problem = entry.try_to(lambda: MeshProblem(where, **given, n_threads=1), plain=True)
+def _opened(entry: _Problem, file: _File, models: Path) -> ProblemConfig:
+    options = file.problem.given() | {key: value for key, value in entry.given().items() if key in PROBLEM_OPTIONS}
+    where = _model_path(entry.model, models, file.folder)
+    with _blaming():
+        problem = MeshProblem(where, **options, n_threads=1)
     return ProblemConfig(
-        name=name.name() if name is not None else Path(source).stem,
-        source=source,
+        name=entry.name,
+        source=entry.model,
         options=problem.options,
         rules=problem.surface.rules,
-        limits={key: value for key, value in given.items() if key in LIMITS},
+        limits={key: value for key, value in options.items() if key in LIMITS},
         model=problem.model,
     )
 
 
-def _model_path(entry: Entry, source: str, models: tuple[Path, Entry | None]) -> str:
+def _model_path(source: str, models: Path, named: str) -> str:
     """Return the model's file, relative to the folder of models, or the name of a built-in model."""
-    folder, named = models
-    path = folder / source
+    path = models / source
     base = source.partition(":")[0]
     if base in datasets.names() and not is_there(path):
         return source
-    _check_inside(entry, "of models")
+    _check_inside(source, "of models", "model")
     if is_there(path):
         return str(path)
     if not Path(base).suffix and "/" not in source and os.sep not in source:
         near = _suggestion(base, datasets.names())
-        entry.fail(f"there is neither a file {path} nor a built-in model of that name{near}")
-    if not folder.is_dir():
-        way_out = "name the folder by --models FOLDER" + (" or by 'folder'" if named is not None else "")
-        entry.fail(f"the file is missing, for there is no folder {folder}; {way_out}")
-    there = [item.name for item in folder.iterdir()]
-    entry.fail(f"there is no file {path}{_suggestion(Path(source).name, there)}")
+        raise _Mistake(f"there is neither a file {path} nor a built-in model of that name{near}", "model")
+    if not models.is_dir():
+        way_out = "name the folder by --models FOLDER" + (" or by 'folder'" if named else "")
+        raise _Mistake(f"the file is missing, for there is no folder {models}; {way_out}", "model")
+    near = _suggestion(Path(source).name, [item.name for item in models.iterdir()])
+    raise _Mistake(f"there is no file {path}{near}", "model")
 
 
-def _options(entry: Entry, known: Sequence[str]) -> dict[str, Any]:
-    return {key: _option(key, value) for key, value in entry.mapping(known).items()}
+def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str) -> None:
+    """Refuse arguments that something does not take, or that would let a trial take all memory or time."""
+    known = _parameters(target)
+    for name, value in arguments.items():
+        if known is not None and name not in known:
+            listed = ", ".join(sorted(known)) or "none"
+            raise _Mistake(f"{owner} has no such parameter{_suggestion(name, known)}; it takes: {listed}", name)
+        for place, number in enumerate(value if isinstance(value, (list, tuple)) else [value]):
+            if name in MOST and isinstance(number, (int, float)) and number > MOST[name]:
+                raise _Mistake(f"expected at most {MOST[name]:,}", name, place)
 
 
-def _option(key: str, entry: Entry) -> Any:
-    """Return an argument of `MeshProblem`, as far as it can be checked without the model."""
-    if key == "objectives":
-        names = [item.text() for item in entry.items()]
-        if len(names) != 2 or names[0] not in OBJECTIVES or names[1] != "triangles":
-            several = "; an experiment compares fronts of two objectives, more are for nsga3() in Python"
-            entry.fail(f"expected [one of {', '.join(OBJECTIVES)}, triangles]" + (several if len(names) > 2 else ""))
-        return names
-    known = settings_of(Options) | settings_of(Rules)
-    return entry.of(known[key].kind if key in known else LIMITS[key])
+def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None:
+    """Let an algorithm run on a tiny model, and set it up for every problem, before anything is run."""
+    from pymoo.optimize import minimize
 
-
-def _distinct(entry: Entry, read: Callable[[Entry], Any], what: str) -> tuple[Any, ...]:
-    """Read a list of things that must have different names."""
-    items = entry.items()
-    if not items:
-        entry.fail(f"the list is empty; give at least one {what}")
-    things: list[Any] = []
-    for item in items:
-        thing = read(item)
-        if any(thing.name == other.name for other in things):
-            item.fail(f"the name {thing.name!r} is there twice; give every {what} a 'name' of its own")
-        things.append(thing)
-    return tuple(things)
+    built = [problem.build() for problem in problems]
+    for entry, problem in zip(problems, built, strict=True):
+        with _blaming(what=f"the algorithm {config.name!r} cannot be used on the problem {entry.name!r}"):
+            config.build(config.merged_values[0]).setup(problem, termination=("n_gen", 1), seed=1)
+    few = {
+        key: min(value, TRIAL_POPULATION) if key in MOST and isinstance(value, int) else value
+        for key, value in config.parameters.items()
+    }
+    small = config.model_copy(update={"parameters": few})
+    wanted = dict.fromkeys((problem.objectives, problem.regions) for problem in built)
+    trials = [MeshProblem(TRIAL_MODEL, objectives=names, regions=n, n_threads=1) for names, n in wanted]
+    trials += [problem.build() for problem in problems if problem.model.n_vertices < TRIAL_VERTICES]
+    for trial in trials:
+        with (
+            _blaming(what=f"the algorithm {config.name!r} fails on {trial.model.name!r}, a trial"),
+            warnings.catch_warnings(),
+        ):
+            warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
+            algorithm = small.build(config.merged_values[0])
+            result = minimize(trial, algorithm, ("n_gen", TRIAL_GENERATIONS), seed=1, copy_algorithm=False)
+            if result.opt is not None and result.opt.get("F").shape[1:] != (2,):  # None: nothing feasible yet
+                raise ValueError("its result is no front of (error, triangles)")
 
 
 # ------------------------------------------------------------------------------------------- classes by name
@@ -659,35 +678,6 @@ def _imported(path: str) -> Any:
     except AttributeError:
         near = _suggestion(name, dir(importlib.import_module(module)))
         raise ValueError(f"the module {module} has no {name!r}{near}") from None
-
-
-def _pymoo_class(kind: str) -> type:
-    """Return the class that all of pymoo's operators of a kind derive from."""
-    from pymoo.core.crossover import Crossover
-    from pymoo.core.duplicate import DuplicateElimination
-    from pymoo.core.mutation import Mutation
-    from pymoo.core.repair import Repair
-    from pymoo.core.sampling import Sampling
-
-    classes = {
-        "sampling": Sampling,
-        "crossover": Crossover,
-        "mutation": Mutation,
-        "repair": Repair,
-        "duplicates": DuplicateElimination,
-    }
-    return classes[kind]
-
-
-def _algorithm_class(entry: Entry) -> Any:
-    from pymoo.core.algorithm import Algorithm
-
-    if "." not in entry.text():
-        entry.fail("expected an import path such as pymoo.algorithms.moo.spea2.SPEA2")
-    found = entry.try_to(lambda: _imported(entry.text()), plain=True)
-    if not (inspect.isclass(found) and issubclass(found, Algorithm)):
-        entry.fail("this is no pymoo algorithm (a class derived from pymoo.core.algorithm.Algorithm)")
-    return found
 
 
 def _parameters(target: Any) -> set[str] | None:
@@ -733,242 +723,121 @@ def _sorted(values: Mapping[str, Any]) -> dict[str, Any]:
 
 # ---------------------------------------------------------------------------------------- YAML with its places
 
+# What is said of values that pydantic refuses by itself; all else is said by functions of this file.
+EXPECTED = {
+    "missing": "the key {key!r} is missing",
+    "bool_type": "expected true or false",
+    "dict_type": "expected a mapping",
+    "tuple_type": "expected a list",
+    "too_short": "the list is empty; give at least one {one}",
+}
 
-class Entry:
-    """A value in the file, which knows its place.
 
-    Parameters
-    ----------
-    node : yaml.nodes.Node
-        The value.
-    file : Path
-        The file, for messages.
-    place : str
-        Its path in the file, such as ``problems[2].model``.
+class _Source(yaml.SafeLoader):
+    """A YAML file: its value as plain data, and where every part of it stands.
+
+    Raises
+    ------
+    ConfigError
+        If it is none, or too large, or holds anything but plain data.
     """
 
-    def __init__(self, node: Node, file: Path, place: str = "") -> None:
-        self.node = node
-        self.file = file
-        self.place = place
-
-    def fail(self, expected: str) -> NoReturn:
-        """Raise the one line that says where, what and what was expected."""
-        place = f"{self.place}: " if self.place else ""
-        value = f"{self._spelled()}: " if self._spelled() else ""
-        raise ConfigError(f"{self._where()}: {place}{value}{expected}")
-
-    def try_to(self, action: Callable[[], Any], what: str = "", *, plain: bool = False) -> Any:
-        """Do something that this value is to blame for if it fails."""
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.depth = self.count = 0
+        self.parts: dict[tuple[str | int, ...], tuple[Node, int]] = {}
         try:
-            return action()
-        except ConfigError:
-            raise
-        except MemoryError:
-            place = f"{self.place}: " if self.place else ""
-            prefix = f"{what}: " if what else ""
-            raise ConfigError(f"{self._where()}: {place}{prefix}does not fit into memory; make it smaller") from None
-        except Exception as problem:
-            reason = " ".join(str(problem).split()) or type(problem).__name__
-            if not plain and not isinstance(problem, (ModelError, ValueError)):
-                reason = f"{type(problem).__name__}: {reason}"
-            place = f"{self.place}: " if self.place else ""
-            prefix = f"{what}: " if what else ""
-            raise ConfigError(f"{self._where()}: {place}{prefix}{reason}") from problem
-
-    def mapping(self, known: Iterable[str] | None, required: Sequence[str] = ()) -> dict[str, Entry]:
-        """Return the entries of a mapping; None allows any key."""
-        from yaml.nodes import MappingNode, ScalarNode
-
-        names = None if known is None else list(known)
-        if not isinstance(self.node, MappingNode):
-            self.fail("expected a mapping" + (f" with the keys {', '.join(names)}" if names else ""))
-        found: dict[str, Entry] = {}
-        for key, value in self.node.value:
-            if not isinstance(key, ScalarNode):
-                Entry(key, self.file, self.place).fail("a key must be a word")
-            place = f"{self.place}.{key.value}" if self.place else key.value
-            if names is not None and key.value not in names:
-                raise ConfigError(
-                    f"{self.file}, line {key.start_mark.line + 1}: {place}: unknown key"
-                    f"{_suggestion(key.value, names)}; known here: {', '.join(names)}"
-                )
-            if key.value in found:
-                raise ConfigError(f"{self.file}, line {key.start_mark.line + 1}: {place}: is there twice")
-            found[key.value] = Entry(value, self.file, place)
-        for name in required:
-            if name not in found:
-                self.fail(f"the key {name!r} is missing")
-        return found
-
-    def items(self) -> list[Entry]:
-        """Return the entries of a list."""
-        if not self.is_list():
-            self.fail("expected a list")
-        return [Entry(node, self.file, f"{self.place}[{index}]") for index, node in enumerate(self.node.value)]
-
-    def is_list(self) -> bool:
-        """Return whether this is a list."""
-        from yaml.nodes import SequenceNode
-
-        return isinstance(self.node, SequenceNode)
-
-    def is_text(self) -> bool:
-        """Return whether this is a text."""
-        return self.node.tag == "tag:yaml.org,2002:str"
-
-    def is_bool(self) -> bool:
-        """Return whether this is true or false."""
-        return self.node.tag == "tag:yaml.org,2002:bool"
-
-    def text(self) -> str:
-        """Return a text."""
-        if not self.is_text() or not self.node.value.strip():
-            self.fail("expected a text" + ("" if self.is_text() else "; put it in quotes if it is one"))
-        return str(self.node.value)
-
-    def name(self) -> str:
-        """Return a text that can stand in a table."""
-        name = self.text().strip()
-        if len(name) > MAX_NAME or not name.isprintable():
-            self.fail(f"expected a name of at most {MAX_NAME} printable characters")
-        return name
-
-    def choice(self, known: Iterable[str], what: str) -> str:
-        """Return one of the known texts."""
-        names = list(known)
-        word = self.text()
-        if word not in names:
-            self.fail(f"unknown {what}{_suggestion(word, names)}; expected one of {', '.join(names)}")
-        return word
-
-    def yes_no(self) -> bool:
-        """Return true or false."""
-        if not self.is_bool():
-            self.fail("expected true or false")
-        return bool(self.plain())
-
-    def of(self, kind: Kind) -> Any:
-        """Return a value of a kind that settings have."""
-        value = self.plain()
+            if (size := path.stat().st_size) > MAX_BYTES:
+                raise ConfigError(f"{path}: has {size:,} bytes; a configuration has at most {MAX_BYTES:,}")
+            super().__init__(path.read_text(encoding="utf-8"))
+            root = self.get_single_node()
+        except FileNotFoundError:
+            raise ConfigError(f"{path}: no such file") from None
+        except OSError as problem:
+            raise ConfigError(f"{path}: cannot be read ({reason_of(problem)})") from None
+        except UnicodeDecodeError as problem:
+            raise ConfigError(f"{path}: is no text in UTF-8 (byte {problem.start})") from None
+        except yaml.YAMLError as problem:
+            mark = getattr(problem, "problem_mark", None)
+            said = getattr(problem, "problem", None) or reason_of(problem)
+            raise ConfigError(f"{path}{f', line {mark.line + 1}' if mark else ''}: is no YAML: {said}") from None
+        if root is None:
+            raise ConfigError(f"{path}: is empty; see the configs folder for examples")
         try:
-            return kind.from_plain(value)
-        except ValueError as problem:
-            self.fail(str(problem))
+            self.value = self._plain(root, root.start_mark.line)
+        except _Mistake as mistake:
+            raise self.answer(mistake) from None
 
-    def whole(self, least: int) -> int:
-        """Return a whole number."""
-        return int(self.of(Whole(least)))
+    def answer(self, error: ValidationError | _Mistake) -> ConfigError:
+        """Return the one line that says where, what and what was expected."""
+        said: Any = error
+        at = getattr(error, "at", ())
+        if isinstance(error, ValidationError):
+            first = error.errors(include_url=False, include_input=False)[0]
+            said = first.get("ctx", {}).get("error") or EXPECTED.get(first["type"], first["msg"]).format(
+                key=first["loc"][-1], one=str(first["loc"][-1]).rstrip("s")
+            )
+            at = (*first["loc"], *getattr(said, "at", ()))
+        while at not in self.parts:
+            at = at[:-1]
+        node, line = self.parts[at]
+        place = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in at).lstrip(".")
+        value = _spelled(node, str(said))
+        return ConfigError(": ".join(filter(None, (f"{self.path}, line {line + 1}", place, value, str(said)))))
 
-    def real(self, least: float | None, *, strict: bool = False) -> float:
-        """Return a number, at least (or, strictly, more than) a limit."""
-        return float(self.of(Real(least, strict)))
+    def compose_node(self, parent: Node | None, index: Any) -> Node | None:
+        """Return the next value, unless the file is too large or too deep to be a configuration."""
+        self.count += 1
+        self.depth += 1
+        self._limit(self.depth, self.count, self.peek_event().start_mark.line)  # type: ignore[no-untyped-call]
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
 
-    def plain(self) -> Any:
-        """Return the value as plain Python data."""
-        from yaml.constructor import ConstructorError
-        from yaml.nodes import MappingNode
+    def _limit(self, depth: int, count: int, line: int) -> None:
+        where = f"{self.path}, line {line + 1}"
+        if depth > MAX_DEPTH:
+            raise ConfigError(f"{where}: is nested too deeply for a configuration, or contains itself by an alias")
+        if count > MAX_VALUES:
+            most = f"a configuration has at most {MAX_VALUES:,}"
+            raise ConfigError(f"{where}: stands for too many values once aliases are replaced; {most}")
 
-        if self.is_list():
-            return [item.plain() for item in self.items()]
-        if isinstance(self.node, MappingNode):
-            return {name: value.plain() for name, value in self.mapping(None).items()}
+    def _plain(self, node: Node, line: int, *at: str | int) -> Any:
+        """Return a value as plain Python data, and remember where its parts stand."""
+        self.parts[at] = node, line
+        self._limit(len(at), len(self.parts), line)
+        if isinstance(node, SequenceNode) and node.tag == "tag:yaml.org,2002:seq":
+            return [self._plain(part, part.start_mark.line, *at, place) for place, part in enumerate(node.value)]
+        if isinstance(node, MappingNode) and node.tag == "tag:yaml.org,2002:map":
+            found: dict[str, Any] = {}
+            for key, part in node.value:
+                if not isinstance(key, ScalarNode):
+                    raise _Mistake("a key must be a word", *at)
+                value = self._plain(part, key.start_mark.line, *at, key.value)
+                if key.value in found:
+                    raise _Mistake("the key is there twice", *at, key.value)
+                found[key.value] = value
+            return found
         try:
-            value = _scalar(self.node)
-        except (ConstructorError, ValueError, OverflowError):
-            self.fail(f"the tag {self.node.tag!r} is not understood; expected plain data")
+            value = self.construct_object(node)
+        except (yaml.YAMLError, ValueError, OverflowError):
+            raise _Mistake(f"the tag {node.tag!r} is not understood; expected plain data", *at) from None
         if isinstance(value, float) and not math.isfinite(value):
-            self.fail("expected a finite number")
+            raise _Mistake("expected a finite number", *at)
         if value is not None and not isinstance(value, (bool, int, float, str)):
-            self.fail(f"a {type(value).__name__} is not understood; put it in quotes if it is a text")
+            raise _Mistake(f"a {type(value).__name__} is not understood; put it in quotes if it is a text", *at)
         return value
 
-    def _where(self) -> str:
-        return f"{self.file}, line {self.node.start_mark.line + 1}"
 
-    def _spelled(self) -> str:
-        from yaml.nodes import ScalarNode
-
-        if not isinstance(self.node, ScalarNode):
-            return ""
-        value = self.node.value if len(self.node.value) <= 80 else self.node.value[:77] + "..."
-        spelled = repr(value) if self.is_text() else value or "nothing"
-        try:
-            float(value)
-        except ValueError:
-            return spelled
-        # YAML 1.1 reads 1e-3 as a text
-        hint = " (a text; write numbers like 1.0e-3)" if self.is_text() and "e" in value.lower() else ""
-        return spelled + hint
-
-
-def _read(path: Path) -> Entry:
-    """Parse the file to the tree of its values, or say why it is none."""
-    import yaml
-
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise ConfigError(f"{path}: has {size:,} bytes; a configuration has at most {MAX_BYTES:,}")
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: no such file") from None
-    except OSError as problem:
-        raise ConfigError(f"{path}: cannot be read ({reason_of(problem)})") from None
-    except UnicodeDecodeError as problem:
-        raise ConfigError(f"{path}: is no text in UTF-8 (byte {problem.start})") from None
-    try:
-        _check_events(yaml.parse(text, Loader=yaml.SafeLoader), path)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as problem:
-        mark = problem.problem_mark or problem.context_mark
-        line = f", line {mark.line + 1}" if mark is not None else ""
-        said = " ".join(str(problem.problem or problem.context).split())
-        raise ConfigError(f"{path}{line}: is no YAML: {said}") from None
-    except yaml.YAMLError as problem:
-        raise ConfigError(f"{path}: is no YAML: {reason_of(problem)}") from None
-    except RecursionError:
-        raise ConfigError(f"{path}: is nested too deeply for a configuration") from None
-    if node is None:
-        raise ConfigError(f"{path}: is empty; see the configs folder for examples")
-    count = _expanded(node, {}, set(), path)
-    if count > MAX_VALUES:
-        raise ConfigError(
-            f"{path}: stands for {count:,} values once aliases are replaced; a configuration has at most {MAX_VALUES:,}"
-        )
-    return Entry(node, path)
-
-
-def _check_events(events: Iterable[Any], path: Path) -> None:
-    """Stop reading where a file has more values, or lists and mappings inside each other, than a configuration has."""
-    count = depth = 0
-    for event in events:
-        kind = type(event).__name__
-        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
-        count += not kind.endswith("EndEvent")
-        if depth > MAX_DEPTH:
-            raise ConfigError(f"{path}, line {event.start_mark.line + 1}: is nested too deeply for a configuration")
-        if count > MAX_VALUES:
-            raise ConfigError(f"{path}: holds more than {MAX_VALUES:,} values; a configuration has fewer")
-
-
-def _expanded(node: Node, counts: dict[int, int], open_nodes: set[int], path: Path) -> int:
-    """Return how many values a node stands for once aliases are replaced."""
-    if id(node) in counts:
-        return counts[id(node)]
-    if id(node) in open_nodes:
-        raise ConfigError(f"{path}, line {node.start_mark.line + 1}: contains itself by an alias")
-    open_nodes.add(id(node))
-    children: list[Node] = []
-    if isinstance(node.value, list):
-        for child in node.value:
-            children += child if isinstance(child, tuple) else (child,)
-    counts[id(node)] = 1 + sum(_expanded(child, counts, open_nodes, path) for child in children)
-    open_nodes.discard(id(node))
-    return counts[id(node)]
-
-
-def _scalar(node: Node) -> Any:
-    import yaml
-
-    return yaml.SafeLoader("").construct_object(node)
+def _spelled(node: Node, said: str) -> str:
+    """Return a single value as the file has it, texts in quotes, unless what is said of it names it already."""
+    if not isinstance(node, ScalarNode):
+        return ""
+    value = node.value if len(node.value) <= 80 else node.value[:77] + "..."
+    if node.tag != "tag:yaml.org,2002:str":
+        return value or "nothing"
+    if repr(value) in said or said.startswith(f"{value}:"):
+        return ""
+    # YAML 1.1 reads 1e-3 as a text
+    is_number = re.fullmatch(r"[-+.\d]+e[-+]?\d+", value, re.IGNORECASE)
+    return repr(value) + (" (a text; write numbers like 1.0e-3)" if is_number else "")

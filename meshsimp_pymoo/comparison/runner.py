@@ -272,7 +272,7 @@ def plan(experiment: Experiment) -> list[Task]:
                                 "problem": what,
                                 "algorithm": described[algorithm.name, value],
                                 "seed": seed,
-                                "budget": budget.description(),
+                                "budget": {budget.kind: budget.amount},
                             }
                             for budget in budgets
                         )
@@ -510,13 +510,7 @@ def _content(experiment: Experiment, tasks: Sequence[Task], out: Path) -> dict[s
         ],
         "seeds": list(experiment.seeds),
         "budgets": [{"name": budget.name, budget.kind: budget.amount} for budget in experiment.budgets],
-        "meshlab": None
-        if experiment.meshlab is None
-        else {
-            "methods": list(experiment.meshlab.methods),
-            "down_to_fronts": experiment.meshlab.down_to_fronts,
-            "steps": experiment.meshlab.steps,
-        },
+        "meshlab": experiment.meshlab and experiment.meshlab.model_dump(mode="json"),
         "runs": [
             {
                 "key": key,

@@ -298,6 +298,8 @@ class Study:
     def _read_classic(self, store: RunStore) -> dict[tuple[str, str], StoredRun]:
         found = {}
         for item in self.content["classic"]:
+            if item["method"] not in CLASSIC_NAMES:
+                raise ValueError(f"the method {item['method']!r} is none of {', '.join(CLASSIC_NAMES)}")
             run = store.get(item["key"])
             if run is None:
                 self.missing.append(f"{item['problem']} / {item['method']}")
@@ -407,7 +409,7 @@ class Study:
             if scoring == "searched":
                 usable &= run.arrays["paper"].astype(bool)
             if usable.any():
-                label = CLASSIC_NAMES.get(method, method)
+                label = CLASSIC_NAMES[method]
                 classic.append(label)
                 runs[label] = {NO_SEED: non_dominated(F[usable])}
                 sources[label] = {NO_SEED: [run]}

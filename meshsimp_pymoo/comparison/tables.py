@@ -284,7 +284,7 @@ def meshlab(study: Study, budget: str) -> Table | None:
                 continue
             for k, asked in enumerate(run.arrays["asked"].tolist()):
                 a, (error, triangles) = run.arrays, run.arrays["F"][k]
-                label, note = CLASSIC_NAMES.get(method, method), run.record["notes"][k]
+                label, note = CLASSIC_NAMES[method], run.record["notes"][k]
                 series = "paper" if a["paper"][k] else "down to the fronts"
                 if not triangles:
                     rows.append((name, label, series, asked, 0, *[None] * (len(columns) - 6), note))
@@ -341,7 +341,7 @@ def times(study: Study) -> Table:
             )
         )  # fmt: skip
     for (problem, method), run in study.classic_runs.items():
-        rows.append((problem, CLASSIC_NAMES.get(method, method), None, None, None, None, run.record["seconds"]))
+        rows.append((problem, CLASSIC_NAMES[method], None, None, None, None, run.record["seconds"]))
     return Table("times", "Measured seconds", columns, tuple(rows))
 
 

@@ -41,12 +41,12 @@ def changed(tmp_path: Path, **parts: str | None) -> Path:
     return write(tmp_path, "\n".join(f"{key}: {value}" for key, value in merged.items()) + "\n")
 
 
-def message(path: Path, **kwargs: object) -> str:
+def message(path: Path, *, names: Path | None = None, **kwargs: object) -> str:
     with pytest.raises(ConfigError) as caught:
         read_experiment_file(path, **kwargs)
     line = str(caught.value)
     assert "\n" not in line
-    assert str(path) in line or "folder" in line
+    assert line.startswith(str(names or path))
     return line
 
 
@@ -183,6 +183,19 @@ MISTAKES = {
         {"problems": "[{model: pyramid, fotprint: hull}]"},
         ["problems[0].fotprint", "unknown key", "'footprint'"],
     ),
+    "unknown key with its line and value": (
+        {"title": "a\nproblem:\n  footprint: hull\n  max_edges: 3", "problem": None},
+        ["line 8", "problem.max_edges: 3: unknown key", "'max_edge'", "known here: up, "],
+    ),
+    "MeshLab is nothing": ({"baselines": "{meshlab: }"}, ["baselines.meshlab: nothing: expected a mapping"]),
+    "a number for true or false": (
+        {"baselines": "{meshlab: {down_to_fronts: 1}}"},
+        ["baselines.meshlab.down_to_fronts: 1: expected true or false"],
+    ),
+    "tag on a list": (
+        {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: !!python/tuple [1]}}]"},
+        ["algorithms[0].parameters.pop_size", "the tag", "python/tuple' is not understood"],
+    ),
     "option value unknown": ({"problem": "{footprint: hul}"}, ["problem.footprint", "'hul'", "'hull'"]),
     "option of wrong type": ({"problem": "{max_error: small}"}, ["problem.max_error", "'small'", "number"]),
     "objective unknown": ({"problem": "{objectives: [errror, triangles]}"}, ["problem.objectives", "rms_error"]),
@@ -202,7 +215,7 @@ MISTAKES = {
     "preset unknown": ({"algorithms": "[nsga2_v3]"}, ["algorithms[0]", "'nsga2_v3'", "did you mean 'nsga2_v"]),
     "preset and class": (
         {"algorithms": "[{preset: moead, class: pymoo.x}]"},
-        ["algorithms[0]", "either 'preset'", "or 'class'"],
+        ["algorithms[0]", "one of 'preset'", "'class' (an import path)", "not preset and class"],
     ),
     "parameter unknown": (
         {"algorithms": "[{preset: nsga2_v1, parameters: {pop_sise: 9}}]"},
@@ -317,10 +330,11 @@ def test_the_configuration_of_the_mistakes_is_good_without_them(tmp_path):
         ("a: &a [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
             f"{chr(98 + k)}: &{chr(98 + k)} [{', '.join(['*' + chr(97 + k)] * 10)}]\n" for k in range(8)
         ), "once aliases are replaced"),
+        ("".join(f"a{k}: &a{k} [{f'*a{k - 1}' if k else ''}]\n" for k in range(60)), "nested too deeply"),
         ("seeds: [" + "1, " * 400_000 + "]", "bytes"),
         ("title: \x00", "is no YAML"),
     ],
-    ids=["empty", "open list", "indentation", "tag", "depth", "cycle", "aliases", "size", "control"],
+    ids=["empty", "open list", "indentation", "tag", "depth", "cycle", "aliases", "deep aliases", "size", "control"],
 )  # fmt: skip
 def test_what_is_no_configuration_is_refused_without_harm(text, expected, tmp_path):
     path = write(tmp_path, text)
@@ -341,7 +355,8 @@ def test_a_binary_file_and_a_missing_one_are_named(tmp_path):
     (tmp_path / "x.yaml").write_bytes(b"\xff\xfe\x00\x80")
     assert "UTF-8" in message(tmp_path / "x.yaml")
     assert "no such file" in message(tmp_path / "y.yaml")
-    assert "no such folder" in message(changed(tmp_path), folder=tmp_path / "gone")
+    gone = tmp_path / "gone"
+    assert "no such folder" in message(changed(tmp_path), names=gone, folder=gone)
 
 
 def test_a_tag_cannot_make_python_objects(tmp_path):

@@ -637,3 +637,5 @@ def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one
         problems=[problem | {"rules": {"footprint": 3}} for problem in content["problems"]]
     )
     assert "experiment.json: is damaged (" in told(runs=[None])
+    unknown = [{"key": "0", "problem": content["problems"][0]["name"], "method": "melting"}]
+    assert "experiment.json: is damaged (the method 'melting' is none of quadric_collapse, " in told(classic=unknown)
