@@ -109,7 +109,9 @@ def test_the_memetic_front_is_never_worse_than_thinning_and_soon_better(problem)
 
 def test_the_memetic_search_repeats_and_stays_in_its_range():
     problem = MeshProblem("face:200")
-    runs = [minimize(problem, memetic(12, triangles=(20, 90), moves_per_vertex=20), ("n_gen", 3), seed=4) for _ in range(2)]
+    runs = [
+        minimize(problem, memetic(12, triangles=(20, 90), moves_per_vertex=20), ("n_gen", 3), seed=4) for _ in range(2)
+    ]
     assert runs[0].X.tobytes() == runs[1].X.tobytes()
     assert runs[0].F[:, 1].max() <= 90
     np.testing.assert_allclose(runs[0].F[:, 0], problem.surface.evaluate(runs[0].X)[:, 0])
