@@ -7,13 +7,42 @@ from pathlib import Path
 
 import pytest
 from browser import launched, playwright_engine
+from counts import SLOW
+from hypothesis import settings
 
-from meshsimp_pymoo.warming import SEARCH, Warming
+from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+# Examples of each property that Hypothesis tries.
+EXAMPLES = 50
+settings.register_profile("plain", max_examples=EXAMPLES, deadline=None)
+settings.register_profile("slow", max_examples=SLOW * EXAMPLES, deadline=None)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Try as many examples as are asked for."""
+    settings.load_profile("slow" if config.option.markexpr == "slow" else "plain")
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Let ``-m slow`` try properties too."""
+    if item.config.option.markexpr == "slow" and getattr(getattr(item, "obj", None), "is_hypothesis_test", False):
+        item.add_marker("slow")
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Divide folders among two processes, on any machine: some tests start two themselves. A file is quicker in one."""
+    return 2 if any((config.invocation_params.dir / argument).is_dir() for argument in config.args) else 0
+
+
+def pytest_xdist_setupnodes() -> None:
+    """Compile what is missing before the processes begin, or both would."""
+    with Warming(part.name for part in PARTS) as warming:
+        warming.finish()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -258,8 +258,8 @@ def test_algorithms_of_two_objectives_refuse_a_third_and_name_the_way_out():
 
 def test_the_memetic_search_lowers_the_measure_of_the_problem():
     problem = MeshProblem("face:300", objectives=("rms_error", "triangles"))
-    seeds = minimize(problem, memetic(12), ("n_gen", 1), seed=1)
-    found = minimize(problem, memetic(12), ("n_gen", 8), seed=1)
+    seeds = minimize(problem, memetic(12, moves_per_vertex=50), ("n_gen", 1), seed=1)
+    found = minimize(problem, memetic(12, moves_per_vertex=50), ("n_gen", 4), seed=1)
     ladder = seeds.pop.get("F")
     best = np.array([found.F[found.F[:, 1] <= size, 0].min() for size in ladder[:, 1]])
     assert (best <= ladder[:, 0]).all()

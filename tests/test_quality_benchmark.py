@@ -58,7 +58,7 @@ def test_variants_are_compared_with_the_first_one(quality, monkeypatch, capsys, 
     few = functools.partial(quality.ladder_search, 5)
     monkeypatch.setattr(quality, "VARIANTS", {"full": quality.ladder_search, "few": few})
     results = tmp_path / "variants.csv"
-    options = ["--ablation", "--models", "peaks:9", "--budgets", "1.5", "--seeds", "1", "2", "--shares", "20"]
+    options = ["--ablation", "--models", "peaks:9", "--budgets", "0.6", "--seeds", "1", "2", "--shares", "20"]
     assert quality.main([*options, "-o", str(results)]) == 0
     with results.open(newline="") as file:
         rows = list(csv.DictReader(file))

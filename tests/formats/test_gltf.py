@@ -165,7 +165,7 @@ def test_an_unknown_unit_is_said_and_nothing_is_scaled(tmp_path):
     scale=st.lists(st.floats(1e-3, 1e6), min_size=2, max_size=2),
     axis=st.sampled_from(["x", "y", "z", "-x", "-y", "-z"]),
 )
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_single_precision_costs_a_share_of_the_width_wherever_a_model_lies(tmp_path, width, far, scale, axis):
     points = POINTS * width + far
     up = np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_array_equal
@@ -45,7 +45,6 @@ def test_a_cell_without_one_corner_is_one_triangle_facing_up(corner):
     hidden=hnp.arrays(np.bool_, hnp.array_shapes(min_dims=2, max_dims=2, min_side=2, max_side=7)),
     nodata=st.sampled_from([None, -9999.0, 0.0]),
 )
-@settings(max_examples=60, deadline=None)
 def test_the_area_of_a_grid_is_that_of_its_cells_with_data(hidden, nodata):
     elevation = np.where(hidden, np.nan if nodata is None else nodata, 7.0)
     corners = sum((~hidden[i : i + hidden.shape[0] - 1, j : j + hidden.shape[1] - 1]).astype(int)

@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from pyramid import hostile_array, refusal, write
@@ -84,7 +84,6 @@ def by_place(source):
     meshed=st.booleans(),
     turned=st.sampled_from([str.lower, str.upper, str.title]),
 )
-@settings(max_examples=30, deadline=None)
 def test_samples_lie_where_the_axes_say_in_any_order(tmp_path_factory, names, flips, meshed, turned):
     path = tmp_path_factory.mktemp("axes") / "a.npz"
     x, y = LON[:: -1 if flips[0] else 1], LAT[:: -1 if flips[1] else 1]

@@ -193,7 +193,7 @@ def test_a_mesh_taken_from_a_folder_brings_its_texture_and_replaces_no_file_of_t
 
 
 @given(points=hnp.arrays(float, (5, 3), elements=st.floats(-1e60, 1e60)))
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_coordinates_of_any_size_read_back_equal(tmp_path, points):
     assume(len(np.unique(points + 0.0, axis=0)) == 5)
     write_mesh(tmp_path / "a.obj", points, FACES, {"uv": points[:, :2]})

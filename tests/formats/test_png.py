@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from PIL import Image
@@ -53,7 +53,6 @@ def test_eight_bits_are_read_with_a_word_of_their_steps(tmp_path):
 
 @pytest.mark.filterwarnings("ignore:.*far from all others")
 @given(heights=st.lists(st.integers(-100_000, 15_000_000), min_size=12, max_size=12))
-@settings(max_examples=20, deadline=None)
 def test_terrain_rgb_is_decoded_to_the_nearest_number(tmp_path_factory, heights):
     """What a tile stores in decimetres, or in 256ths of a metre, comes back as those very numbers."""
     folder = tmp_path_factory.mktemp("rgb")

@@ -123,7 +123,7 @@ from meshsimp_pymoo.formats.table import read_source, write_mesh
 roof = load("roof:5")
 write_mesh("roof.toy", roof.points, roof.faces)
 assert (read_source("roof.toy").points == roof.points).all()
-quick = ["--generations", "2", "--population", "8", "--quiet", "--no-page"]
+quick = ["--algorithm", "nsga2_v1", "--generations", "2", "--population", "8", "--quiet", "--no-page"]
 assert main(["simplify", "roof.toy", "-o", "out", "--format", "toy", "--pick", "knee", *quick]) == 0
 chosen = read_source("out/chosen.toy")
 assert len(list(Path("out/meshes").glob("*.toy"))) > 0

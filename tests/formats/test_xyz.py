@@ -7,7 +7,7 @@ import contextlib
 import numpy as np
 import pytest
 from clouds import scattered
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -177,7 +177,6 @@ def test_a_pts_with_intensities_keeps_them_apart_from_its_colours(tmp_path):
     quotes=st.booleans(),
     text=st.booleans(),
 )
-@settings(max_examples=25, deadline=None)
 @pytest.mark.filterwarnings("ignore:.*its coordinates are degrees")
 def test_a_table_means_the_same_whatever_its_order_names_and_separators(
     tmp_path_factory, values, order, names, separator, decimal_comma, quotes, text

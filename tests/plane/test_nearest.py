@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from from_python import from_python
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.plane import nearest
@@ -25,7 +25,6 @@ def test_of_two_segments_at_one_distance_the_one_of_least_key_is_taken(key, expe
     assert (found, t, d) == (expected, 0.25, 1.0)
 
 
-@settings(max_examples=150, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), m=st.integers(1, 60), grid=st.booleans())
 def test_the_tree_finds_what_looking_at_all_segments_finds(seed, m, grid):
     rng = np.random.default_rng(seed)

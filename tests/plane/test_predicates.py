@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from delaunay import in_circle, orient, rational
 from from_python import from_python
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.plane import predicates
@@ -33,7 +33,6 @@ def sign(x):
     return (x > 0) - (x < 0)
 
 
-@settings(max_examples=400, deadline=None)
 @given(quadruples())
 def test_predicates_equal_rational_arithmetic(xy):
     a, b, c, p = xy

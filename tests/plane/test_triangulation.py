@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from delaunay import assert_delaunay, canonical, faces_of
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
@@ -39,7 +39,6 @@ nearly_collinear = st.lists(
 point_sets = st.one_of(grid_points, free_points, huddled_points, nearly_collinear)
 
 
-@settings(max_examples=150, deadline=None)
 @given(point_sets, st.randoms(use_true_random=False))
 def test_any_order_of_insertion_gives_the_one_delaunay_triangulation(xy, random):
     faces = faces_of(xy)

@@ -94,7 +94,7 @@ def test_searches_keep_their_time(algorithm):
 
 def test_gaps_of_a_front_are_filled_as_far_as_the_time_goes():
     problem = MeshProblem("jacksboro:9")
-    result = minimize(problem, memetic(40), ("n_gen", 3), seed=1)
+    result = minimize(problem, memetic(40, moves_per_vertex=20), ("n_gen", 3), seed=1)
     X, F = result.algorithm.pop.get("X", "F")
     most = F[:, 1].max()
     whole, some = (between_the_rungs(problem.surface, X, F, most=most, seconds=s) for s in (None, 0.0))

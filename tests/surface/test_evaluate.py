@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 from delaunay import faces_of
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from samples import SMALL, stepped_model, subset, surface
 
@@ -195,7 +195,6 @@ def test_a_population_is_its_members_on_any_number_of_threads(model, n_threads):
         np.testing.assert_array_equal(row, surface(model).evaluate(kept)[0])
 
 
-@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.02, 1.0), name=st.sampled_from(sorted(SMALL)))
 def test_the_listing_of_the_vertices_does_not_matter(seed, share, name):
     source = SMALL[name]()

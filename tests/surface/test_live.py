@@ -112,7 +112,7 @@ class LiveMachine(RuleBasedStateMachine):
             assert_as_from_scratch(self.live, *self.rules)
 
 
-LiveMachine.TestCase.settings = settings(max_examples=60, stateful_step_count=30, deadline=None)
+LiveMachine.TestCase.settings = settings(stateful_step_count=30)
 TestLive = LiveMachine.TestCase
 
 

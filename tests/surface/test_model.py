@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.datasets import load
@@ -30,7 +30,6 @@ def test_vector_order_is_a_hilbert_curve():
     np.testing.assert_array_equal(steps, 1)
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 2)), min_size=4, max_size=30),
     st.randoms(use_true_random=False),

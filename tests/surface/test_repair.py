@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
@@ -81,7 +81,6 @@ def test_a_face_listed_many_times_stays_once_wherever_the_repeats_stand():
 
 
 @given(share=st.floats(0.01, 0.45), seed=st.integers(0, 1000), backwards=st.booleans())
-@settings(max_examples=30, deadline=None)
 def test_faces_wound_the_other_way_are_turned_as_most_of_the_area_is(share, seed, backwards):
     source = sheet(12)
     against = np.random.default_rng(seed).random(len(source.faces)) < share

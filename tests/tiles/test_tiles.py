@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 from cracks import find_cracks
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.datasets import load
@@ -131,7 +131,6 @@ def test_a_grid_or_a_model_that_is_open_already_is_not_read_in_another_way(how):
 # --------------------------------------------------------------------------------------------------------- the mesh
 
 
-@settings(max_examples=25, deadline=None)
 @given(share=st.sampled_from([0.0, 0.01, 0.1, 0.5, 1.0]), seed=st.integers(0, 2**32))
 def test_a_welded_mesh_is_the_triangulation_of_the_whole_with_its_error(share, seed):
     samples = subset(SMALL_GRID, share, seed)
@@ -176,7 +175,6 @@ def test_a_mesh_without_a_corner_is_refused():
 # --------------------------------------------------------------------------------------------------------- a tile
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     share=st.sampled_from([0.03, 0.2, 0.6, 1.0]),
     seed=st.integers(0, 2**32),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from pymoo.core.evaluator import Evaluator
@@ -31,7 +31,6 @@ STRENGTH = {
     "relocation": lambda rate: {"moves_per_vertex": 20 * rate, "temperature": 1.0},
     "size_step": lambda rate: {"step": rate},
 }
-few = settings(max_examples=25, deadline=None)
 
 
 def rng(seed: int) -> np.random.Generator:
@@ -102,7 +101,6 @@ def test_float_chromosomes_are_refused_with_the_way_out(kind: str, name: str) ->
 
 @pytest.mark.parametrize("name", CROSSOVERS)
 @pytest.mark.parametrize("n_offsprings", [1, 2])
-@few
 @given(seed=seeds)
 def test_children_only_carry_parental_genes(name: str, n_offsprings: int, seed: int) -> None:
     parents = genomes(seed, 3, 2)
@@ -114,7 +112,6 @@ def test_children_only_carry_parental_genes(name: str, n_offsprings: int, seed: 
 
 
 @pytest.mark.parametrize("name", CROSSOVERS)
-@few
 @given(seed=seeds)
 def test_same_seed_same_children(name: str, seed: int) -> None:
     parents = genomes(seed, 4, 2)
@@ -128,7 +125,6 @@ def test_another_seed_gives_other_children(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CROSSOVERS)
-@few
 @given(seed=seeds)
 def test_twins_beget_twins(name: str, seed: int) -> None:
     twins = np.repeat(genomes(seed, 3, 1), 2, axis=1)
@@ -187,7 +183,6 @@ def test_impossible_crossover_arguments_are_refused_with_their_value(name: str, 
 
 
 @pytest.mark.parametrize("name", MUTATIONS)
-@few
 @given(seed=seeds, rate=st.floats(0, 1))
 def test_mutation_keeps_shape_dtype_pins_and_its_input(name: str, seed: int, rate: float) -> None:
     X = genomes(seed, 5)
@@ -211,7 +206,6 @@ def test_mutation_changes_something_and_depends_on_the_seed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(OPERATORS["sampling"]))
-@few
 @given(seed=seeds)
 def test_samples_are_bool_pinned_and_repeatable(name: str, seed: int) -> None:
     sampling = OPERATORS["sampling"][name]()
@@ -223,7 +217,6 @@ def test_samples_are_bool_pinned_and_repeatable(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(OPERATORS["repair"]))
-@few
 @given(seed=seeds)
 def test_a_repair_pins_changes_nothing_else_and_repairs_once_and_for_all(name: str, seed: int) -> None:
     X = rng(seed).random((5, PROBLEM.n_var)) < 0.3

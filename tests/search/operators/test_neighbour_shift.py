@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from pymoo.core.population import Population
@@ -32,7 +32,6 @@ def outcomes(kept: str, **kwargs: object) -> set[str]:
 
 
 @given(seed=st.integers(0, 2**32 - 1), rate=st.floats(0, 1), along=st.sampled_from(["vector", "mesh"]))
-@settings(max_examples=200, deadline=None)
 def test_the_number_of_kept_vertices_never_changes(seed: int, rate: float, along: str) -> None:
     problem, rng = GridProblem(5), np.random.default_rng(seed)
     X = (rng.random((6, 25)) < rng.random((6, 1))) | problem.pinned

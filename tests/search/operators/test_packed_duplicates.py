@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymoo.core.duplicate import DefaultDuplicateElimination
 from pymoo.core.population import Population
@@ -22,7 +22,6 @@ def random_population(rng: np.random.Generator, n: int, n_var: int) -> Populatio
     sizes=st.tuples(st.integers(0, 12), st.integers(0, 12), st.integers(0, 12)),
     n_var=st.integers(1, 17),
 )
-@settings(max_examples=200, deadline=None)
 def test_the_same_individuals_stay_as_with_the_default(seed: int, sizes: tuple[int, int, int], n_var: int) -> None:
     rng = np.random.default_rng(seed)
     n_var = min(n_var, 17)
