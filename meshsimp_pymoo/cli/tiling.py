@@ -21,7 +21,7 @@ from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import TILES, claim_output
 from meshsimp_pymoo.surface.grid_surface import FREE_RULES, GridSurface
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, settings, tiled_front, usual_most
+from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, identity, tiled_front, usual_most
 from meshsimp_pymoo.tiles.memory import check_memory
 from meshsimp_pymoo.warming import SEARCH
 from meshsimp_pymoo.workers import EngineError, open_engine
@@ -76,7 +76,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     most = max(wish.triangles or 2, usual_most(grid))
     check_memory(grid, tile=tile, most=most, jobs=jobs, remote=tiling.dask is not None)
     try:
-        pieces = settings(grid, tile=tile, most=most)
+        identity_of_tiles = identity(grid, tile=tile, most=most)
     except ValueError as problem:
         if isinstance(problem, ModelError):
             raise
@@ -86,7 +86,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
         try:
             out.mkdir(parents=True, exist_ok=True)
             if output.overwrite:
-                _forget_other(out / TILES, pieces)
+                _forget_other(out / TILES, identity_of_tiles)
             threads = request.search.threads or os.cpu_count() or 1
             with (
                 answering("stopping: finished tiles are stored, the same command goes on"),
@@ -99,7 +99,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
                     tile=tile,
                     most=most,
                     engine=engine,
-                    store=Folder(out / TILES, pieces),
+                    store=Folder(out / TILES, identity_of_tiles),
                     threads=threads,
                     progress=show,
                 )

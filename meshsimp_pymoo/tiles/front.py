@@ -72,7 +72,7 @@ LOST = "a finished tile was stored, but is gone or damaged; start the same call 
 Progress = Callable[[float, str], None]
 
 
-class Memory:
+class InMemory:
     """Keeps finished pieces of work for this call only; see :class:`Folder`."""
 
     def __init__(self) -> None:
@@ -156,7 +156,7 @@ def usual_most(grid: HeightGrid) -> int:
     return max(2, min(int(FINEST * len(grid.faces)), MOST_TRIANGLES))
 
 
-def settings(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> dict[str, Any]:
+def identity(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> dict[str, Any]:
     """Return what the pieces of a call of :func:`tiled_front` depend on, and check it.
 
     Raises
@@ -186,7 +186,7 @@ def tiled_front(
     tile: int = TILE,
     most: int | None = None,
     engine: Engine | None = None,
-    store: Folder | Memory | None = None,
+    store: Folder | InMemory | None = None,
     threads: int = 1,
     progress: Progress | None = None,
 ) -> Front:
@@ -205,7 +205,7 @@ def tiled_front(
         Triangles of the finest solution, about; by default a tenth of the grid's, but not above 1 200 000.
     engine : Engine, optional
         Where the tiles are thinned; in this process by default. The front does not depend on it.
-    store : Folder or Memory, optional
+    store : Folder or InMemory, optional
         Where finished tiles are kept; with a folder an interrupted call is continued.
     threads : int
         Threads that measure the solutions.
@@ -217,9 +217,9 @@ def tiled_front(
     Front
         Of which :meth:`~meshsimp_pymoo.front.Front.best` makes a mesh of nearly any number of triangles.
     """
-    setting = settings(grid, tile=tile, most=most)
-    work = _Work(grid, tile, engine or Serial(), store or Memory(), progress or (lambda share, text: None))
-    n_wanted = setting["most"] // 2
+    what = identity(grid, tile=tile, most=most)
+    work = _Phases(grid, tile, engine or Serial(), store or InMemory(), progress or (lambda share, text: None))
+    n_wanted = what["most"] // 2
     # A tile with few vertices could thin hardly any: all lie near its edge. So tiles this small begin finer.
     samples, slope = work.start(max(n_wanted, grid.n_vertices // ENOUGH_SAMPLES))
     level = np.full(len(samples), np.inf)
@@ -338,10 +338,12 @@ def cut_axis(n: int, tile: int, shift: float, stride: int = 1) -> IntArray:
     return np.array([0, *inner[away & (number > 1)], n - 1], np.int64)
 
 
-class _Work:
+class _Phases:
     """One call's work on a grid."""
 
-    def __init__(self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | Memory, progress: Progress) -> None:
+    def __init__(
+        self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | InMemory, progress: Progress
+    ) -> None:
         self.grid = grid
         self.tile = tile
         self.engine = engine

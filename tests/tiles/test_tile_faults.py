@@ -32,7 +32,7 @@ from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import memory
-from meshsimp_pymoo.tiles.front import Folder, settings, tiled_front
+from meshsimp_pymoo.tiles.front import Folder, identity, tiled_front
 from meshsimp_pymoo.tiles.thin import thin_tile
 from meshsimp_pymoo.workers import Processes
 
@@ -417,7 +417,7 @@ def test_an_interrupted_run_with_damaged_tiles_ends_with_the_same_bytes(path, wh
 def test_a_damaged_record_of_what_the_tiles_belong_to_is_named(path, whole, tmp_path, capsys):
     out = tmp_path / "out"
     grid = open_grid(path)
-    Folder(out / "tiles", settings(grid, tile=64))
+    Folder(out / "tiles", identity(grid, tile=64))
     for damage in (b"", b"\xff\xfe", b"{}"):
         (out / "tiles" / "what.json").write_bytes(damage)
         assert main(command(path, out)) == 2

@@ -19,8 +19,7 @@ from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.weld import measure, pieces, weld
-from meshsimp_pymoo.tiles.front import Folder, Memory, _Work, cut_axis, tiled_front
-from meshsimp_pymoo.tiles.front import settings as call_settings
+from meshsimp_pymoo.tiles.front import Folder, InMemory, _Phases, cut_axis, identity, tiled_front
 from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
 from meshsimp_pymoo.workers import Processes, Serial
 
@@ -184,7 +183,7 @@ def test_a_mesh_without_a_corner_is_refused():
 def test_what_tiles_remove_changes_the_error_of_the_whole_by_what_they_say(share, seed, limit, side):
     """Several tiles at once, each for itself: the sum of their levels is the change of the whole."""
     kept = subset(GRID, share, seed)
-    work = _Work(GRID, 64, Serial(), Memory(), lambda *_: None)
+    work = _Phases(GRID, 64, Serial(), InMemory(), lambda *_: None)
     change, removed = 0.0, []
     low, high = side
     for left, right in itertools.pairwise([0, 50, 100, GRID.shape[1] - 1]):
@@ -207,7 +206,7 @@ def test_what_tiles_remove_changes_the_error_of_the_whole_by_what_they_say(share
 
 
 def test_all_samples_as_sites_are_the_same_tile_as_no_sites_given():
-    work = _Work(GRID, 64, Serial(), Memory(), lambda *_: None)
+    work = _Phases(GRID, 64, Serial(), InMemory(), lambda *_: None)
     box = (20, 60, 30, 80)
     some = thin_tile(work.task(box, 1, np.inf, None))
     same = thin_tile(work.task(box, 1, np.inf, np.arange(GRID.n_vertices)))
@@ -216,7 +215,7 @@ def test_all_samples_as_sites_are_the_same_tile_as_no_sites_given():
 
 
 def test_the_only_tile_of_a_grid_is_thinned_as_the_whole():
-    work = _Work(SMALL_GRID, 512, Serial(), Memory(), lambda *_: None)
+    work = _Phases(SMALL_GRID, 512, Serial(), InMemory(), lambda *_: None)
     gone, _ = thin_tile(work.task((0, SMALL_GRID.shape[0] - 1, 0, SMALL_GRID.shape[1] - 1), 1, np.inf, None))
     assert SMALL_GRID.row_of[gone].tolist() == thinning(HeightSurface(SMALL)).order[::-1].tolist()
 
@@ -394,7 +393,7 @@ def test_a_dask_cluster_finds_the_same_front(front):
 
 
 def test_a_call_that_was_stopped_goes_on_and_ends_with_the_same_front(front, tmp_path):
-    what = call_settings(GRID, tile=64)
+    what = identity(GRID, tile=64)
     total = Backwards()
     tiled_front(GRID, tile=64, engine=total)
     done = 0
@@ -411,7 +410,7 @@ def test_a_call_that_was_stopped_goes_on_and_ends_with_the_same_front(front, tmp
 
 
 def test_damaged_pieces_are_done_again(front, tmp_path):
-    what = call_settings(GRID, tile=64)
+    what = identity(GRID, tile=64)
     with pytest.raises(KeyboardInterrupt):
         tiled_front(GRID, tile=64, engine=Backwards(20), store=Folder(tmp_path, what))
     stored = sorted(tmp_path.glob("*.npz"))
@@ -425,9 +424,9 @@ def test_damaged_pieces_are_done_again(front, tmp_path):
 
 
 def test_pieces_of_something_else_are_not_used(tmp_path):
-    Folder(tmp_path, call_settings(GRID, tile=64))
+    Folder(tmp_path, identity(GRID, tile=64))
     with pytest.raises(ResultError, match="of another model or of other settings"):
-        Folder(tmp_path, call_settings(GRID, tile=65))
+        Folder(tmp_path, identity(GRID, tile=65))
     with pytest.raises(ResultError, match="of another model or of other settings"):
-        Folder(tmp_path, call_settings(SMALL_GRID, tile=64))
+        Folder(tmp_path, identity(SMALL_GRID, tile=64))
     assert json.loads((tmp_path / "what.json").read_text())["tile"] == 64
