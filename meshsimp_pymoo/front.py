@@ -529,9 +529,10 @@ class Front(Sequence[FrontSolution]):
 
     def _between(self, triangles: int) -> FrontSolution | None:
         """Return a solution of a nested front of at most so many triangles, which it may not have had so far."""
-        nested, surface = self._kept, self.surface if isinstance(self._kept, Nested) else None
-        if not isinstance(nested, Nested) or not isinstance(surface, GridSurface):
+        if not isinstance(self._kept, Nested):
             return None
+        nested, surface = self._kept, self.surface
+        assert isinstance(surface, GridSurface)
         slope = slope_of(surface, nested, triangles)
         if slope in nested.slope:
             return self[nested.slope.tolist().index(slope)]

@@ -149,10 +149,17 @@ def _against(front: Front, triangles: int, error: float) -> tuple[dict[str, Any]
         smallest = f"its smallest has {front[0].triangles}"
         return {"solution": None}, f"holds no mesh of at most {triangles:,} triangles; {smallest}"
     ratio = error / rival.error if rival.error > 0 else None
-    facts = {"solution": rival.solution, "triangles": rival.triangles, "error": rival.error, "error_ratio": ratio}
+    stored = rival.front is front  # else it was made between two that are
+    facts = {
+        "solution": rival.solution if stored else None,
+        "triangles": rival.triangles,
+        "error": rival.error,
+        "error_ratio": ratio,
+    }
     smaller = next((s for s in front if s.error <= error * (1 + ROUNDING)), None)
     facts["triangles_for_this_error"] = None if smaller is None else smaller.triangles
-    own = f"solution {rival.solution}, with {rival.triangles:,} triangles, has the error {rival.error:.6g}"
+    which = f"solution {rival.solution}" if stored else "a mesh between two solutions"
+    own = f"{which}, with {rival.triangles:,} triangles, has the error {rival.error:.6g}"
     if ratio is None:
         compared = "both are exact" if error == 0 else "that is exact"
     else:
