@@ -18,7 +18,6 @@ included.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import math
 from collections.abc import Callable
@@ -30,7 +29,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.errors import ModelError, reason_of
+from meshsimp_pymoo.errors import ModelError, meant, reason_of
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 
@@ -90,7 +89,7 @@ def load(name: str, /, **parameters: float) -> SourceMesh:
     given = _spelled_parameters(name, base, spelled, known) | parameters
     for key, value in given.items():
         if key not in known:
-            raise ModelError(f"{name}: no parameter {key!r}{_suggestion(key, known)}; {base} takes {', '.join(known)}")
+            raise ModelError(f"{name}: no parameter {key!r}{meant(key, known)}; {base} takes {', '.join(known)}")
         given[key] = _number(name, key, value, known[key])
     try:
         source = make(**given)
@@ -520,13 +519,8 @@ def _check_range(key: str, value: int, low: int, high: int) -> None:
         raise ValueError(f"{key} is {value}; it must be {low} to {high}")
 
 
-def _suggestion(word: str, known: Any) -> str:
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f" (did you mean {near[0]!r}?)" if near else ""
-
-
 def _unknown(name: str, base: str) -> str:
     return (
-        f"{name}: no such file, and no built-in model of that name{_suggestion(base.lower(), _MODELS)}; "
+        f"{name}: no such file, and no built-in model of that name{meant(base, _MODELS)}; "
         f"built-in models: {', '.join(_MODELS)}"
     )

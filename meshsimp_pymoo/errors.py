@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import errno
 import re
 import unicodedata
 import warnings
+from collections.abc import Iterable
 
 # Of a foreign exception's text, in a line of ours.
 LONGEST_REASON = 200
@@ -41,6 +43,23 @@ class PictureWarning(UserWarning):
 
 class ModelWarning(UserWarning):
     """The input is usable, but something in it was dropped or is doubtful."""
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return which of the known words was meant, most likely; None if none is near.
+
+    >>> nearest("Widnow", ["spacing", "window"]), nearest("smooth", ["spacing", "window"])
+    ('window', None)
+    """
+    by_lower = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.5)
+    return by_lower[near[0]] if near else None
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """Return a question for behind an unknown word; empty if no known one is near."""
+    near = nearest(word, known)
+    return "" if near is None else f" (did you mean {near!r}?)"
 
 
 def reason_of(error: BaseException) -> str:

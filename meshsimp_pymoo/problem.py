@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import inspect
 import os
@@ -17,6 +16,7 @@ import trimesh
 from pymoo.core.problem import ElementwiseProblem, Problem
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.errors import meant
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import textured
@@ -363,10 +363,7 @@ def _refuse_unknown(kwargs: dict[str, Any]) -> None:
     unknown = sorted(set(kwargs) - set(inspect.signature(Problem).parameters))
     if unknown:
         names = [*inspect.signature(MeshProblem).parameters, *inspect.signature(Problem).parameters]
-        near = difflib.get_close_matches(unknown[0], names, 1)
-        raise TypeError(
-            f"MeshProblem has no argument {unknown[0]!r}" + (f"; did you mean {near[0]!r}?" if near else "")
-        )
+        raise TypeError(f"MeshProblem has no argument {unknown[0]!r}{meant(unknown[0], names)}")
 
 
 def _require_bool(X: Any) -> None:

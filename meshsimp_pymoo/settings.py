@@ -13,7 +13,6 @@ what was stored can be read back.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import re
 import reprlib
@@ -22,7 +21,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from meshsimp_pymoo.errors import InputError
+from meshsimp_pymoo.errors import InputError, meant
 
 # A whole number beyond this is not exact as a float any more; a real one beyond MOST_REAL has infinite products.
 MOST_WHOLE = 2**53
@@ -56,9 +55,9 @@ class Choice(NamedTuple):
         """Return the word."""
         if value in self.names:
             return str(value)
-        near = difflib.get_close_matches(str(value).lower(), self.names, 1, 0.6)
-        meant = f"unknown (did you mean {near[0]!r}?); " if near else ""
-        raise ValueError(f"{meant}expected {'one of ' * (len(self.names) > 1)}{', '.join(self.names)}")
+        near = meant(str(value), self.names)
+        unknown = f"unknown{near}; " if near else ""
+        raise ValueError(f"{unknown}expected {'one of ' * (len(self.names) > 1)}{', '.join(self.names)}")
 
 
 class Whole(NamedTuple):

@@ -204,9 +204,13 @@ def test_a_signal_while_compiling_is_answered_at_once_and_leaves_nothing(tmp_pat
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):
     command = [*PROGRAM, "simplify", "jacksboro:20", "--time", "10min", "--threads", "1", "--json"]
-    command += ["-o", str(tmp_path / "out")]
+    command += ["-o", str(tmp_path / "out"), "--checkpoint", "1s"]
+    deadline = time.monotonic() + 100
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        time.sleep(4)
+        while not (tmp_path / "out" / "checkpoint.npz").exists():
+            assert process.poll() is None
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
         process.send_signal(number)
         out, err = process.communicate(timeout=60)
     assert process.returncode == code, err

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 from meshsimp_pymoo.cli import commands
 from meshsimp_pymoo.discovery import modules_in
-from meshsimp_pymoo.errors import UsageError
+from meshsimp_pymoo.errors import UsageError, nearest
 
 # The order in which the commands are listed; one that is not named here comes last.
 ORDER = ("simplify", "pick", "score", "info", "run", "report", "warm", "completion")
@@ -78,12 +78,12 @@ class Parser(argparse.ArgumentParser):
         if action.choices is None or value in action.choices:
             return
         choices = [str(choice) for choice in action.choices]
-        near = difflib.get_close_matches(str(value).lower(), choices, n=1, cutoff=0.5)
+        near = nearest(str(value), choices)
         text = f"invalid choice: {str(value)!r} (choose from {', '.join(choices)})"
         if isinstance(action, argparse._SubParsersAction) and (Path(value).suffix or Path(value).exists()):
             text += f"; did you mean meshsimp simplify {value}?"
         elif near:
-            text += f"; did you mean {near[0]}?"
+            text += f"; did you mean {near}?"
         raise argparse.ArgumentError(action, text)
 
 

@@ -27,7 +27,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import difflib
 import importlib
 import inspect
 import math
@@ -36,7 +35,7 @@ import re
 import sys
 import typing
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -49,7 +48,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
-from meshsimp_pymoo.errors import InputError, reason_of
+from meshsimp_pymoo.errors import InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem
@@ -229,7 +228,7 @@ class Part(BaseModel):
             raise ValueError(f"expected a mapping with the keys {', '.join(names)}")
         for name in given:
             if name not in names:
-                raise _Mistake(f"unknown key{_suggestion(name, names)}; known here: {', '.join(names)}", name)
+                raise _Mistake(f"unknown key{meant(name, names)}; known here: {', '.join(names)}", name)
         found = [name for name in cls.one_of if name in given]
         if cls.one_of and len(found) != 1:
             raise ValueError(f"give one of {', '.join(cls.one_of.values())}, not {' and '.join(found) or 'none'}")
@@ -611,12 +610,12 @@ def _model_path(source: str, models: Path, named: str) -> str:
     if is_there(path):
         return str(path)
     if not Path(base).suffix and "/" not in source and os.sep not in source:
-        near = _suggestion(base, datasets.names())
+        near = meant(base, datasets.names())
         raise _Mistake(f"there is neither a file {path} nor a built-in model of that name{near}", "model")
     if not models.is_dir():
         way_out = "name the folder by --models FOLDER" + (" or by 'folder'" if named else "")
         raise _Mistake(f"the file is missing, for there is no folder {models}; {way_out}", "model")
-    near = _suggestion(Path(source).name, [item.name for item in models.iterdir()])
+    near = meant(Path(source).name, [item.name for item in models.iterdir()])
     raise _Mistake(f"there is no file {path}{near}", "model")
 
 
@@ -626,7 +625,7 @@ def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str) -> N
     for name, value in arguments.items():
         if known is not None and name not in known:
             listed = ", ".join(sorted(known)) or "none"
-            raise _Mistake(f"{owner} has no such parameter{_suggestion(name, known)}; it takes: {listed}", name)
+            raise _Mistake(f"{owner} has no such parameter{meant(name, known)}; it takes: {listed}", name)
         for place, number in enumerate(value if isinstance(value, (list, tuple)) else [value]):
             if name in MOST and isinstance(number, (int, float)) and number > MOST[name]:
                 raise _Mistake(f"expected at most {MOST[name]:,}", name, place)
@@ -676,7 +675,7 @@ def _imported(path: str) -> Any:
     except (ImportError, ValueError) as problem:
         raise ValueError(f"{path!r} cannot be imported ({problem})") from None
     except AttributeError:
-        near = _suggestion(name, dir(importlib.import_module(module)))
+        near = meant(name, dir(importlib.import_module(module)))
         raise ValueError(f"the module {module} has no {name!r}{near}") from None
 
 
@@ -709,12 +708,6 @@ def _argument(name: str, value: Any) -> Any:
 
         return get_reference_directions("uniform", 2, n_partitions=max(1, value - 1))
     return np.asarray(value, dtype=float)
-
-
-def _suggestion(word: str, known: Iterable[str]) -> str:
-    by_lower = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
-    return f" (did you mean {by_lower[near[0]]!r}?)" if near else ""
 
 
 def _sorted(values: Mapping[str, Any]) -> dict[str, Any]:
