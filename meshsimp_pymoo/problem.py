@@ -334,7 +334,7 @@ class MeshProblem(ElementwiseProblem):
 
 def _doc() -> str:
     """Return the documentation of MeshProblem with what the tables know."""
-    doc = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+    doc = (inspect.getdoc(MeshProblem) or "").replace("SETTINGS", documentation(Options, Rules))
     doc = doc.replace("OBJECTIVES", ", ".join(f'"{name}"' for name in OBJECTIVES))
     return doc.replace("REPORTED", ", ".join(f"``{name}``" for name in REPORTED))
 
