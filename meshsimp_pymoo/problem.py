@@ -49,6 +49,10 @@ MOST_REGIONS = 4096
 REPORTED = tuple(name for name in MEASURES if name != "triangles")
 
 
+# The constraints: an argument of MeshProblem each, and which objective it limits (the first, the last).
+CONSTRAINTS = {"max_triangles": -1, "max_error": 0}
+
+
 class ThreadRunner:
     """Evaluate a population of a :class:`MeshProblem` on several threads; the kernel runs without Python's lock.
 
@@ -191,7 +195,7 @@ class MeshProblem(ElementwiseProblem):
         super().__init__(
             n_var=self.surface.n_vertices,
             n_obj=len(self.objectives),
-            n_ieq_constr=(max_triangles is not None) + (max_error is not None),
+            n_ieq_constr=sum(getattr(self, name) is not None for name in CONSTRAINTS),
             xl=0,
             xu=1,
             vtype=bool,
@@ -257,11 +261,8 @@ class MeshProblem(ElementwiseProblem):
         F = [float(getattr(quality, name)) for name in self.objectives]
         out["F"] = F
         if self.n_ieq_constr:
-            out["G"] = []
-            if self.max_triangles is not None:
-                out["G"].append(F[-1] - self.max_triangles)
-            if self.max_error is not None:
-                out["G"].append(F[0] - self.max_error)
+            limits = ((column, getattr(self, name)) for name, column in CONSTRAINTS.items())
+            out["G"] = [F[column] - limit for column, limit in limits if limit is not None]
         if self.regions:
             # No mesh: its error, that of the worst one, is spread evenly.
             known = np.isfinite(row[REGIONS:])
@@ -336,7 +337,7 @@ def mesh_of(surface: Surface, faces: IntArray) -> trimesh.Trimesh:
 
 def _doc() -> str:
     """Return the documentation of MeshProblem with what the tables know."""
-    doc = (MeshProblem.__doc__ or "").replace("    SETTINGS", documentation(Options, Rules))
+    doc = (inspect.getdoc(MeshProblem) or "").replace("SETTINGS", documentation(Options, Rules))
     doc = doc.replace("OBJECTIVES", ", ".join(f'"{name}"' for name in OBJECTIVES))
     return doc.replace("REPORTED", ", ".join(f"``{name}``" for name in REPORTED))
 

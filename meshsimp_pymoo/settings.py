@@ -372,15 +372,15 @@ def read_back(kind: type[Settings], stored: Any) -> Settings:
     return kind(**stored)
 
 
-def documentation(*kinds: type[Any], indent: str = "    ") -> str:
+def documentation(*kinds: type[Any]) -> str:
     """Return the settings of classes as the parameters of a docstring."""
     lines = []
     for kind in kinds:
         for name, known in settings_of(kind).items():
             if known.derived:
                 continue
-            lines.append(f"{indent}{name} : {known.accepts}")
-            lines += _wrapped(known.doc, indent + "    ")
+            lines.append(f"{name} : {known.accepts}")
+            lines += _wrapped(known.doc, "    ")
     return "\n".join(lines)
 
 

@@ -82,7 +82,7 @@ OWN_ENTRIES = (
     TILES, "series.csv",
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
-PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh", "pymeshlab")
+PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh")
 
 
 @dataclass(frozen=True, eq=False)
@@ -465,15 +465,15 @@ def _look(kind: Format, surface: Surface) -> dict[str, Any]:
     )
 
 
-def package_versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that decide the results; absent ones are left out."""
-    return dict(_versions())
+def package_versions(*others: str) -> dict[str, str]:
+    """Return the versions of Python, of the packages that decide the results, and of others; absent ones left out."""
+    return dict(_versions(*others))
 
 
 @cache
-def _versions() -> dict[str, str]:
+def _versions(*others: str) -> dict[str, str]:
     versions = {"python": platform.python_version()}
-    for package in PACKAGES:
+    for package in PACKAGES + others:
         try:
             versions[package] = metadata.version(package)
         except metadata.PackageNotFoundError:

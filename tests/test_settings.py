@@ -319,9 +319,9 @@ class Toy:
 
 
 def test_settings_document_themselves_as_parameters_of_a_docstring():
-    lines = documentation(Toy, indent="  ").splitlines()
-    assert lines[0] == "  size : int"
-    assert all(line.startswith("      ") and len(line) < 120 for line in lines[1:])
+    lines = documentation(Toy).splitlines()
+    assert lines[0] == "size : int"
+    assert all(line.startswith("    ") and len(line) < 120 for line in lines[1:])
     assert " ".join(" ".join(lines[1:]).split()) == ("How many. " + "And so on. " * 20).strip()
 
 

@@ -1,7 +1,8 @@
 """What MeshLab makes of a mesh: quadric edge collapse and vertex clustering, the classic methods.
 
-Both run through pymeshlab (GPL-3), which is imported only when it is needed. It needs two libraries of the
-system; where they are missing, `MeshLabUnavailable` names the packages and everything else goes on working.
+Both run through pymeshlab (GPL-3), which the extra ``[meshlab]`` installs and which is imported only when it is needed.
+It needs two libraries of the system; where something is missing, `MeshLabUnavailable` names it and everything else
+goes on working.
 
 Four properties of MeshLab decide how its filters are called here:
 
@@ -32,6 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.errors import way_to_install
 from meshsimp_pymoo.surface.surface import Surface, require_rules
 
 if TYPE_CHECKING:
@@ -66,7 +68,7 @@ BISECTIONS = 24
 NEIGHBOURING_SIZES = 64
 
 
-class MeshLabUnavailable(RuntimeError):
+class MeshLabUnavailable(ImportError):
     """MeshLab's filters cannot be used on this machine; the message says what to install."""
 
 
@@ -386,6 +388,9 @@ def _pymeshlab() -> ModuleType:
 
             # without libOpenGL the import succeeds, but the plug-in that holds the filters is left out
             filters = set(pymeshlab.filter_list())
+    except ModuleNotFoundError as error:
+        way = way_to_install("meshlab")
+        raise MeshLabUnavailable(f"MeshLab's methods need pymeshlab; install it by {way}") from error
     except ImportError as error:
         raise MeshLabUnavailable(_unavailable(str(error))) from error
     missing = {QUADRIC, CLUSTERING} - filters
@@ -397,9 +402,8 @@ def _pymeshlab() -> ModuleType:
 def _unavailable(reason: str) -> str:
     """Say what to do where pymeshlab cannot be used."""
     return (
-        f"MeshLab's methods cannot be used here: pymeshlab does not load ({' '.join(reason.split())}); it is "
-        "installed by 'pip install pymeshlab' and needs the system's libGL.so.1 and libOpenGL.so.0, on "
-        "Debian and Ubuntu the packages libgl1 and libopengl0"
+        f"MeshLab's methods cannot be used here: pymeshlab does not load ({' '.join(reason.split())}); it "
+        "needs the system's libGL.so.1 and libOpenGL.so.0, on Debian and Ubuntu the packages libgl1 and libopengl0"
     )
 
 

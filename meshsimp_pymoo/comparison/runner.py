@@ -742,6 +742,6 @@ def _write_classic(
         "algorithm": method,
         "seconds": round(seconds, 4),
         "notes": notes,
-        "versions": package_versions(),
+        "versions": package_versions("pymeshlab"),
     }
     return write_run(folder, label, description, arrays, facts)

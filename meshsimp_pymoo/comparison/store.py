@@ -291,7 +291,7 @@ def write_model(out: Path, model: OpenModel) -> str:
     return relative
 
 
-def read_model(out: Path, relative: str, expected: str) -> OpenModel:
+def read_model(out: Path, relative: object, expected: str) -> OpenModel:
     """Read a stored model.
 
     Parameters

@@ -416,6 +416,7 @@ def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_ski
     def unavailable() -> None:
         raise meshlab.MeshLabUnavailable("it needs the packages libgl1 and libopengl0")
 
+    there = meshlab_available()
     monkeypatch.setattr(meshlab, "_pymeshlab", unavailable)
     config.write_text(CONFIG + "baselines: {meshlab: true}\n", encoding="utf-8")
     out = tmp_path / "out"
@@ -427,6 +428,14 @@ def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_ski
     assert "libopengl0" in (out / "findings.md").read_text()
     same = {name: content for name, content in results(out).items() if "findings" not in name}
     assert same == {name: content for name, content in results(reference).items() if "findings" not in name}
+    versions = [run.record["versions"] for run in Study(out).all_runs]
+    assert versions
+    assert not any("pymeshlab" in version for version in versions)
+    if there:  # installed since: the same call adds what was left out, and does nothing again
+        monkeypatch.undo()
+        added = run_experiment(config, out)
+        assert (added.finished, added.reused, added.skipped) == (2 * len(meshlab.MESHLAB_METHODS), RUNS, ())
+        assert all("pymeshlab" in run.record["versions"] for run in Study(out).classic_runs.values())
 
 
 def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolutionary_one(config, tmp_path):
