@@ -251,5 +251,4 @@ def test_no_name_of_a_model_is_a_tag_or_a_link_in_markdown(tmp_path, evil):
     for text in pages.values():
         assert "<" not in text
         # a link is an unescaped ] before a (
-        links = re.findall(r"(?<!\\)(?:\\\\)*\]\(\S*", text)
-        assert all(link == "](times.md)" for link in links), links
+        assert re.findall(r"(?<!\\)(?:\\\\)*\]\(\S*", text) == []

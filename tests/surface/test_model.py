@@ -143,7 +143,8 @@ def test_weights_follow_the_rows_of_the_file_or_come_from_it():
     model = build_model(named, up="z").with_weights("importance")
     np.testing.assert_array_equal(model.weights, model.source_index)
     assert model.hash != build_model(named, up="z").hash
-    assert model.neighbours is not None
+    for of_weighted, of_plain in zip(model.neighbours, build_model(named, up="z").neighbours, strict=True):
+        np.testing.assert_array_equal(of_weighted, of_plain)
 
 
 @pytest.mark.parametrize(
