@@ -558,15 +558,6 @@ def test_the_front_of_a_ramp_over_itself_is_its_uppermost_turn(turns):
     assert np.ptp(patch.points[:, 2]) == pytest.approx(height_of_a_turn, rel=0.05)
 
 
-@pytest.mark.parametrize(("others", "said"), [(1, "in 1 piece$"), (3, "in 3 pieces$")])
-def test_the_pieces_that_a_front_leaves_out_are_counted(others, said):
-    small = relief(4)
-    small = build_source(small.points / 5, small.faces)
-    whole = joined(relief(), *(moved(small, 2.0 * k, 3.0, 0.0) for k in range(others)))
-    with pytest.warns(ModelWarning, match=rf": {18 * others} of {242 + 18 * others} faces .* front patch, {said}"):
-        assert len(front_patch(whole, "z").faces) == 242
-
-
 def test_an_open_relief_is_its_own_front_also_when_clockwise():
     source = relief()
     for given_source in (source, inverted(source)):
