@@ -500,6 +500,7 @@ def test_the_output_shows_hypervolume_and_errors_generation_by_generation(capsys
     volumes = [row["hv"] for row in output.rows]
     assert volumes == sorted(volumes)
     assert 0 < volumes[0] < volumes[-1] < 1
+    assert last[3] == f"{volumes[-1]:.4f}"
 
 
 def test_the_hypervolume_is_the_share_of_the_box_between_the_ends():

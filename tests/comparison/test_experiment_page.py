@@ -114,6 +114,12 @@ def test_the_page_fits_a_phone(browser, page, tmp_path, scheme):
     visit.close()
 
 
+def test_the_seconds_of_a_search_are_those_of_the_runs(study, page):
+    shown = page[page.index('id="times"') :]
+    # 1.01, 1.02 and 1.03 s for both methods on both models
+    assert shown[: shown.index("</section>")].count("1.02") == 4
+
+
 def test_a_report_ends_with_the_page(study, monkeypatch):
     monkeypatch.setattr(experiment, "_write_figures", lambda study, progress: None)
     experiment.write_report(study.out)

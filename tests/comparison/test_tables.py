@@ -88,6 +88,12 @@ def test_the_tests_are_the_analysis_own(study):
     assert float(row["mean_a"]) > float(row["mean_b"])  # negated: larger is better
 
 
+def test_of_a_large_table_people_are_shown_some_columns_by_names_of_their_own():
+    table = Table("t", "A title", ("a", "b", "c"), ((1, 2.0, "x"), (3, 4.0, "y")))
+    part = table.part({"c": "third", "a": "first"}, table.rows[1:])
+    assert (part.title, part.columns, part.rows) == ("A title", ("third", "first"), (("y", 3),))
+
+
 def test_selected_solutions_come_with_their_numbers_and_the_run_that_found_them(study):
     rows = {(r["method"], r["solution"]): r for r in read(tables.selected(study, BUDGET, NEAREST))}
     least, fewest = rows["MD", "least error"], rows["N1", "fewest triangles"]

@@ -66,6 +66,22 @@ def test_upright_rectangles_of_inexact_sides_are_ties():
             assert circle_sign(*(a - p), *(b - p), *(c - p), 0.0) == 0
 
 
+@pytest.mark.parametrize("nudge", [(1, 0), (-1, 0), (0, 1), (0, -1)])
+def test_a_rectangle_with_one_corner_off_by_a_quantum_is_no_tie(nudge):
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        x0, x1, y0, y1 = (0.1 + 0.8 * rng.random(4) + 1.0) - 1.0
+        for corner in range(4):
+            corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+            corners[corner] += np.array(nudge) / SCALE
+            expected = sign(in_circle(*rational(corners)))
+            assert expected != 0
+            for shift in range(4):
+                a, b, c, p = np.roll(corners, shift, axis=0)
+                # round a circle: with every other corner the one in question changes sides
+                assert circle_sign(*(a - p), *(b - p), *(c - p), 0.0) == expected * (-1) ** shift
+
+
 @pytest.mark.parametrize(("step", "expected"), [(1 / 8, 2.0**-3), (3 / 1024, 2.0**-10), (0.1, 2.0**-52)])
 def test_exact_ranges_find_the_quantum_of_a_grid(step, expected):
     xy = np.stack(np.meshgrid(np.arange(6) * step, np.arange(6) * step), -1).reshape(-1, 2)

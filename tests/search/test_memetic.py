@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -111,6 +112,19 @@ def test_what_is_filled_in_between_two_rungs_fits_into_memory(monkeypatch):
         monkeypatch.setattr(module, "ENTRIES", most * X.size)
         n_rows.append(len(module.between_the_rungs(problem.surface, X, F, most=0)))
     assert n_rows == [1, 2, module.BETWEEN]
+
+
+def test_beyond_the_last_rung_come_meshes_of_thinning_up_to_its_best_one(monkeypatch):
+    surface = MeshProblem("face:200").surface
+    front = thinning(surface)
+    best = 100  # as if larger meshes were worse, as where an outline is not covered
+    error = np.where(np.arange(len(front)) > best, front.error[best] + 1, front.error)
+    monkeypatch.setattr(module, "thinned", lambda _: dataclasses.replace(front, error=error))
+    X = front.kept(20)[None]
+    found = module.between_the_rungs(surface, X, np.array([[front.error[20], front.triangles[20]]]), most=np.inf)
+    assert len(found) == module.BETWEEN
+    assert (np.diff(found.sum(axis=1)) > 0).all()
+    np.testing.assert_array_equal(found[-1], front.kept(best))
 
 
 def test_between_rungs_of_one_error_there_is_nothing_to_find():

@@ -13,7 +13,7 @@ from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.plane.order import find_corners, vector_order
-from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.surface.model import build_model, placed_model
 
 SIDE = 16
 
@@ -126,6 +126,13 @@ def test_copies_share_the_model_and_the_hash_follows_the_geometry(face):
     assert build_model(load("face:400")).hash == face.hash
     assert build_model(load("face:400,seed=2")).hash != face.hash
     assert len(face) == face.n_vertices == 400
+
+
+def test_a_model_put_together_from_arrays_is_in_the_frame_of_its_file(face):
+    model = placed_model(
+        "placed", face.points, face.faces, face.corners, xy=face.xy, unit=face.unit, source_index=face.source_index
+    )
+    np.testing.assert_array_equal(model.to_local(model.file_points), face.points)
 
 
 # ------------------------------------------------------------------------------------------------- weights

@@ -84,6 +84,14 @@ def test_an_island_over_a_sheet_is_seen_although_no_borders_touch():
     assert len(hidden_faces(points, np.vstack([sheet.faces[~hole], island.faces + 81]))) == 0
 
 
+def test_what_crosses_a_long_edge_in_its_middle_is_seen():
+    """Far more cells from the edge's ends than an ordinary edge is long."""
+    island = grid_source(np.zeros((16, 16)), 0.15, 0.15)
+    points = np.vstack([[[0, 0, 0], [100, 0, 0], [0, 100, 0]], island.points + np.array([50, 51.2, 1])])
+    faces = np.vstack([[[0, 1, 2]], island.faces + 3])
+    assert_array_equal(hidden_faces(points, faces), [0])
+
+
 @pytest.mark.parametrize(
     ("source", "folds", "hidden"),
     [(wall(100), 9750, 0), (sheets(80), 0, 161), (copies(8000), 0, 161), (fan(8000), 0, 0)],
