@@ -319,7 +319,7 @@ class DaskEngine:
         from distributed.scheduler import KilledWorker
 
         source = enumerate(tasks)
-        spread = None if shared is None else self.client.scatter(shared, broadcast=True, hash=False)
+        spread: Any = None
         running: dict[Any, int] = {}
         try:
             while True:
@@ -327,6 +327,8 @@ class DaskEngine:
                     with warnings.catch_warnings():
                         # a task carries its data, so that it can be done again where another worker died
                         warnings.filterwarnings("ignore", message="Sending large graph")
+                        if spread is None:  # a task too, not data that one worker may take with it
+                            spread = self.client.submit(_itself, shared, pure=False)
                         running[self.client.submit(work, item[1], spread, pure=False)] = item[0]
                 if not running:
                     return
@@ -350,6 +352,10 @@ class DaskEngine:
         finally:
             if running:
                 self.client.cancel(list(running))
+
+
+def _itself(shared: Any) -> Any:
+    return shared
 
 
 def open_engine(jobs: int | None = None, dask: str | None = None) -> Engine:

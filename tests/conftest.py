@@ -88,4 +88,4 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Let the tests that can go on for long be told how long."""
     parser.addoption("--fuzz-cases", type=int, default=300, help="damaged inputs of each kind (default: %(default)s)")
     parser.addoption("--fuzz-seed", type=int, default=1, help="of the damage (default: %(default)s)")
-    parser.addoption("--soak", type=int, default=13, help="simplifications in one process (default: %(default)s)")
+    parser.addoption("--soak", type=int, default=10, help="simplifications in one process (default: %(default)s)")

@@ -425,7 +425,7 @@ def test_dask_s_workers_give_the_same_result():
     )
     base = minimize(MeshProblem("roof:5"), nsga2_v1(pop_size=12), ("n_gen", 3), seed=1)
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
         problem = MeshProblem("roof:5", elementwise_runner=DaskParallelization(client))

@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-SETTLED = 10
+SETTLED = 7
 # What may come and go: caches of matplotlib and of the allocator.
 GROWTH = 4 << 20
 PER_RUN = 64 << 10

@@ -89,6 +89,7 @@ def first_call(tmp_path_factory):
     return done.stderr, said, json.loads(facts), run
 
 
+@pytest.mark.slow
 def test_the_first_call_says_that_it_compiles_and_keeps_it_apart(first_call):
     err, said, facts, run = first_call
     assert facts["code"] == 0
@@ -98,6 +99,7 @@ def test_the_first_call_says_that_it_compiles_and_keeps_it_apart(first_call):
     assert any(line.startswith("compiled once for this machine: ") for line in said)
 
 
+@pytest.mark.slow
 def test_a_search_finds_everything_compiled(first_call):
     _, _, facts, _ = first_call
     assert facts["late"] == []
@@ -106,6 +108,7 @@ def test_a_search_finds_everything_compiled(first_call):
     assert set(facts["entries"]) == names
 
 
+@pytest.mark.slow
 def test_the_specialisations_do_not_grow(first_call):
     _, _, facts, _ = first_call
     assert facts["compiled"] <= MOST_SPECIALISATIONS

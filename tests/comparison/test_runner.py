@@ -389,7 +389,7 @@ def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(con
 def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
     distributed = pytest.importorskip("distributed")
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster,
         DaskEngine(cluster.scheduler_address) as engine,
     ):
         run_experiment(config, tmp_path / "out", engine=engine)

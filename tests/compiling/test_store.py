@@ -183,7 +183,7 @@ def test_code_is_known_by_all_it_is_made_from():
 def test_code_of_a_loop_is_made_from_the_answers_of_the_surfaces(monkeypatch):
     """They are in another file, which Numba's own time stamps do not see."""
     known = made_from(thin.py_func)
-    monkeypatch.setattr(live, "MOST", live.MOST + 1)
+    monkeypatch.setattr(live, "MOST_TOUCHED", live.MOST_TOUCHED + 1)
     assert made_from(thin.py_func) != known
 
 

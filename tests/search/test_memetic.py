@@ -100,7 +100,9 @@ def test_where_all_vertices_are_not_the_best_mesh_the_front_still_ends_with_the_
 def test_a_rung_on_which_no_individual_fits_has_none():
     problem = MeshProblem("roof:5")
     pop = Population.new("F", np.array([[5.0, 9], [0.5, 12], [5.0, 8], [0.5, 14]]))
-    assert SizeLadder(np.array([7, 8, 11, 20])).best(problem, pop).tolist() == [-1, 2, 2, 1]
+    ladder = SizeLadder()
+    ladder.rungs = np.array([7, 8, 11, 20])
+    assert ladder.best(problem, pop).tolist() == [-1, 2, 2, 1]
 
 
 def test_what_is_filled_in_between_two_rungs_fits_into_memory(monkeypatch):

@@ -112,7 +112,19 @@ def test_no_read_is_larger_than_a_band_or_a_tile(path, tmp_path, monkeypatch):
         return read(self, top, bottom, left, right)
 
     monkeypatch.setattr(RasterHeights, "_read", watched)
-    call = ["simplify", str(path), "-o", str(tmp_path / "out"), "--tile", "64", "--meshes", "2", "--jobs", "1"]
+    call = [
+        "simplify",
+        str(path),
+        "-o",
+        str(tmp_path / "out"),
+        "--tile",
+        "64",
+        "--meshes",
+        "2",
+        "--jobs",
+        "1",
+        "--no-page",
+    ]
     assert main([*call, "--quiet"]) == 0
     assert 1000 < largest[0] <= 1500
 
@@ -121,7 +133,7 @@ def test_a_raster_becomes_a_front_in_its_own_coordinates_and_any_mesh_is_picked(
     out = tmp_path / "out"
     window = ",".join(map(str, WINDOW))
     call = ["simplify", str(path), "-o", str(out), "--tile", "64", "--window", window, "--triangles", "300"]
-    assert main([*call, "--meshes", "2", "--jobs", "1", "--quiet"]) == 0
+    assert main([*call, "--meshes", "2", "--jobs", "1", "--quiet", "--no-page"]) == 0
     record = json.loads((out / "run.json").read_text())
     model = open_model(path, Options(window=WINDOW))
     assert record["model"]["georeference"] == json.loads(json.dumps(model.georeference))
@@ -149,7 +161,20 @@ def test_a_raster_becomes_a_front_in_its_own_coordinates_and_any_mesh_is_picked(
 
 
 def test_meshes_far_from_the_origin_state_one_origin_or_lose_nothing(path, tmp_path, capsys):
-    base = ["simplify", str(path), "--tile", "64", "--jobs", "1", "--meshes", "2", "--pick", "knee", "--quiet"]
+    base = [
+        "simplify",
+        str(path),
+        "--tile",
+        "64",
+        "--jobs",
+        "1",
+        "--meshes",
+        "2",
+        "--pick",
+        "knee",
+        "--quiet",
+        "--no-page",
+    ]
     assert main([*base, "-o", str(tmp_path / "glb"), "--format", "glb"]) == 0
     record = json.loads((tmp_path / "glb" / "run.json").read_text())
     origin = record["mesh_origin"]
@@ -169,7 +194,9 @@ def test_a_big_raster_is_cut_into_tiles_without_being_asked_and_a_window_of_it_c
     path, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.setattr(tiled_command, "TILED_FROM", 10_000)
-    assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1"]) == 0
+    assert (
+        main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1", "--no-page"]) == 0
+    )
     assert "thinned tile by tile" in capsys.readouterr().out
     call = ["simplify", str(path), "-o", str(tmp_path / "part"), "--window", "0,0,12,10", "--no-page"]
     assert main([*call, "--algorithm", "nsga2_v1", "--population", "4", "--generations", "1", "--meshes", "none"]) == 0
@@ -200,7 +227,7 @@ def cut_off(path):
 )
 def test_what_cannot_be_cut_into_tiles_is_refused_in_one_line(tmp_path, capsys, make, message):
     file, out = make(tmp_path / "dem.tif"), tmp_path / "out"
-    assert main(["simplify", str(file), "-o", str(out), "--tile", "64", "--jobs", "1"]) == 2
+    assert main(["simplify", str(file), "-o", str(out), "--tile", "64", "--jobs", "1", "--no-page"]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     with pytest.raises(ModelError, match=message):
@@ -210,7 +237,19 @@ def test_what_cannot_be_cut_into_tiles_is_refused_in_one_line(tmp_path, capsys, 
 
 def test_a_part_of_a_raster_without_the_hole_is_thinned(tmp_path, capsys):
     file = write(tmp_path / "dem.tif", with_hole(HEIGHTS), nodata=-9999)
-    call = ["simplify", str(file), "-o", str(tmp_path / "out"), "--tile", "64", "--meshes", "none", "--jobs", "1"]
+    call = [
+        "simplify",
+        str(file),
+        "-o",
+        str(tmp_path / "out"),
+        "--tile",
+        "64",
+        "--meshes",
+        "none",
+        "--jobs",
+        "1",
+        "--no-page",
+    ]
     assert main([*call, "--window", "0,21,135,90", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["model"]["vertices"] == 135 * 90
 

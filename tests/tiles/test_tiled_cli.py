@@ -59,7 +59,7 @@ def test_an_independent_referee_agrees_with_the_front_of_a_mesh_whose_vertices_a
     model = build_model(load("jacksboro:5"))
     write_mesh(tmp_path / "relief.ply", model.file_points, model.faces)
     call = ["simplify", str(tmp_path / "relief.ply"), "-o", str(tmp_path / "out"), "--tile", "64", "--jobs", "1"]
-    assert main([*call, "--meshes", "6", "--quiet"]) == 0
+    assert main([*call, "--meshes", "6", "--quiet", "--no-page"]) == 0
     table = tmp_path / "out" / "front.csv"
     command = [sys.executable, str(oracle), str(tmp_path / "relief.ply"), "--front", str(table)]
     judged = subprocess.run(command, capture_output=True, text=True)
@@ -151,7 +151,20 @@ def test_pictures_of_a_big_grid_are_drawn_from_some_of_its_samples(path, out, mo
 
 
 def test_two_processes_write_the_same_bytes(out, path, tmp_path):
-    call = ["simplify", str(path), "--tile", "64", "--triangles", "700", "--meshes", "4", "--spacing", "30", "--quiet"]
+    call = [
+        "simplify",
+        str(path),
+        "--tile",
+        "64",
+        "--triangles",
+        "700",
+        "--meshes",
+        "4",
+        "--spacing",
+        "30",
+        "--quiet",
+        "--no-page",
+    ]
     assert main([*call, "-o", str(tmp_path / "other"), "--jobs", "2", "--threads", "1"]) == 0
     for file in ("front.csv", "front.npz", "chosen.ply"):
         assert (tmp_path / "other" / file).read_bytes() == (out / file).read_bytes(), file
@@ -159,7 +172,7 @@ def test_two_processes_write_the_same_bytes(out, path, tmp_path):
 
 def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
     call = ["simplify", str(path), "-o", str(tmp_path / "out"), "--tile", "64", "--pieces", "--pick", "knee"]
-    assert main([*call, "--meshes", "none", "--jobs", "1", "--json"]) == 0
+    assert main([*call, "--meshes", "none", "--jobs", "1", "--no-page", "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
     parts = [read_source(file) for file in sorted((tmp_path / "out" / "chosen").iterdir())]
     assert len(parts) >= 4
@@ -230,7 +243,9 @@ def test_a_big_grid_with_gaps_is_searched_in_one_piece_unless_tiles_are_asked_fo
 
 def test_big_grids_are_cut_into_tiles_without_being_asked(path, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(tiled_command, "TILED_FROM", 5_000)
-    assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1"]) == 0
+    assert (
+        main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1", "--no-page"]) == 0
+    )
     assert "thinned tile by tile" in capsys.readouterr().out
     monkeypatch.setattr(tiled_command, "TILED_FROM", 10_000_000)
     call = ["simplify", str(path), "-o", str(tmp_path / "whole"), "--generations", "1", "--population", "4"]
@@ -240,7 +255,7 @@ def test_big_grids_are_cut_into_tiles_without_being_asked(path, tmp_path, capsys
 
 def again(path, target):
     call = ["simplify", str(path), "-o", str(target), "--tile", "64", "--triangles", "700", "--meshes", "4"]
-    return [*call, "--spacing", "30", "--jobs", "1", "--quiet"]
+    return [*call, "--spacing", "30", "--jobs", "1", "--quiet", "--no-page"]
 
 
 def test_killed_and_started_again_it_goes_on_and_ends_with_the_same_bytes(out, path, tmp_path, monkeypatch):
@@ -282,7 +297,20 @@ def test_unfinished_tiles_of_other_settings_are_named_and_can_be_overwritten(pat
     out = tmp_path / "out"
     (out / "tiles").mkdir(parents=True)
     (out / "tiles" / "what.json").write_text("{}\n")
-    call = ["simplify", str(path), "-o", str(out), "--tile", "64", "--meshes", "none", "--jobs", "1", "--quiet"]
+    call = [
+        "simplify",
+        str(path),
+        "-o",
+        str(out),
+        "--tile",
+        "64",
+        "--meshes",
+        "none",
+        "--jobs",
+        "1",
+        "--no-page",
+        "--quiet",
+    ]
     assert main(call) == 2
     assert "unfinished tiles of another model or of other settings" in capsys.readouterr().err
     assert main([*call, "--overwrite"]) == 0

@@ -386,7 +386,7 @@ def test_a_dask_cluster_finds_the_same_front(front):
     from meshsimp_pymoo.workers import DaskEngine
 
     with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0", silence_logs=50) as cluster,
         DaskEngine(cluster.scheduler_address) as engine,
     ):
         assert same(tiled_front(GRID, tile=64, engine=engine), front)
