@@ -471,6 +471,10 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     # nothing is done again
     before = results(out)
     assert run_experiment(config, out).finished == 0
+    # but what is damaged
+    damaged = spoil_truncated(run.path)
+    with pytest.warns(ExperimentWarning, match=f"{damaged.name}.*computed again"):
+        assert run_experiment(config, out).finished == 1
     write_tables(Study(out))
     assert results(out) == before
 
