@@ -18,7 +18,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 # Examples of each property that Hypothesis tries.
-EXAMPLES = 50
+EXAMPLES = 30
 settings.register_profile("plain", max_examples=EXAMPLES, deadline=None)
 settings.register_profile("slow", max_examples=SLOW * EXAMPLES, deadline=None)
 
@@ -86,6 +86,6 @@ def browser(engine):
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let the tests that can go on for long be told how long."""
-    parser.addoption("--fuzz-cases", type=int, default=300, help="damaged inputs of each kind (default: %(default)s)")
+    parser.addoption("--fuzz-cases", type=int, default=200, help="damaged inputs of each kind (default: %(default)s)")
     parser.addoption("--fuzz-seed", type=int, default=1, help="of the damage (default: %(default)s)")
     parser.addoption("--soak", type=int, default=10, help="simplifications in one process (default: %(default)s)")
