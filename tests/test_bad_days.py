@@ -200,6 +200,36 @@ def test_a_signal_while_compiling_is_answered_at_once_and_leaves_nothing(tmp_pat
     assert [entry.name for entry in tmp_path.iterdir()] == ["cache"]
 
 
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_what_a_signal_stops_halfway_in_a_library_says_nothing(interrupted):
+    """Libraries free in ``__del__`` what they had not made whole yet; that a search is interrupted is said already."""
+    code = f"""
+import signal, sys
+from meshsimp_pymoo import cli
+
+class Half:
+    def __del__(self):
+        raise AttributeError("no such part")
+
+def main(argv=None, half=None):
+    with cli.interruptible():
+        if {interrupted}:
+            try:
+                signal.raise_signal(signal.SIGINT)
+            except KeyboardInterrupt:
+                pass
+    kept.append(Half())
+    return 130
+
+kept = []
+cli.main = main
+cli.program()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 130
+    assert ("no such part" in done.stderr) is not interrupted
+
+
 @needs_posix
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):

@@ -54,6 +54,7 @@ def test_it_scores_every_method_at_the_sizes_of_thinning(quality, tmp_path, caps
     assert "Search / rival" in text
 
 
+@pytest.mark.slow
 def test_variants_are_compared_with_the_first_one(quality, monkeypatch, capsys, tmp_path):
     few = functools.partial(quality.ladder_search, 5)
     monkeypatch.setattr(quality, "VARIANTS", {"full": quality.ladder_search, "few": few})
@@ -72,6 +73,7 @@ def test_variants_are_compared_with_the_first_one(quality, monkeypatch, capsys, 
     assert float(line[column]) == pytest.approx(np.exp(few.mean() - full.mean()), abs=6e-4)
 
 
+@pytest.mark.slow
 def test_every_variant_searches_and_they_differ(quality):
     problem = MeshProblem("peaks:9", regions=quality.REGIONS)
     found = {}

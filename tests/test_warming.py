@@ -114,6 +114,7 @@ def test_the_specialisations_do_not_grow(first_call):
     assert facts["compiled"] <= MOST_SPECIALISATIONS
 
 
+@pytest.mark.slow
 def test_two_processes_compile_where_there_are_two_cores(tmp_path, monkeypatch):
     code = "from meshsimp_pymoo import warming\nparts = ['files', 'folded scans']\n"
     code += "warming.PARTS = [part._replace(beside=part.name == parts[1]) for part in warming.PARTS]\n"

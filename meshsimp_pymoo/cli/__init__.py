@@ -35,6 +35,7 @@ from meshsimp_pymoo.cli.terminal import (
     interruptible,
     matplotlib_silent,
     say,
+    tell_unraisable,
     warnings_as_lines,
 )
 from meshsimp_pymoo.errors import InputError
@@ -88,6 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def program() -> NoReturn:
     """Be the shell command: once :func:`main` is done, no signal changes what came of it."""
+    sys.unraisablehook = tell_unraisable
     code = main()
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)

@@ -58,6 +58,7 @@ __all__ = [
     "tell",
     "tell_drawn",
     "tell_origin",
+    "tell_unraisable",
     "there",
     "warnings_as_lines",
 ]
@@ -159,10 +160,16 @@ def _note(signum: int, frame: Any) -> None:
         raise KeyboardInterrupt
 
 
+def tell_unraisable(lost: Any) -> None:
+    """Say what can raise nothing, as Python does, but not what a signal has stopped halfway in a library."""
+    if _Signals.first is None:
+        sys.__unraisablehook__(lost)
+
+
 def _raise_again(lost: Any) -> None:
     """Raise KeyboardInterrupt a moment later where it met what can raise nothing, such as the end of an object."""
     if lost.exc_type is not KeyboardInterrupt or _Signals.first is None:
-        sys.__unraisablehook__(lost)
+        tell_unraisable(lost)
         return
     _Signals.part.came -= 1
     _Signals.repeated += 1

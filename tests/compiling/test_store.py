@@ -137,7 +137,9 @@ def assert_said(done, n):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="HOME is another there")
-@pytest.mark.parametrize("n", PLACES.values(), ids=PLACES)
+@pytest.mark.parametrize(
+    "n", [pytest.param(n, id=name, marks=[pytest.mark.slow] * (n < 3)) for name, n in PLACES.items()]
+)
 def test_info_works_where_the_package_cannot_be_written(tmp_path, n):
     # two faces that touch in a vertex alone: whether they overlap takes compiled code
     corners = "0 0 0\n1 1 0\n0 1 0\n1 -1 0\n0 -1 0"

@@ -386,8 +386,10 @@ def test_the_referee_agrees_on_terrain(referee, name):
 
 @pytest.mark.parametrize(
     "name",
-    "m1_laurana m2_demosthenes m3_nefertiti m4_skull m5_celticskull m6_igea t_matteo500 f_humface f_maxplanck "
-    "f_mask_holes l_laurana_front".split(),
+    [
+        *"m1_laurana m2_demosthenes m3_nefertiti m4_skull m5_celticskull m6_igea t_matteo500 f_humface".split(),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("f_maxplanck", "f_mask_holes", "l_laurana_front")),
+    ],
 )
 def test_the_referee_agrees_on_real_scans(referee, shared_data, name):
     assert_referee_agrees(referee, build_model(read_source(shared_data / f"{name}.ply")), [0.05, 0.4])

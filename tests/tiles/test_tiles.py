@@ -381,6 +381,7 @@ def test_the_front_depends_neither_on_the_order_nor_on_the_engine(front):
         assert same(tiled_front(GRID, tile=64, engine=engine), front)
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_finds_the_same_front(front):
     distributed = pytest.importorskip("distributed")
     from meshsimp_pymoo.workers import DaskEngine
