@@ -90,7 +90,7 @@ def way_to_install(extra: str) -> str:
     """Return the command that installs what an extra of this package brings, wherever the package came from.
 
     >>> way_to_install("geo")
-    "pip install 'rasterio>=1.3'"
+    "pip install 'rasterio>=1.4'"
     """
     from importlib.metadata import PackageNotFoundError, requires
 

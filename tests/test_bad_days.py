@@ -231,7 +231,9 @@ cli.program()
 
 
 @needs_posix
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(
+    ("number", "code"), [pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow), (signal.SIGINT, 130)]
+)
 def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):
     command = [*PROGRAM, "simplify", "jacksboro:20", "--time", "10min", "--threads", "1", "--json"]
     command += ["--checkpoint", "0.2s", "-o", str(tmp_path / "out")]

@@ -360,6 +360,7 @@ def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(conf
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL is a POSIX signal")
+@pytest.mark.slow
 def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(config, tmp_path, reference):
     out = tmp_path / "out"
     call = [sys.executable, "-m", "meshsimp_pymoo", "run", str(config), "-o", str(out), "--jobs", "2", "--quiet"]

@@ -356,7 +356,7 @@ def test_from_a_clone_that_is_not_installed_the_extra_is_named(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "module", "needed"), [("las", "laspy", r"laspy\[lazrs\]>=2.5"), ("tif", "rasterio", "rasterio>=1.3")]
+    ("suffix", "module", "needed"), [("las", "laspy", r"laspy\[lazrs\]>=2.5"), ("tif", "rasterio", "rasterio>=1.4")]
 )
 def test_a_missing_library_is_named_with_the_way_to_install_it(tmp_path, monkeypatch, suffix, module, needed):
     monkeypatch.setitem(sys.modules, module, None)
