@@ -156,7 +156,7 @@ def test_no_scheduler_and_no_dask_are_answered_in_one_line(monkeypatch):
     with pytest.raises(EngineError, match=r"tcp://127.0.0.1:9: no Dask scheduler answers .*--jobs"):
         DaskEngine("tcp://127.0.0.1:9")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(EngineError, match=r"pip install 'dask\[distributed\]>=2024.1'"):
+    with pytest.raises(EngineError, match=r"pip install 'dask\[distributed\]>=2024.8'"):
         DaskEngine("tcp://127.0.0.1:9")
 
 
