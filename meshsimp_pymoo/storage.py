@@ -291,14 +291,15 @@ def write_front(
         for solution, row in enumerate(order):
             path, fitted = "", ["", ""]
             if faces is not None and (solution in with_mesh or row == chosen):
-                arrays = mesh_arrays(model, faces(int(row)))
+                triangles = faces(int(row))
+                arrays = mesh_arrays(model, triangles)
                 single = max(single, single_precision_shift(arrays[0], surface.view.scale))
                 if solution in with_mesh:
                     path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                     write_mesh(partial / path, *arrays, **look)
                 if row == chosen and cut is not None:
                     (partial / "chosen").mkdir()
-                    for name, part in cut(faces(int(row))):
+                    for name, part in cut(triangles):
                         write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
                 elif row == chosen:
                     write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray, Rows
-from meshsimp_pymoo.errors import NoFullGrid
+from meshsimp_pymoo.errors import NoFullGrid, ResultError
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.source.heights import Heights
@@ -237,13 +237,28 @@ class HeightGrid:
         return Rows(numbered, self.n_vertices)
 
     def samples_of_rows(self, rows: IntArray) -> IntArray:
-        """Return the samples of rows of the file; the inverse of ``source_index``."""
+        """Return the samples of rows of the file; the inverse of ``source_index``.
+
+        Raises
+        ------
+        ResultError
+            If the grid has no such row: whoever names it is about another one.
+        """
         if self.model is None or self.row_of is None:
             row, column = np.divmod(rows, self.file_columns or self.shape[1])
-            return (row - self.corner[0]) * self.shape[1] + column - self.corner[1]
-        source = self.model.source_index[self.row_of]
-        order = np.argsort(source)
-        return order[np.searchsorted(source[order], rows)]
+            samples = (row - self.corner[0]) * self.shape[1] + column - self.corner[1]
+        else:
+            source = self.model.source_index[self.row_of]
+            order = np.argsort(source)
+            samples = order[np.minimum(np.searchsorted(source[order], rows), self.n_vertices - 1)]
+        samples = np.clip(samples, 0, self.n_vertices - 1)
+        wrong = np.flatnonzero(self.source_index[samples] != rows)
+        if len(wrong):
+            raise ResultError(
+                f"{self.name}: has no vertex of row {rows[wrong[0]]}, which the front keeps; its front.npz is damaged or "
+                "of another model: simplify again"
+            )
+        return samples
 
     def _rows_of(self, values: Any) -> Rows:
         """Return an array of the model's vertices as one of the samples."""

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, ResultError
 from meshsimp_pymoo.opening import open_grid, open_model
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -98,6 +98,15 @@ def test_chromosomes_are_made_one_at_a_time():
     chromosomes = Chromosomes(NESTED, grid)
     assert chromosomes.shape == (3, 9)
     assert np.flatnonzero(chromosomes[2]).tolist() == [0, 2, 3, 5]  # 7, 3, 5, 1 of 4 columns, of which 3 are here
+
+
+@pytest.mark.parametrize("row", [-1, 4, 10**9])
+def test_rows_that_a_grid_does_not_have_are_named(row, pair):
+    grid = open_grid(np.arange(12.0).reshape(3, 4), window=(1, 0, 3, 3))
+    with pytest.raises(ResultError, match=f"has no vertex of row {row}, which the front keeps"):
+        grid.samples_of_rows(np.array([1, row]))
+    with pytest.raises(ResultError, match="has no vertex of row 1000000"):
+        pair[0].model.samples_of_rows(np.array([1, 10**6]))
 
 
 @pytest.mark.parametrize(
