@@ -255,8 +255,8 @@ class HeightGrid:
         wrong = np.flatnonzero(self.source_index[samples] != rows)
         if len(wrong):
             raise ResultError(
-                f"{self.name}: has no vertex of row {rows[wrong[0]]}, which the front keeps; its front.npz is damaged or "
-                "of another model: simplify again"
+                f"{self.name}: has no vertex of row {rows[wrong[0]]}, which the front keeps; its front.npz is damaged "
+                "or of another model; simplify again"
             )
         return samples
 
