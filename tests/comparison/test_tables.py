@@ -16,7 +16,7 @@ from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.figures import box_figure, fronts_figure, selected_figure
 from meshsimp_pymoo.comparison.report import write_tables
 from meshsimp_pymoo.comparison.store import ExperimentWarning
-from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, Study
+from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, INDICATORS as NAMES, Study
 from meshsimp_pymoo.comparison.tables import Table
 from meshsimp_pymoo.report.document import slug
 
@@ -78,12 +78,13 @@ def test_the_tests_are_the_analysis_own(study):
     case = study.cases["M_1 & co", BUDGET, NEAREST]
     for indicator in INDICATORS:
         expected = compared(case.runs, "N1", "MD", indicator, case.optimal)
-        (row,) = [r for r in rows if r["indicator"] == tables.INDICATOR_NAMES[indicator]]
+        (row,) = [r for r in rows if r["indicator"] == NAMES[indicator]]
         assert (row["a"], row["b"]) == ("N1", "MD")
         assert float(row["p"]) == expected.p
         assert float(row["a12"]) == expected.a12
         assert float(row["mean_a"]) == pytest.approx(expected.sample_a.mean())
-    assert len(rows) == 5
+    assert len(rows) == len(NAMES) == 9
+    assert {row["p_signed_rank"] for row in rows if row["indicator"] == "HVR"} == {"0.5"}  # two pairs: 2 / 2 ** 2
     (row,) = [r for r in rows if r["indicator"] == "epsilon to the pseudo-optimal front"]
     assert float(row["mean_a"]) > float(row["mean_b"])  # negated: larger is better
 
