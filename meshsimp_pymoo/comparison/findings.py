@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from meshsimp_pymoo.comparison.analysis import ALPHA, holm
+from meshsimp_pymoo.comparison.statistics import ALPHA, holm, rank_sum, signed_rank
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.comparison.tables import INDICATOR_NAMES, Table, markdown_text
 from meshsimp_pymoo.search.presets import PRESETS
@@ -478,8 +478,6 @@ def _tested(
 
 
 def _rank_sum(model: str, a: str, b: str, x: np.ndarray, y: np.ndarray, value_a: float, value_b: float) -> Outcome:
-    from meshsimp_pymoo.comparison.analysis import rank_sum
-
     least = 2 / math.comb(len(x) + len(y), len(x))
     return Outcome(model, a, b, rank_sum(x, y).p, least, _direction(x.mean(), y.mean(), x, y), value_a, value_b)
 
@@ -515,8 +513,7 @@ def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[
         return []
     values = np.array([_values(case, a, b, indicator) for case in both])
     difference = values[:, 0] - values[:, 1] if indicator == "hvr" else values[:, 1] - values[:, 0]
-    n = int(np.count_nonzero(difference))
-    p = float(stats.wilcoxon(difference, method="exact" if n == len(difference) else "auto").pvalue) if n else 1.0
+    p = signed_rank(values[:, 0], values[:, 1]).p
     direction = int(np.sign(np.median(difference)))
     return [Outcome("all models", a, b, p, 2.0 ** (1 - len(both)), direction, *values.mean(axis=0).tolist())]
 
