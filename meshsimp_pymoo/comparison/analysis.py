@@ -9,13 +9,12 @@ The order of a study:
 1. `pseudo_optimal`: what a method found in all its runs, or what all methods found together;
 2. `unary_scores`: hypervolume ratio, epsilon, coverage and cardinality of every run against that optimum;
    `epsilon_table`, `coverage_table`: every method's runs against every other's, the paper's Tables 2 and 1;
-3. `rank_sum`, of indicators or of `dominance_rates`: the paper's Wilcoxon procedure, with effect sizes; `holm`,
-   `corrected` for many comparisons;
+3. `dominance_rates`, to which the paper's Wilcoxon procedure comes down for a binary indicator; `corrected` for
+   many comparisons; the tests themselves are in `meshsimp_pymoo.comparison.statistics`;
 4. `selected_solutions`: the paper's three solutions per method, and the knees;
 5. `attainment_surfaces`: where a share of a method's runs gets.
 
-The paper's text was not at hand when this was written. What had to be read into its words is marked as a
-reading.
+Where the paper's text leaves something open, what was read into it is marked as a reading.
 
 References
 ----------
@@ -23,10 +22,6 @@ References
    mesh simplification of 3D open models", Integrated Computer-Aided Engineering 20(4), 2013.
 .. [2] L. Sánchez and J. R. Villar, "Obtaining transparent models of chaotic systems with multi-objective
    simulated annealing algorithms", Information Sciences 178(4), 2008.
-.. [3] A. Vargha and H. D. Delaney, "A critique and improvement of the CL common language effect size
-   statistics of McGraw and Wong", Journal of Educational and Behavioral Statistics 25(2), 2000.
-.. [4] S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics
-   6(2), 1979.
 """
 
 from __future__ import annotations
@@ -40,9 +35,9 @@ from dataclasses import dataclass, replace
 import moocore
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.comparison.statistics import ALPHA, Summary, holm, summarise
 from meshsimp_pymoo.indicators import (
     cardinality,
     coverage,
@@ -53,41 +48,32 @@ from meshsimp_pymoo.indicators import (
 )
 
 __all__ = [
-    "ALPHA",
     "COVERAGE_THRESHOLD",
     "Comparison",
     "OptimalFront",
     "PairTable",
-    "RankSum",
     "Scores",
     "Solution",
-    "Summary",
     "attainment_surfaces",
     "corrected",
     "coverage_table",
     "dominance_rates",
     "epsilon_table",
-    "holm",
     "knees",
-    "magnitude",
     "pseudo_optimal",
-    "rank_sum",
     "scale_factor",
     "selected_solutions",
-    "summarise",
     "trade_off",
     "unary_scores",
-    "vargha_delaney",
 ]
 
 Runs = Mapping[str, Mapping[int, ArrayLike]]
 
-# The paper's level of significance, and the coverage from which one run counts as dominating another.
-ALPHA = 0.05
+# The coverage from which one run counts as dominating another (Section 4.6).
 COVERAGE_THRESHOLD = 0.75
 
-# How many random weights choose the best trade-off.
-N_WEIGHTS = 1000
+TRADE_OFFS = {"ranges": "trade_off", "paper": "trade_off_paper"}
+"""The rules of `trade_off`, and the kind of `Solution` that each gives."""
 
 
 @dataclass(frozen=True)
@@ -108,26 +94,6 @@ class OptimalFront:
     def share(self, method: str) -> float:
         """Return the share of the front's solutions that a method found, alone or not."""
         return float(np.mean([any(name == method for name, _ in runs) for runs in self.found_by]))
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Mean and standard deviation of some values.
-
-    Attributes
-    ----------
-    mean, std : float
-        The standard deviation is the sample's (n - 1); NaN where there is none, as `note` says.
-    n : int
-        Number of values.
-    note : str
-        Why a number is NaN or infinite; empty if none is.
-    """
-
-    mean: float
-    std: float
-    n: int
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -179,29 +145,6 @@ class Scores:
     merged_epsilon: float
     merged_coverage: float
     merged_cardinality: int
-
-
-@dataclass(frozen=True)
-class RankSum:
-    """A Wilcoxon rank-sum test between two samples.
-
-    Attributes
-    ----------
-    p : float
-        Two-sided p-value.
-    a12 : float
-        Vargha-Delaney effect size: the probability that a value of the first sample is larger than one of the
-        second, ties counted half; 0.5 is no effect.
-    exact : bool
-        Whether p is exact (no ties) or the normal approximation with corrections for ties and continuity.
-    note : str
-        What to know before believing p; mostly empty.
-    """
-
-    p: float
-    a12: float
-    exact: bool
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -263,7 +206,7 @@ class Solution:
     Attributes
     ----------
     kind : str
-        "least_error", "fewest_triangles", "trade_off" or "knee".
+        "least_error", "fewest_triangles", "trade_off", "trade_off_paper" or "knee".
     error : float
         [model units]
     triangles : int
@@ -301,28 +244,6 @@ def pseudo_optimal(runs: Runs) -> OptimalFront:
                 if row.tobytes() in found:
                     found[row.tobytes()].append((method, seed))
     return OptimalFront(front, tuple(tuple(found[row.tobytes()]) for row in front))
-
-
-def summarise(values: ArrayLike) -> Summary:
-    """Return mean and standard deviation, and say why if one of them is not a number.
-
-    Examples
-    --------
-    >>> summarise([1.0, 2.0, 3.0])
-    Summary(mean=2.0, std=1.0, n=3, note='')
-    >>> summarise([1.5]).note
-    'one value has no standard deviation'
-    """
-    array = _sample(values, "the values")
-    n = len(array)
-    infinite = int(np.isinf(array).sum())
-    if infinite:
-        mean = math.inf if array.max() == math.inf else -math.inf
-        return Summary(mean, math.nan, n, f"{infinite} of {n} values are infinite")
-    mean = float(array.mean())
-    if n == 1:
-        return Summary(mean, math.nan, n, "one value has no standard deviation")
-    return Summary(mean, float(array.std(ddof=1)), n)
 
 
 def unary_scores(
@@ -363,7 +284,8 @@ def unary_scores(
 def coverage_table(runs: Runs) -> PairTable:
     """Return the coverage C between the runs of every two methods, as in the paper's Table 1.
 
-    A reading: a cell averages over all pairs of a run of the one and a run of the other method.
+    A reading: Section 4.5 prints means without saying of what. A merged front has one value and no deviation, which
+    Table 2 has, so a cell averages over all pairs of a run of the one and a run of the other method.
 
     Examples
     --------
@@ -377,106 +299,9 @@ def coverage_table(runs: Runs) -> PairTable:
 def epsilon_table(runs: Runs, *, shift: ArrayLike = 0.0) -> PairTable:
     """Return the multiplicative epsilon I between the runs of every two methods, as in the paper's Table 2.
 
-    A reading: a cell averages over all pairs of a run of the one and a run of the other method.
+    Its cells are read as those of `coverage_table`.
     """
     return _pair_table("epsilon", runs, lambda A, B: epsilon(A, B, shift=shift))
-
-
-def vargha_delaney(x: ArrayLike, y: ArrayLike) -> float:
-    """Return A12, the probability that a value of x is larger than one of y, ties counted half [3]_.
-
-    References
-    ----------
-    .. [3] A. Vargha and H. D. Delaney, "A critique and improvement of the CL common language effect size
-       statistics of McGraw and Wong", Journal of Educational and Behavioral Statistics 25(2), 2000.
-
-    Examples
-    --------
-    >>> vargha_delaney([2, 3], [1, 3])
-    0.625
-    """
-    a, b = _sample(x, "the first sample")[:, None], _sample(y, "the second sample")[None, :]
-    return float((a > b).mean() + (a == b).mean() / 2)
-
-
-def magnitude(a12: float) -> str:
-    """Return Vargha and Delaney's word for an effect size: negligible, small, medium or large.
-
-    Examples
-    --------
-    >>> magnitude(0.5), magnitude(0.3), magnitude(1.0)
-    ('negligible', 'medium', 'large')
-    """
-    distance = abs(a12 - 0.5)
-    words = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"))
-    return next((word for limit, word in words if distance < limit - 1e-12), "large")
-
-
-def rank_sum(x: ArrayLike, y: ArrayLike, *, alpha: float = ALPHA) -> RankSum:
-    """Test by Wilcoxon's rank sums whether two samples come from the same distribution.
-
-    p is exact where no two values are equal, and the normal approximation with corrections for ties and
-    continuity where some are. Samples that cannot differ get p = 1 and a note, not a warning.
-
-    Parameters
-    ----------
-    x, y : (n,), (m,) array-like
-        The samples; infinite values have a rank like any other, NaN is refused.
-    alpha : float
-        Level of significance that the note speaks of.
-
-    Examples
-    --------
-    >>> rank_sum([1, 2, 3, 4], [5, 6, 7, 8])
-    RankSum(p=0.02857142857142857, a12=0.0, exact=True, note='')
-    >>> rank_sum([1, 1], [1]).note
-    'all values are equal'
-    """
-    a, b = _sample(x, "the first sample"), _sample(y, "the second sample")
-    pooled = np.concatenate([a, b])
-    a12 = vargha_delaney(a, b)
-    if (pooled == pooled[0]).all():
-        return RankSum(1.0, a12, True, "all values are equal")
-    exact = len(np.unique(pooled)) == len(pooled)
-    p = float(stats.mannwhitneyu(a, b, method="exact" if exact else "asymptotic").pvalue)
-    least = 2 / math.comb(len(pooled), len(a))
-    note = ""
-    if least >= alpha:
-        note = f"with {len(a)} and {len(b)} values no p-value below {min(1.0, least):.2g} is possible"
-    return RankSum(min(1.0, p), a12, exact, note)
-
-
-def holm(p: ArrayLike) -> FloatArray:
-    """Return p-values corrected for being many, by Holm's step-down procedure [4]_.
-
-    Parameters
-    ----------
-    p : (n,) array-like
-        Raw p-values of all comparisons made together.
-
-    Returns
-    -------
-    (n,) float array
-        In the same order; each is to be compared with the level of significance itself.
-
-    References
-    ----------
-    .. [4] S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of
-       Statistics 6(2), 1979.
-
-    Examples
-    --------
-    >>> holm([0.01, 0.04, 0.03])
-    array([0.03, 0.06, 0.06])
-    """
-    raw = np.asarray(p, dtype=float)
-    if raw.ndim != 1 or not np.all((raw >= 0) & (raw <= 1)):
-        raise ValueError(f"p-values are a list of numbers from 0 to 1, not {raw}")
-    order = np.argsort(raw, kind="stable")
-    steps = np.maximum.accumulate(raw[order] * np.arange(len(raw), 0, -1))
-    adjusted = np.empty_like(raw)
-    adjusted[order] = np.minimum(steps, 1.0)
-    return adjusted
 
 
 def dominance_rates(
@@ -489,8 +314,8 @@ def dominance_rates(
     * by "epsilon" if I(A_i, B_j) <= 1 < I(B_j, A_i), that is, if A_i is better than B_j;
     * by "coverage" if C(A_i, B_j) >= threshold > C(B_j, A_i).
 
-    A reading: the paper has the threshold of 0.75; that the reverse coverage must stay below it is added
-    here, so that of two nearly equal runs neither dominates the other.
+    A reading: Section 4.6 has the procedure of [2]_ and the threshold of 0.75; that the reverse coverage must stay
+    below it is added here, so that of two nearly equal runs neither dominates the other.
 
     Parameters
     ----------
@@ -540,70 +365,126 @@ def corrected(comparisons: Iterable[Comparison]) -> list[Comparison]:
     return [replace(comparison, p_holm=float(p)) for comparison, p in zip(family, adjusted, strict=True)]
 
 
-def scale_factor(front: ArrayLike) -> float:
-    """Return alpha, which brings the triangles to the scale of the error: the ratio of their ranges.
+def scale_factor(front: ArrayLike, rule: str = "ranges") -> float | None:
+    """Return alpha, which brings error and triangles to one scale, by a rule of `trade_off`.
 
-    A reading: the design only says that the trade-off uses a scale factor alpha. With this one the weighted
-    sum ranks solutions as if both objectives were normalised to [0, 1] over the front. Where the front has no
-    extent (a single solution), alpha is 1.
+    ========= ======================================================= =====================================
+    rule      alpha                                                   unit
+    ========= ======================================================= =====================================
+    "ranges"  range of the errors / range of the triangles            errors per triangle; multiplies T
+    "paper"   mean of triangles / error over all solutions (Eq. 10)   triangles per error; multiplies E
+    ========= ======================================================= =====================================
+
+    Parameters
+    ----------
+    front : (n, 2) array-like
+        (error, triangles).
+    rule : {"ranges", "paper"}
+        Which.
+
+    Returns
+    -------
+    float or None
+        None where Eq. 10 is undefined: a solution without error would count infinitely much. By the ranges, 1
+        where the front has no extent (a single solution).
 
     Examples
     --------
-    >>> scale_factor([[100.0, 2], [0.0, 52]])
-    2.0
+    >>> front = [[100.0, 2], [25.0, 52]]
+    >>> scale_factor(front), scale_factor(front, "paper")
+    (1.5, 1.05)
+    >>> scale_factor([[100.0, 2], [0.0, 52]], "paper") is None
+    True
     """
-    error, triangles = np.ptp(non_dominated(front, "the front"), axis=0)
-    return float(error / triangles) if error > 0 and triangles > 0 else 1.0
+    F = non_dominated(front, "the front")
+    if rule == "ranges":
+        error, triangles = np.ptp(F, axis=0)
+        return float(error / triangles) if error > 0 and triangles > 0 else 1.0
+    if rule != "paper":
+        raise ValueError(f"{rule!r} is no rule of the trade-off: choose {' or '.join(map(repr, TRADE_OFFS))}")
+    with np.errstate(divide="ignore", over="ignore"):
+        alpha = float(np.mean(F[:, 1] / F[:, 0]))
+    return alpha if math.isfinite(alpha) else None
 
 
 def trade_off(
     front: ArrayLike,
     *,
-    random_state: np.random.Generator,
+    rule: str = "ranges",
     alpha: float | None = None,
-    n_weights: int = N_WEIGHTS,
-) -> int:
-    """Return the best trade-off of a front between error and triangles, over many random weights.
+    n_weights: int | None = None,
+    random_state: np.random.Generator | None = None,
+) -> int | None:
+    """Return the best trade-off of a front between error and triangles: the least weighted sum of both.
 
-    The value of a solution s for a weight w, uniform in [0, 1], is
+    ========= ==================================== ========================================================
+    rule      value of a solution                  alpha, see `scale_factor`
+    ========= ==================================== ========================================================
+    "ranges"  mean of w E + (1 - w) alpha T        ratio of the ranges: as if both were scaled to [0, 1]
+    "paper"   mean of alpha w E + (1 - w) T        Eq. 10: the mean of T / E over the method's own front
+    ========= ==================================== ========================================================
 
-        F_w(s) = w * error(s) + (1 - w) * alpha * triangles(s)
+    The mean is over weights w, uniform in [0, 1]; the paper draws 1000 (Section 4.7, Eqs. 9 and 11). It is linear
+    in w, so that many weights say what their mean does, and the mean of all is 1/2. That is the default: the same
+    choice every time. Where the values of neighbours are close, 1000 weights choose now one and now the other.
 
-    A reading: the design gives the random weights and the scale factor, not how 1000 values become one
-    choice. Here the solution with the least average of F_w is chosen, of equal ones that with the fewest
-    triangles.
+    The two differ widely where the front is long: the few solutions of the least error have nearly all of the mean of
+    T / E, so that the paper's rule chooses larger meshes the closer a method came to no error, and none where one
+    of its meshes has none.
 
     Parameters
     ----------
     front : (n, 2) array-like
         (error, triangles), non-dominated and sorted by triangles, as `indicators.non_dominated` gives it.
-    random_state : numpy.random.Generator
-        Draws the weights.
+    rule : {"ranges", "paper"}
+        Which.
     alpha : float, optional
-        Scale factor [error units per triangle]; `scale_factor` of the front unless given. Give all methods
-        the same, that of the pseudo-optimal front, to compare their choices.
-    n_weights : int
-        Number of weights.
+        In place of the `scale_factor` of the front. By "ranges", give all methods the same, that of the
+        pseudo-optimal front, to compare their choices.
+    n_weights : int, optional
+        How many random weights to take the mean of, in place of 1/2.
+    random_state : numpy.random.Generator, optional
+        Draws the weights; needed for them.
 
     Returns
     -------
-    int
-        Row of ``front``.
+    int or None
+        Row of ``front``, of equal values the one with the fewest triangles. None where the paper's rule is undefined.
 
     Examples
     --------
-    >>> trade_off([[10, 2], [1, 4], [0, 20]], random_state=np.random.default_rng(1))
+    >>> trade_off([[10, 2], [1, 4], [0, 20]])
+    1
+    >>> trade_off([[10, 2], [1, 4], [0, 20]], rule="paper") is None
+    True
+    >>> trade_off([[10, 2], [1, 4]], rule="paper", n_weights=1000, random_state=np.random.default_rng(1))
     1
     """
-    F = _front(front)
+    return _trade_off(_front(front), rule, alpha, _mean_weight(n_weights, random_state))
+
+
+def _mean_weight(n_weights: int | None, random_state: np.random.Generator | None) -> float:
+    """Return the mean of so many random weights; 1/2, that of all, unless they are asked for."""
+    if (n_weights is None) != (random_state is None):
+        raise ValueError("random weights need both their number, n_weights, and a random_state that draws them")
+    if n_weights is None or random_state is None:
+        return 0.5
     if n_weights < 1:
         raise ValueError(f"n_weights is {n_weights}: give at least 1")
-    factor = scale_factor(F) if alpha is None else float(alpha)
+    return float(random_state.uniform(size=n_weights).mean())
+
+
+def _trade_off(F: FloatArray, rule: str, alpha: float | None, weight: float) -> int | None:
+    """Return the row of the least value at the mean weight."""
+    factor = scale_factor(F, rule) if alpha is None else float(alpha)
+    if factor is None:
+        return None
     if not (math.isfinite(factor) and factor > 0):
         raise ValueError(f"the scale factor alpha is {factor}: it must be positive")
-    weights = random_state.uniform(size=(n_weights, 1))
-    value = weights * F[:, 0] + (1 - weights) * factor * F[:, 1]
-    return int(value.mean(axis=0).argmin())
+    scales = (factor, 1.0) if rule == "paper" else (1.0, factor)
+    value = F @ (np.array([weight, 1 - weight]) * scales)
+    # equal but for rounding is equal, as are both ends of a front scaled by its own ranges
+    return int(np.argmax(value <= value.min() * (1 + 1e-12)))
 
 
 def knees(front: ArrayLike) -> IntArray:
@@ -638,57 +519,57 @@ def knees(front: ArrayLike) -> IntArray:
 def selected_solutions(
     runs: Runs,
     *,
-    random_state: np.random.Generator,
     optimal: OptimalFront | ArrayLike | None = None,
-    n_weights: int = N_WEIGHTS,
+    n_weights: int | None = None,
+    random_state: np.random.Generator | None = None,
 ) -> dict[str, tuple[Solution, ...]]:
-    """Return the paper's three solutions of every method, and its knees.
+    """Return the paper's three solutions of every method (Section 4.7), and its knees.
 
-    They come from the method's merged front: the least error, the fewest triangles, the best trade-off (see
-    `trade_off`, with the same weights for all methods and the scale factor of the pseudo-optimal front), and
-    any number of knees.
+    They come from the method's merged front: the least error, the fewest triangles, the best trade-off by both
+    rules of `trade_off`, and any number of knees.
 
     Parameters
     ----------
     runs : mapping
         ``runs[method][seed]`` is an (n, 2) front.
-    random_state : numpy.random.Generator
-        Draws the weights.
     optimal : OptimalFront or (P, 2) array-like, optional
-        Gives the scale factor; `pseudo_optimal` of the runs unless given.
-    n_weights : int
-        As in `trade_off`.
+        Gives the scale factor of the rule "ranges"; `pseudo_optimal` of the runs unless given.
+    n_weights, random_state
+        As in `trade_off`; the weights are the same for all methods.
 
     Returns
     -------
     dict of str to tuple of Solution
-        "least_error", "fewest_triangles", "trade_off", then the knees from few triangles to many.
+        "least_error", "fewest_triangles", "trade_off", "trade_off_paper" where it is defined, then the knees from
+        few triangles to many.
 
     Examples
     --------
-    >>> runs = {"a": {1: [[9, 2], [1, 4]], 2: [[0, 30]]}}
-    >>> for solution in selected_solutions(runs, random_state=np.random.default_rng(1))["a"][:3]:
+    >>> runs = {"a": {1: [[9, 2], [1, 4]], 2: [[0.5, 30]]}}
+    >>> for solution in selected_solutions(runs)["a"][:4]:
     ...     print(solution)
-    Solution(kind='least_error', error=0.0, triangles=30, seeds=(2,))
+    Solution(kind='least_error', error=0.5, triangles=30, seeds=(2,))
     Solution(kind='fewest_triangles', error=9.0, triangles=2, seeds=(1,))
     Solution(kind='trade_off', error=1.0, triangles=4, seeds=(1,))
+    Solution(kind='trade_off_paper', error=1.0, triangles=4, seeds=(1,))
     """
     fronts = _fronts(runs)
     if optimal is None:
         optimal = pseudo_optimal(runs)
-    alpha = scale_factor(optimal.front if isinstance(optimal, OptimalFront) else optimal)
-    seed_of_weights = int(random_state.integers(2**63))
+    common = scale_factor(optimal.front if isinstance(optimal, OptimalFront) else optimal)
+    weight = _mean_weight(n_weights, random_state)
     chosen = {}
     for method, seeds in fronts.items():
         found = pseudo_optimal({method: seeds})
         front = found.front
-        same_weights = np.random.default_rng(seed_of_weights)
-        middle = trade_off(front, random_state=same_weights, alpha=alpha, n_weights=n_weights)
-        rows = [("least_error", len(front) - 1), ("fewest_triangles", 0), ("trade_off", middle)]
+        rows: list[tuple[str, int | None]] = [("least_error", len(front) - 1), ("fewest_triangles", 0)]
+        for rule, kind in TRADE_OFFS.items():
+            rows.append((kind, _trade_off(front, rule, common if rule == "ranges" else None, weight)))
         rows += [("knee", int(row)) for row in knees(front)]
         chosen[method] = tuple(
             Solution(kind, float(front[row, 0]), int(front[row, 1]), tuple(seed for _, seed in found.found_by[row]))
             for kind, row in rows
+            if row is not None
         )
     return chosen
 
@@ -778,13 +659,3 @@ def _pair_table(name: str, runs: Runs, indicator: Callable[[FloatArray, FloatArr
         for a, b in itertools.permutations(fronts, 2)
     }
     return PairTable(name, tuple(fronts), values)
-
-
-def _sample(values: ArrayLike, name: str) -> FloatArray:
-    """Return a sample as an array, or say what is wrong with it."""
-    sample = np.asarray(values, dtype=float)
-    if sample.ndim != 1 or not len(sample):
-        raise ValueError(f"{name} must be a list of at least one number, not an array of shape {sample.shape}")
-    if np.isnan(sample).any():
-        raise ValueError(f"{name} has {int(np.isnan(sample).sum())} NaN among {len(sample)} values")
-    return sample

@@ -17,7 +17,6 @@ from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import attainment_surfaces, selected_solutions
 from meshsimp_pymoo.comparison.store import classic_mesh
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
-from meshsimp_pymoo.comparison.tables import WEIGHTS_SEED
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plot_error, plot_mesh
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -141,7 +140,7 @@ def selected_figure(study: Study, cases: Sequence[Case]) -> Figure:
     for panel, case in zip(panels, cases, strict=False):
         optimal = case.optimal.front
         panel.step(optimal[:, 1], optimal[:, 0], where="post", color="0.85", linewidth=4, zorder=1)
-        chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
+        chosen = selected_solutions(case.runs, optimal=case.optimal)
         points = []
         for method, solutions in chosen.items():
             colour, mark = method_look(study, case, method)
@@ -210,7 +209,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
 
 def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
     """Return the meshes to show."""
-    chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
+    chosen = selected_solutions(case.runs, optimal=case.optimal)
     trade_offs = {method: next(s for s in solutions if s.kind == "trade_off") for method, solutions in chosen.items()}
     evolutionary = [m for m in case.runs if m not in case.classic]
     # the best by hypervolume, and at least one classic method if there is one

@@ -28,7 +28,7 @@ import numpy as np
 from scipy import stats
 
 from meshsimp_pymoo.arrays import FloatArray
-from meshsimp_pymoo.comparison.analysis import ALPHA, holm, rank_sum
+from meshsimp_pymoo.comparison.statistics import ALPHA, holm, rank_sum, signed_rank
 from meshsimp_pymoo.comparison.study import BINARY, CLASSIC_NAMES, SMALLER_IS_BETTER, Case, Start, Study
 from meshsimp_pymoo.search.presets import PRESETS
 
@@ -460,14 +460,13 @@ def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[
     values = np.array([_values(case, a, b, indicator) for case in cases])
     sign = -1.0 if indicator in SMALLER_IS_BETTER else 1.0
     difference = sign * (values[:, 0] - values[:, 1])
-    n = int(np.count_nonzero(difference))
-    p = float(stats.wilcoxon(difference, method="exact" if n == len(difference) else "auto").pvalue) if n else 1.0
+    test = signed_rank(values[:, 0], values[:, 1])
     ahead, behind = int((difference > 0).sum()), int((difference < 0).sum())
     direction = _sign(float(np.median(difference))) or _sign(ahead - behind)
     means = values.mean(axis=0).tolist()
     return [
         Outcome(
-            "all models", a, b, p, 2.0 ** (1 - len(cases)), direction, *means, informative=n > 0, ahead=ahead, behind=behind
+            "all models", a, b, test.p, 2.0 ** (1 - len(cases)), direction, *means, informative=ahead + behind > 0, ahead=ahead, behind=behind
         )
     ]  # fmt: skip
 

@@ -53,12 +53,12 @@ from meshsimp_pymoo.comparison.analysis import (
     dominance_rates,
     epsilon_table,
     pseudo_optimal,
-    rank_sum,
     scale_factor,
     trade_off,
     unary_scores,
 )
 from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.statistics import rank_sum
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.indicators import merged_front, non_dominated

@@ -9,7 +9,8 @@ coverage   C between the runs of every two methods (the paper's Table 1)
 epsilon    multiplicative epsilon between the runs of every two methods (the paper's Table 2)
 wilcoxon   every two methods with chance, by rank sums: raw and corrected p, effect size, who is better; and
            the p of the signed-rank test, by seeds
-selected   least error, fewest triangles, best trade-off and knees of every method
+selected   least error, fewest triangles, best trade-off (by the ranges, and by the paper's Eq. 11) and knees of
+           every method
 meshlab    every mesh of MeshLab's methods, with the vertices that it leaves uncovered
 runs       every run: solutions, generations, evaluations
 ========== =====================================================================================
@@ -29,8 +30,8 @@ from pathlib import Path
 
 import numpy as np
 
-from meshsimp_pymoo.comparison.analysis import PairTable, Summary, selected_solutions, summarise
-from meshsimp_pymoo.comparison.statistics import friedman, magnitude, signed_rank
+from meshsimp_pymoo.comparison.analysis import PairTable, selected_solutions
+from meshsimp_pymoo.comparison.statistics import Summary, friedman, magnitude, signed_rank, summarise
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, INDICATORS, SCORINGS, Case, Study
 from meshsimp_pymoo.surface.measures import MEASURES
 
@@ -51,8 +52,6 @@ __all__ = [
 
 Cell = str | int | float | None
 
-# Seeds the random weights that choose the best trade-off, so that the tables are the same every time.
-WEIGHTS_SEED = 1
 DIGITS = 4
 # The columns of measures of the error beside the one that was minimised, by their heading.
 AS_SEARCHED = {
@@ -282,9 +281,11 @@ def selected(study: Study, budget: str, scoring: str) -> Table:
         *AS_SEARCHED, "error_every_vertex", "seed", "found_in_runs",
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
+    undefined = 0
     for case in study.compared(budget, scoring):
-        chosen = selected_solutions(case.runs, random_state=np.random.default_rng(WEIGHTS_SEED), optimal=case.optimal)
+        chosen = selected_solutions(case.runs, optimal=case.optimal)
         for method, solutions in chosen.items():
+            undefined += all(solution.kind != "trade_off_paper" for solution in solutions)
             for solution in solutions:
                 found = case.find(method, solution.error, solution.triangles)
                 rows.append(
@@ -297,6 +298,8 @@ def selected(study: Study, budget: str, scoring: str) -> Table:
                     )
                 )  # fmt: skip
     title = f"Selected solutions of the merged fronts ({_setting(budget, scoring)})"
+    if undefined:
+        title += f"; the paper's trade-off is undefined for {undefined}, which hold a mesh without error"
     shown_columns = {
         "model": "model", "method": "method", "solution": "solution", "triangles": "triangles",
         "error_as_searched": "error as searched", "error_every_vertex": "error, every vertex",

@@ -7,9 +7,9 @@ from meshsimp_pymoo.comparison.analysis import (
     coverage_table,
     dominance_rates,
     epsilon_table,
-    rank_sum,
     unary_scores,
 )
+from meshsimp_pymoo.comparison.statistics import rank_sum
 
 INDICATORS = ("hvr", "cardinality", "epsilon", "coverage")
 

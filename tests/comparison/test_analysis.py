@@ -19,18 +19,14 @@ from meshsimp_pymoo.comparison.analysis import (
     coverage_table,
     dominance_rates,
     epsilon_table,
-    holm,
     knees,
-    magnitude,
     pseudo_optimal,
-    rank_sum,
     scale_factor,
     selected_solutions,
-    summarise,
     trade_off,
     unary_scores,
-    vargha_delaney,
 )
+from meshsimp_pymoo.comparison.statistics import holm
 from meshsimp_pymoo.indicators import coverage, epsilon, hypervolume_ratio, non_dominated
 
 
@@ -134,119 +130,6 @@ class TestTables:
         assert "no standard deviation" in cell.note
 
 
-def exact_p(x, y):
-    """All ways to draw the first sample from the pooled values; two-sided by twice the smaller tail."""
-    pooled = [*x, *y]
-
-    def u(rows):
-        others = [v for k, v in enumerate(pooled) if k not in rows]
-        return sum(pooled[i] > other for i in rows for other in others)
-
-    all_u = [u(rows) for rows in itertools.combinations(range(len(pooled)), len(x))]
-    here = u(range(len(x)))
-    smaller = min(sum(v <= here for v in all_u), sum(v >= here for v in all_u))
-    return min(1.0, 2 * smaller / len(all_u))
-
-
-class TestRankSum:
-    def test_without_ties_p_is_exact(self):
-        rng = np.random.default_rng(1)
-        for n, m in ((1, 1), (1, 4), (3, 4), (5, 5), (4, 6)):
-            for _ in range(10):
-                pooled = rng.permutation(n + m).astype(float)
-                test = rank_sum(pooled[:n], pooled[n:])
-                assert test.exact
-                assert_allclose(test.p, exact_p(pooled[:n], pooled[n:]))
-
-    def test_with_ties_p_is_the_corrected_normal_approximation(self):
-        x, y = [1, 1, 2, 2, 3], [2, 3, 3, 4, 4]
-        test = rank_sum(x, y)
-        assert not test.exact
-        # by hand: U = 3 of 25, groups of equal values 2, 3, 3, 2
-        variance = 25 / 12 * (11 - (2 * 6 + 2 * 24) / (10 * 9))
-        z = (12.5 - 3 - 0.5) / math.sqrt(variance)
-        assert_allclose(test.p, math.erfc(z / math.sqrt(2)))
-        assert_allclose(test.a12, 3 / 25)
-
-    def test_the_order_of_the_samples_turns_the_effect_only(self):
-        rng = np.random.default_rng(2)
-        for _ in range(30):
-            x, y = rng.integers(0, 9, 6), rng.integers(2, 9, 9)
-            there, back = rank_sum(x, y), rank_sum(y, x)
-            assert_allclose(there.p, back.p)
-            assert_allclose(there.a12, 1 - back.a12)
-
-    def test_all_ties_are_no_difference_and_no_warning(self):
-        assert rank_sum([0.5] * 8, [0.5] * 8).p == 1
-        assert rank_sum([math.inf] * 3, [math.inf] * 2).p == 1
-        assert "all values are equal" in rank_sum([1], [1]).note
-
-    def test_identical_samples_are_no_difference(self):
-        test = rank_sum([1, 2, 3, 4], [1, 2, 3, 4])
-        assert test.p == 1
-        assert test.a12 == 0.5
-
-    def test_too_few_runs_say_that_nothing_can_be_significant(self):
-        assert rank_sum([1], [2]).note == "with 1 and 1 values no p-value below 1 is possible"
-        assert "1 and 10 values no p-value below 0.18" in rank_sum([0], range(1, 11)).note
-        assert rank_sum(range(4), range(4, 8)).note == ""
-
-    def test_infinite_values_have_a_rank(self):
-        assert rank_sum([math.inf, math.inf, 9, 8], [1, 2, 3, 4]).a12 == 1
-
-    def test_effect_size_is_the_probability_of_being_larger(self):
-        rng = np.random.default_rng(3)
-        for _ in range(50):
-            x, y = rng.integers(0, 5, 4), rng.integers(0, 5, 7)
-            pairs = [(a > b) + (a == b) / 2 for a in x for b in y]
-            assert_allclose(vargha_delaney(x, y), np.mean(pairs))
-
-    @pytest.mark.parametrize(
-        ("a12", "word"),
-        [
-            (0.5, "negligible"),
-            (0.56, "small"),
-            (0.4, "small"),
-            (0.64, "medium"),
-            (0.71, "large"),
-            (0, "large"),
-        ],
-    )
-    def test_effect_sizes_have_the_words_of_vargha_and_delaney(self, a12, word):
-        assert magnitude(a12) == word
-
-    @pytest.mark.parametrize("bad", [[], [1, np.nan], [[1, 2]]])
-    def test_refuses_no_samples(self, bad):
-        with pytest.raises(ValueError, match="the second sample"):
-            rank_sum([1, 2], bad)
-
-
-class TestHolm:
-    def test_known_answer(self):
-        assert_allclose(holm([0.01, 0.02, 0.03, 0.005]), [0.03, 0.04, 0.04, 0.02])
-
-    def test_rejects_what_the_step_down_procedure_rejects(self):
-        rng = np.random.default_rng(4)
-        for _ in range(200):
-            p = rng.choice([0.001, 0.01, 0.012, 0.02, 0.04, 0.3, 1.0], rng.integers(1, 8))
-            rejected = np.zeros(len(p), dtype=bool)
-            for k, row in enumerate(np.argsort(p, kind="stable")):
-                if p[row] * (len(p) - k) > 0.05:
-                    break
-                rejected[row] = True
-            assert_array_equal(holm(p) <= 0.05, rejected)
-            assert (holm(p) >= p).all()
-            assert holm(p).max() <= 1
-
-    def test_of_nothing_is_nothing_and_of_one_is_itself(self):
-        assert len(holm([])) == 0
-        assert holm([0.2]) == [0.2]
-
-    def test_refuses_what_is_no_p_value(self):
-        with pytest.raises(ValueError, match="from 0 to 1"):
-            holm([0.5, np.nan])
-
-
 class TestDominanceRates:
     def test_by_epsilon_a_run_must_be_better_not_only_as_good(self):
         fronts = {"a": {1: [[1, 2]], 2: [[5, 5]]}, "b": {1: [[1, 2]], 2: [[1, 3]], 3: [[0.5, 9]]}}
@@ -265,6 +148,64 @@ class TestDominanceRates:
             dominance_rates([[1, 2]], [[1, 2]], "epsilon")
         with pytest.raises(ValueError, match="not a binary indicator"):
             dominance_rates([[1]], [[1]], "hvr")
+
+
+class TestByHand:
+    """Every indicator of two runs and of what both found."""
+
+    A = ((8, 2), (4, 4), (1, 8), (8, 3), (4, 4))  # the last two are no part of its front
+    B = ((6, 3), (4, 4), (1, 10))
+    WORSE = ((9, 3), (5, 5))
+
+    def test_pseudo_optimal(self):
+        optimal = pseudo_optimal({"a": {1: self.A}, "b": {1: self.B}})
+        assert optimal.front.tolist() == [[8, 2], [6, 3], [4, 4], [1, 8]]
+        assert optimal.found_by == ((("a", 1),), (("b", 1),), (("a", 1), ("b", 1)), (("a", 1),))
+
+    def test_against_the_optimum(self):
+        scores = unary_scores({"a": {1: self.A}, "b": {1: self.B}})
+        # bounds (1, 2) and (8, 8), so the reference point is (8.7, 8.6) and one unit is 1 / 42. Areas by the error:
+        # optimum: [8, 8.7) 0.7 * 6.6 + [6, 8) 2 * 5.6 + [4, 6) 2 * 4.6 + [1, 4) 3 * 0.6 = 26.82
+        # a:       [8, 8.7) 0.7 * 6.6 + [4, 8) 4 * 4.6                  + [1, 4) 3 * 0.6 = 24.82
+        # b:       [6, 8.7) 2.7 * 5.6 + [4, 6) 2 * 4.6; 10 triangles are too many        = 24.32
+        assert_allclose(scores["a"].hvr, [24.82 / 26.82])
+        assert_allclose(scores["b"].hvr, [24.32 / 26.82])
+        # a to reach (6, 3): from (8, 2) a factor of 8 / 6; b to reach (8, 2): from (6, 3) a factor of 3 / 2
+        assert_allclose(scores["a"].epsilon, [4 / 3])
+        assert_allclose(scores["b"].epsilon, [3 / 2])
+        assert scores["a"].coverage == [3 / 4]
+        assert scores["b"].coverage == [2 / 4]
+        assert scores["a"].cardinality == scores["b"].cardinality == [3]
+
+    def test_against_each_other(self):
+        runs = {"a": {1: self.A}, "b": {1: self.B, 2: self.WORSE}}
+        # (4, 4) and (1, 10) of b's first run, all of its second; of a's front only (4, 4), and nothing
+        table = coverage_table(runs)
+        assert_array_equal(table.values["a", "b"], [[2 / 3, 1]])
+        assert_array_equal(table.values["b", "a"], [[1 / 3], [0]])
+        assert dominance_rates(table.values["a", "b"], table.values["b", "a"], "coverage") == [1 / 2]
+        assert dominance_rates(table.values["a", "b"], table.values["b", "a"], "coverage", threshold=0.6) == [1]
+        # (6, 3) from (8, 2); (9, 3) from (8, 2). Back: (8, 2) from (6, 3), (1, 8) from (5, 5)
+        table = epsilon_table(runs)
+        assert_allclose(table.values["a", "b"], [[8 / 6, 8 / 9]])
+        assert_allclose(table.values["b", "a"], [[3 / 2], [5]])
+        assert dominance_rates(table.values["a", "b"], table.values["b", "a"], "epsilon") == [1 / 2]
+        assert_array_equal(dominance_rates(table.values["b", "a"], table.values["a", "b"], "epsilon"), [0, 0])
+
+    def test_no_error(self):
+        # (0, 20) is reached by no factor; with 1 added to the errors, by (1, 8) with 2 / 1; by (0, 12) with 12 / 20,
+        # and then (6, 3) is the farthest again
+        zero = ((0, 20), *self.B)
+        assert epsilon(self.A, zero) == math.inf
+        assert epsilon(self.A, zero, shift=[1, 0]) == 2
+        assert_allclose(epsilon(((0, 12), *self.A), zero), 4 / 3)
+        assert_allclose(epsilon(((0, 12), *self.A), [[0, 20]]), 12 / 20)
+
+    def test_attainment(self):
+        # both have: at 3 triangles an error of 8, at 4 of 4, and 1 not before 10
+        surfaces = attainment_surfaces({1: self.A, 2: self.B})
+        assert surfaces[50].tolist() == [[8, 2], [6, 3], [4, 4], [1, 8]]
+        assert surfaces[100].tolist() == [[8, 3], [4, 4], [1, 10]]
 
 
 class TestComparisons:
@@ -327,7 +268,7 @@ def elbow(n=30, sharpness=4):
 
 class TestSelection:
     def test_extremes_are_the_extremes(self, runs):
-        selected = selected_solutions(runs, random_state=np.random.default_rng(1))
+        selected = selected_solutions(runs)
         for method, seeds in runs.items():
             rows = np.vstack(list(seeds.values()))
             error, triangles, middle = selected[method][:3]
@@ -347,55 +288,110 @@ class TestSelection:
                 assert solution.seeds == found_in
                 assert found_in
 
-    def test_same_generator_same_choice(self, runs):
-        first, second = (selected_solutions(runs, random_state=np.random.default_rng(7)) for _ in "ab")
-        assert first == second
+    def test_trade_off_by_hand(self):
+        front = [[8, 2], [4, 4], [1, 10]]
+        # alpha = (8 - 1) / (10 - 2) = 0.875, and (E + alpha T) / 2 = 4.875, 3.75, 4.875
+        assert scale_factor(front) == 0.875
+        assert trade_off(front) == 1
+        # Eq. 10: alpha = (2 / 8 + 4 / 4 + 10 / 1) / 3 = 3.75; Eq. 11 at w = 1/2: (alpha E + T) / 2 = 16, 9.5, 6.875
+        assert scale_factor(front, "paper") == 3.75
+        assert trade_off(front, rule="paper") == 2
+        # without the third solution alpha = (0.25 + 1) / 2 = 0.625, and the values are 3.5 and 3.25
+        assert scale_factor(front[:2], "paper") == 0.625
+        assert trade_off(front[:2], rule="paper") == 1
+
+    @pytest.mark.parametrize("rule", ["ranges", "paper"])
+    def test_random_weights_are_the_papers_sums(self, rule):
+        triangles = np.arange(200.0, 2, -1)[::-1]
+        front = np.column_stack([1000 / triangles, triangles])
+        choices = set()
+        for seed in range(20):
+            weights = np.random.default_rng(seed).uniform(size=9)
+            if rule == "paper":
+                alpha = sum(t / e for e, t in front) / len(front)
+                values = [sum(alpha * w * e + (1 - w) * t for w in weights) / 9 for e, t in front]
+            else:
+                alpha = (front[0, 0] - front[-1, 0]) / (front[-1, 1] - front[0, 1])
+                values = [sum(w * e + (1 - w) * alpha * t for w in weights) / 9 for e, t in front]
+            chosen = trade_off(front, rule=rule, n_weights=9, random_state=np.random.default_rng(seed))
+            assert chosen == np.argmin(values)
+            choices.add(chosen)
+        assert len(choices) > 1  # which is why the mean of all weights is the default
+        assert min(choices) < trade_off(front, rule=rule) < max(choices)
+
+    @pytest.mark.parametrize("rule", ["ranges", "paper"])
+    def test_the_default_is_what_ever_more_weights_tend_to(self, rule):
+        front = elbow()[:-1]
+        many = trade_off(front, rule=rule, n_weights=10**6, random_state=np.random.default_rng(1))
+        assert trade_off(front, rule=rule) == many
+
+    def test_of_equal_values_the_fewest_triangles(self):
+        # scaled by their own ranges the two ends are equal, whatever rounding makes of it
+        rng = np.random.default_rng(2)
+        for _ in range(100):
+            (e1, e2), (t1, t2) = np.sort(rng.uniform(0, 1e5, 2)), np.sort(rng.choice(10**6, 2, replace=False) + 2)
+            assert trade_off([[e2, t1], [e1, t2]]) == 0
+        # alpha = (3 / 3 + 3 / 1) / 2 = 2 of the second and third alone; given, all three values are 6
+        assert trade_off([[2.5, 1], [2, 2], [1, 4]], rule="paper", alpha=2) == 0
+
+    def test_the_papers_rule_is_undefined_where_a_mesh_has_no_error(self):
+        front = [[8, 2], [4, 4], [0, 10]]
+        assert scale_factor(front, "paper") is None
+        assert trade_off(front, rule="paper") is None
+        assert trade_off(front) is not None
+        assert trade_off([[1, 2], [5e-324, 10]], rule="paper") is None  # T / E is beyond all numbers
+        kinds = [solution.kind for solution in selected_solutions({"a": {1: front}})["a"]]
+        assert kinds == ["least_error", "fewest_triangles", "trade_off", "knee"]
+
+    def test_the_papers_rule_has_the_scale_of_the_methods_own_front(self):
+        runs = {"a": {1: [[8, 2], [4, 4], [1, 10]]}, "b": {1: [[8, 2], [4, 4]]}}
+        chosen = {m: {s.kind: s.triangles for s in solutions} for m, solutions in selected_solutions(runs).items()}
+        assert chosen["a"]["trade_off_paper"] == 10
+        assert chosen["b"]["trade_off_paper"] == 4
+        # by the ranges of the front of both, 7 / 8: 4.875 and 3.75
+        assert chosen["a"]["trade_off"] == chosen["b"]["trade_off"] == 4
 
     def test_all_methods_are_judged_by_the_same_weights(self):
         twins = {name: {1: elbow()} for name in "abcdefgh"}
         draws = [
-            set(selected_solutions(twins, random_state=np.random.default_rng(seed), n_weights=1).values())
+            set(selected_solutions(twins, n_weights=1, random_state=np.random.default_rng(seed)).values())
             for seed in range(5)
         ]
         assert all(len(choices) == 1 for choices in draws)
         assert len(set.union(*draws)) > 1  # the weights themselves differ from draw to draw
 
-    def test_trade_off_is_what_the_weights_say(self):
-        front = elbow()
-        weights = np.random.default_rng(3).uniform(size=1000)
-        alpha = 1000 / 300
-        values = [[w * e + (1 - w) * alpha * t for e, t in front] for w in weights]
-        expected = np.argmin(np.sum(values, axis=0))
-        assert trade_off(front, random_state=np.random.default_rng(3)) == expected
-
     def test_trade_off_does_not_depend_on_units(self):
-        front = elbow()
-        choices = {trade_off(front * [unit, 1], random_state=np.random.default_rng(1)) for unit in (1, 1e-6, 1e6)}
-        assert len(choices) == 1
-        assert 0 < choices.pop() < len(front) - 1
+        front = elbow()[:-1]
+        for rule in ("ranges", "paper"):
+            choices = {trade_off(front * [unit, 1], rule=rule) for unit in (1, 1e-6, 1e6)}
+            assert len(choices) == 1
+            assert 0 < choices.pop() < len(front) - 1 + (rule == "paper")
 
     def test_a_scale_factor_can_be_given(self):
-        rng = np.random.default_rng
-        assert trade_off(elbow(), random_state=rng(1), alpha=1e9) == 0  # triangles are all that counts
-        assert trade_off(elbow(), random_state=rng(1), alpha=1e-9) == len(elbow()) - 1
+        assert trade_off(elbow(), alpha=1e9) == 0  # triangles are all that counts
+        assert trade_off(elbow(), alpha=1e-9) == len(elbow()) - 1
+        assert trade_off(elbow(), rule="paper", alpha=1e-9) == 0  # of the error there
 
     def test_all_methods_get_the_scale_factor_of_the_optimal_front(self):
         runs = {"a": {1: elbow()}}
         steep = np.array([[1e12, 10.0], [0.0, 310.0]])
-        (chosen,) = (
-            s
-            for s in selected_solutions(runs, random_state=np.random.default_rng(1), optimal=steep)["a"]
-            if s.kind == "trade_off"
-        )
+        (chosen,) = (s for s in selected_solutions(runs, optimal=steep)["a"] if s.kind == "trade_off")
         assert chosen.triangles == 10  # against that range of errors every error here is small
         assert scale_factor(steep) == 1e12 / 300
 
     def test_one_solution_is_every_choice_and_no_knee(self):
-        selected = selected_solutions({"a": {3: [[5, 4]]}}, random_state=np.random.default_rng(1))
+        selected = selected_solutions({"a": {3: [[5, 4]]}})
         assert selected["a"] == tuple(
-            Solution(kind, 5.0, 4, (3,)) for kind in ("least_error", "fewest_triangles", "trade_off")
+            Solution(kind, 5.0, 4, (3,)) for kind in ("least_error", "fewest_triangles", "trade_off", "trade_off_paper")
         )
         assert scale_factor([[5, 4]]) == 1
+        assert scale_factor([[5, 4]], "paper") == 0.8
+
+    def test_a_knee_by_hand(self):
+        # scaled to [0, 1]: (1, 0), (.8, .1), (.2, .2), (.1, .6), (0, 1); five solutions are neighbours of each
+        # other. The least price of a gain: .2/.8, .1/.6, min(.8/.2, .6/.1, .4/.1, .8/.2), .1/.4, .1/.4
+        # = .25, .167, 4, .25, .25; their mean is .983, their deviation 1.509: only the third is more than one off
+        assert_array_equal(knees([[20, 1], [18, 2], [12, 3], [11, 7], [10, 11]]), [2])
 
     def test_the_knee_of_a_bent_front_is_its_bend(self):
         straight = np.column_stack([np.linspace(100, 90, 11), np.linspace(0, 5, 11)])
@@ -416,15 +412,20 @@ class TestSelection:
         assert warnings.filters == before
 
     def test_refusals(self):
-        rng = np.random.default_rng(1)
         with pytest.raises(ValueError, match="not a front sorted by triangles"):
-            trade_off(elbow()[::-1], random_state=rng)
+            trade_off(elbow()[::-1])
         with pytest.raises(ValueError, match="not a front sorted by triangles"):
             knees([[1, 2], [1, 2], [0, 4]])
         with pytest.raises(ValueError, match="alpha is 0"):
-            trade_off(elbow(), random_state=rng, alpha=0)
+            trade_off(elbow(), alpha=0)
         with pytest.raises(ValueError, match="n_weights is 0"):
-            trade_off(elbow(), random_state=rng, n_weights=0)
+            trade_off(elbow(), n_weights=0, random_state=np.random.default_rng(1))
+        with pytest.raises(ValueError, match="random weights need both"):
+            trade_off(elbow(), n_weights=1000)
+        with pytest.raises(ValueError, match="random weights need both"):
+            selected_solutions({"a": {1: elbow()}}, random_state=np.random.default_rng(1))
+        with pytest.raises(ValueError, match="'mean' is no rule of the trade-off: choose 'ranges' or 'paper'"):
+            trade_off(elbow(), rule="mean")
 
 
 class TestAttainment:
@@ -464,7 +465,7 @@ class TestAttainment:
         unary_scores,
         coverage_table,
         epsilon_table,
-        lambda runs: selected_solutions(runs, random_state=np.random.default_rng(1)),
+        selected_solutions,
     ],
 )
 class TestUnusableRuns:
@@ -485,12 +486,3 @@ class TestUnusableRuns:
             for F in seeds.values():
                 F.setflags(write=False)
         function(runs)
-
-
-def test_summaries():
-    assert summarise([2.0, 4.0]).std == math.sqrt(2)
-    assert summarise([1.0, -math.inf]).mean == -math.inf
-    with pytest.raises(ValueError, match="1 NaN among 2"):
-        summarise([1, np.nan])
-    with pytest.raises(ValueError, match="at least one number"):
-        summarise([])

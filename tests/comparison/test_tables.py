@@ -103,6 +103,19 @@ def test_selected_solutions_come_with_their_numbers_and_the_run_that_found_them(
     assert rows["N1", "trade off"]["triangles"] in ("20", "40", "60")
     # alpha weighs the triangles by 10 / 40: sums of halves are 7.5, 7.5, 7.5 ... all alike, so the fewest triangles
     assert rows["N1", "trade off"]["triangles"] == "20"
+    # both merged fronts hold a mesh without error
+    assert tables.selected(study, BUDGET, NEAREST).title.endswith("undefined for 2, which hold a mesh without error")
+
+
+def test_the_papers_trade_off_is_beside_ours_where_it_is_defined(tmp_path):
+    fronts = {"M": {"N1": {1: [(8.0, 2), (4.0, 4), (1.0, 10)]}, "MD": {1: [(8.0, 2), (0.0, 20)]}}}
+    table = tables.selected(Study(store(tmp_path / "out", fronts)), BUDGET, NEAREST)
+    rows = {(r["method"], r["solution"]): r for r in read(table)}
+    # by Eq. 10 alpha = (2 / 8 + 4 / 4 + 10 / 1) / 3 = 3.75; by the ranges of all, 8 / 18, (E + alpha T) = 8.9, 5.8, 5.4
+    assert rows["N1", "trade off paper"]["triangles"] == "10"
+    assert rows["N1", "trade off"]["triangles"] == "10"
+    assert ("MD", "trade off paper") not in rows
+    assert table.title.endswith("the paper's trade-off is undefined for 1, which hold a mesh without error")
 
 
 def test_uncovered_vertices_cost_under_one_scoring_and_not_under_the_other(tmp_path):
