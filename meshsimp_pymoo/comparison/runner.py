@@ -323,7 +323,8 @@ def perform(
                 "seconds": TimeBasedTermination,
             }
             termination = terminations[budget.kind](budget.amount)
-        return task.algorithm.build(task.merged_value).setup(problem, termination=termination, seed=task.seed)
+        searched = task.algorithm.searched(problem, task.merged_value)
+        return task.algorithm.build(task.merged_value).setup(searched, termination=termination, seed=task.seed)
 
     start = time.perf_counter()
     algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
@@ -338,8 +339,10 @@ def perform(
             algorithm = set_up()
     keeper = None
     if checkpoint is not None:
-        with contextlib.suppress(NotResumable):
+        try:
             keeper = Checkpoints(checkpoint, algorithm, _search_and_versions(task), interval=interval)
+        except NotResumable as trouble:
+            warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
     left = list(range(len(task.budgets)))
     set_aside = 0.0  # seconds spent on runs already yielded, on the trace and on checkpoints
     while left:
@@ -570,6 +573,7 @@ class _Shared:
     problems: Mapping[str, ProblemConfig]
     folder: Path | None
     checkpoint: float | None
+    not_resumable: frozenset[str]  # algorithms whose state cannot be saved
 
 
 def _perform_all(
@@ -581,8 +585,14 @@ def _perform_all(
     checkpoint: float | None,
 ) -> None:
     problems = {problem.name: problem for problem in experiment.problems}
-    shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint)
+    folder = store.folder if engine.shares_files else None
+    shared = _Shared(problems, folder, checkpoint, frozenset(experiment.not_resumable))
     if shared.folder is not None and checkpoint is not None:
+        to_do = {task.algorithm.name for task in tasks}
+        for name, reason in experiment.not_resumable.items():
+            if name in to_do:
+                line = f"{name}: a search that is cut off begins anew, for its state cannot be saved: {reason}"
+                warnings.warn(line, ExperimentWarning, stacklevel=3)
         for task in tasks:  # damage is named here, not by the processes
             _usable_checkpoint(task, _checkpoint_of(task, store.folder.parent))
     if shown.progress is not None:
@@ -613,7 +623,7 @@ def _work_on(task: Task, shared: _Shared) -> list[Any]:
 def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
     problem = shared.problems[task.problem].build()
     saved: dict[str, Any] = {}
-    if shared.checkpoint is not None:
+    if shared.checkpoint is not None and task.algorithm.name not in shared.not_resumable:
         saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
     paths = []
     for k, arrays, facts in perform(task, problem, **saved):
