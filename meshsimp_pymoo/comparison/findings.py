@@ -1,7 +1,7 @@
 """The paper's findings, each with "holds", "does not hold" or "not decided here", computed from the runs.
 
 A finding says that some methods are better than others, or that they do not differ, by an indicator and a procedure
-(`study.PROCEDURES`), among the methods that start alike (`study.Start`) and against a pseudo-optimal front of their own.
+(`study.PROCEDURES`), among the methods that start alike (`study.Start`), against their own pseudo-optimal front.
 It is broken down to comparisons, one for each pair of methods and each model (merged fronts: each pair, over all
 models), tested at the level of 0.05 after Holm's correction over the models; each pair is a question of its own:
 
@@ -11,10 +11,10 @@ models), tested at the level of 0.05 after Holm's correction over the models; ea
   indicator tells any two runs apart in more than half of the comparisons; does not hold if any is.
 
 Which test. Section 4.6 of the paper names Wilcoxon's signed-rank test, its section 5 the rank-sum test. *Run against
-run* takes rank sums, because the seeds of two methods are no pairs: seed 1 of the one has nothing in common with seed 1 of
-the other (the tables have the signed-rank p beside, by seeds). A method without chance has one front, so each run of the
-other method is either better or worse, and the sign test counts them. *Merged fronts* are one number for each method
-and model, and the models are pairs: there it is the signed-rank test. How many comparisons are significant by
+run* takes rank sums, because the seeds of two methods are no pairs: seed 1 of the one has nothing in common with seed 1
+of the other (the tables have the signed-rank p beside, by seeds). A method without chance has one front, so each run of
+the other method is either better or worse, and the sign test counts them. *Merged fronts* are one number for each
+method and model, and the models are pairs: there it is the signed-rank test. How many comparisons are significant by
 the raw p-value, as the paper counts, is always said too.
 """
 
@@ -463,12 +463,22 @@ def _over_models(cases: Sequence[Case], a: str, b: str, indicator: str) -> list[
     test = signed_rank(values[:, 0], values[:, 1])
     ahead, behind = int((difference > 0).sum()), int((difference < 0).sum())
     direction = _sign(float(np.median(difference))) or _sign(ahead - behind)
-    means = values.mean(axis=0).tolist()
+    value_a, value_b = values.mean(axis=0).tolist()
     return [
         Outcome(
-            "all models", a, b, test.p, 2.0 ** (1 - len(cases)), direction, *means, informative=ahead + behind > 0, ahead=ahead, behind=behind
+            "all models",
+            a,
+            b,
+            test.p,
+            2.0 ** (1 - len(cases)),
+            direction,
+            value_a,
+            value_b,
+            informative=ahead + behind > 0,
+            ahead=ahead,
+            behind=behind,
         )
-    ]  # fmt: skip
+    ]
 
 
 def _sign(number: float) -> int:

@@ -13,13 +13,14 @@ from meshsimp_pymoo.surface.measures import MEASURES
 __all__ = ["findings_page", "reservations", "shown_claims", "table", "times_page", "what_was_run"]
 
 HOW = (
-    "How a verdict comes about: every pair of methods that start alike is compared at the level of 0.05. *Run against run* "
-    "takes every run on every model (rank sums; signs against a method without chance), with Holm's correction over the "
-    "models. *Merged fronts* are those of the paper's section 4.3: the runs of a method as one front, of the weighted-sum "
-    "GA its eleven weights of one seed, so that both have made about as many evaluations; there is one number for each "
-    "model, and the signed-rank test over the models. *Better* holds if it is so significantly in more than half of the "
-    "comparisons and the reverse in none, and does not hold if the reverse is significant anywhere. *No different* holds "
-    "if nothing is significant though it could be. All else is not decided here. The tables hold every comparison."
+    "How a verdict comes about: every pair of methods that start alike is compared at the level of 0.05. *Run "
+    "against run* takes every run on every model (rank sums; signs against a method without chance), with Holm's "
+    "correction over the models. *Merged fronts* are those of the paper's section 4.3: the runs of a method as "
+    "one front, of the weighted-sum GA its eleven weights of one seed, so that both have made about as many "
+    "evaluations; there is one number for each model, and the signed-rank test over the models. *Better* holds if"
+    " it is so significantly in more than half of the comparisons and the reverse in none, and does not hold if "
+    "the reverse is significant anywhere. *No different* holds if nothing is significant though it could be. All "
+    "else is not decided here. The tables hold every comparison."
 )
 SCORED = (
     "*Error as searched* is the paper's reading: a vertex that no triangle covers costs nothing. Meshes of other tools "
@@ -45,13 +46,19 @@ def findings_page(study: Study, all_findings: Sequence[Finding]) -> str:
     claims = shown_claims(CLAIMS, all_findings)
     if not claims:
         lines += [
-            "## The paper's findings", "", "They are about NSGA-II, MOEA/D and the weighted-sum GA as the paper has them; "
-            "this experiment compares no two of those.",
-        ]  # fmt: skip
+            "## The paper's findings",
+            "",
+            "They are about NSGA-II, MOEA/D and the weighted-sum GA as the paper has them; this experiment compares no "
+            "two of those.",
+        ]
         return _joined(lines)
     lines += ["## The paper's findings", "", HOW, ""]
     for budget, scoring in settings:
-        lines += [f"### In short: {budget}, error {SCORINGS[scoring]}", "", *_in_short(claims, all_findings, budget, scoring)]
+        lines += [
+            f"### In short: {budget}, error {SCORINGS[scoring]}",
+            "",
+            *_in_short(claims, all_findings, budget, scoring),
+        ]
         lines += ["", "Times: see [times.md](times.md).", ""]
     for budget, scoring in settings:
         here = [f for f in all_findings if (f.budget, f.scoring) == (budget, scoring)]
@@ -82,7 +89,10 @@ def _in_short(claims: Sequence[Claim], all_findings: Sequence[Finding], budget: 
         if (f.budget, f.scoring) == (budget, scoring)
     }
     starts = list(dict.fromkeys(start for *_, start in by_place))
-    lines = [f"| the paper says | Sec. | procedure | by | {' | '.join(starts)} |", "|---|---|---|---|" + "---|" * len(starts)]
+    lines = [
+        f"| the paper says | Sec. | procedure | by | {' | '.join(starts)} |",
+        "|---|---|---|---|" + "---|" * len(starts),
+    ]
     for claim in claims:
         for procedure in claim.procedures:
             for indicator in claim.indicators:
@@ -120,8 +130,8 @@ def times_page(study: Study) -> str:
         "# Times",
         "",
         "Seconds of a single search, measured while other searches ran beside it; the weighted GAs need one search "
-        "for each weight, a classic method's are for all its meshes. The paper (Sec. 4.5): 6 to 8 minutes for MOEA/D, 10 to "
-        "15 for the versions v1 and the classic methods, 20 for the versions v2.",
+        "for each weight, a classic method's are for all its meshes. The paper (Sec. 4.5): 6 to 8 minutes for MOEA/D, "
+        "10 to 15 for the versions v1 and the classic methods, 20 for the versions v2.",
         "",
     ]
     for budget in study.budgets:
@@ -188,8 +198,8 @@ def _unlike(study: Study) -> list[str]:
         if movers:
             verb = "moves" if len(movers) == 1 else "move"
             lines.append(
-                f"at {budget} evaluations do not measure {listed(movers)}, which {verb} vertices of a mesh one at a time; "
-                "compare by seconds"
+                f"at {budget} evaluations do not measure {listed(movers)}, which {verb} vertices of a mesh one at a "
+                "time; compare by seconds"
             )
         mean = {method: value for method, value in mean.items() if method not in movers}
         if not mean:

@@ -98,12 +98,12 @@ def _columns(found: Sequence[Finding]) -> list[Finding]:
 def _claims(found: Sequence[Finding]) -> Iterator[dict[str, Any]]:
     """Yield the verdicts on each claim, one row for each procedure and indicator."""
     places = [(f.budget, f.scoring, f.start) for f in _columns(found)]
-    by_place = {(f.claim.key, f.procedure, f.indicator, f.budget, f.scoring, f.start): f for f in found}
+    by_place = {(f.claim.key, f.procedure, f.indicator, (f.budget, f.scoring, f.start)): f for f in found}
     for claim in findings_page.shown_claims(CLAIMS, found):
         rows = [
             (
                 f"{PROCEDURES[procedure]}, {INDICATORS[key]}",
-                [by_place[claim.key, procedure, key, *place] for place in places],
+                [by_place[claim.key, procedure, key, place] for place in places],
             )
             for procedure in claim.procedures
             for key in claim.indicators

@@ -210,7 +210,7 @@ class Case:
 
     @cached_property
     def merged(self) -> Case:
-        """The fronts of section 4.3: of each method its runs merged to one, unless each is merged of several already."""
+        """The fronts of section 4.3: of each method its runs merged to one, unless each is merged already."""
         runs, sources = dict(self.runs), dict(self.sources)
         for method, found in self.sources.items():
             if all(len(made_of) == 1 for made_of in found.values()):
@@ -494,7 +494,7 @@ class Study:
         return [Start(name, roles) for name, roles in found.items()]
 
     def kind(self, method: str) -> str:
-        """Return what a method is: "own" (by import path), "preset", "paper" (a preset of the paper's) or "baseline"."""
+        """Return what a method is: "own" (by import path), "paper" (a preset of the paper's), "preset", "baseline"."""
         preset = {item["name"]: item["preset"] for item in self.content["algorithms"]}.get(method)
         if preset is None:
             return "baseline"

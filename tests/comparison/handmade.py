@@ -95,7 +95,9 @@ def store(
                     "merged_values": [0, 1] if name in merged else [None],
                     "description": {
                         "parameters": {"normalised": True} if "normalised" in name else {},
-                        "settings": {"sampling": {"class": "X.RandomSubset", "size": 0.2 if "common" in name else None}},
+                        "settings": {
+                            "sampling": {"class": "X.RandomSubset", "size": 0.2 if "common" in name else None},
+                        },
                     },
                 }
                 for name in names

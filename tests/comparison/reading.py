@@ -86,7 +86,9 @@ def papers_tables(study: Study) -> Iterator[str]:
                 shown["C"].append(pair(cover[a, b].mean(), cover[b, a].mean()))
                 shown["epsilon"].append(pair(float(np.median(literal[a, b])), float(np.median(literal[b, a]))))
         rows.append([*row, *shown["C"], pair(*PAPER_EPSILON[k], 3), *shown["epsilon"]])
-    columns = [f"{what} {start.name.removeprefix('start at ')}" for start in study.starts for what in ("runs", "merged")]
+    columns = [
+        f"{what} {start.name.removeprefix('start at ')}" for start in study.starts for what in ("runs", "merged")
+    ]
     head = ["model", "C, paper", *(f"C, {name}" for name in columns), "ε, paper", *(f"ε, {name}" for name in columns)]
     yield from table(head, rows)
 
@@ -186,8 +188,8 @@ def main(folder: str) -> None:
             f"Merged fronts, {start.name}: HVR, epsilon to the pseudo-optimal front": equal_evaluations(study, start)
             for start in study.starts
         },
-        "Error of NSGA-II v1 over that of other tools at as many triangles, reductions of 5 to 50 % (median; as searched "
-        "/ every vertex)": against_others(study),
+        "Error of NSGA-II v1 over that of other tools at as many triangles, reductions of 5 to 50 % (median; as "
+        "searched / every vertex)": against_others(study),
         "Vertices that a mesh of half of the triangles or more leaves uncovered (mean, in %)": abandoned(study),
         "The paper's solutions of M1": papers_solutions(study),
     }  # fmt: skip
