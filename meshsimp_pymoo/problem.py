@@ -17,7 +17,7 @@ from pymoo.algorithms.soo.nonconvex.random_search import RandomSearch
 from pymoo.core.problem import ElementwiseProblem, Problem
 from pymoo.util.display.single import SingleObjectiveOutput
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.errors import meant
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -390,10 +390,9 @@ def minimises_one_number(algorithm: Any) -> bool:
 
 
 def _require_bool(X: Any) -> None:
-    kind = np.asarray(X).dtype
-    if kind != np.bool_:
-        raise TypeError(
-            f"chromosomes are bool vectors, one entry a vertex, but these are {kind}; pass sampling=RandomSubset(), "
-            "crossover=SubsetUniformCrossover() or OAX(), mutation=NeighbourShift() and repair=PinnedCorners() "
-            "to the algorithm, since pymoo's defaults make real numbers"
-        )
+    require_bool(
+        X,
+        "chromosomes are bool vectors, one entry a vertex",
+        "pass sampling=RandomSubset(), crossover=SubsetUniformCrossover() or OAX(), mutation=NeighbourShift() and "
+        "repair=PinnedCorners() to the algorithm, since pymoo's defaults make real numbers",
+    )
