@@ -1,8 +1,8 @@
 """The state of a running search in one file, so that a killed search goes on where it was.
 
 A checkpoint is taken between two ``algorithm.next()``. Restored into an algorithm that was made and set up in the same
-way, it makes the search go on to the very bytes that it would have found undisturbed, if its budget is in generations
-or evaluations; a budget in seconds goes on with what is left of it::
+way, it makes the search go on to the very bytes that it would have found undisturbed, if its budget is in generations,
+evaluations or moves; a budget in seconds goes on with what is left of it::
 
     algorithm.setup(problem, termination=("n_gen", 1000), seed=1)
     if path.exists():
@@ -51,7 +51,7 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, read_npz
-from meshsimp_pymoo.search.time_limit import WholeGenerations
+from meshsimp_pymoo.search.budgets import Moves, WholeGenerations
 
 __all__ = ["CheckpointError", "Checkpoints", "NotResumable", "Stored", "difference", "read_checkpoint", "restore"]
 
@@ -81,6 +81,7 @@ TERMINATIONS = (
     NoTermination,
     MaximumGenerationTermination,
     MaximumFunctionCallTermination,
+    Moves,
     TimeBasedTermination,
     WholeGenerations,
 )

@@ -21,7 +21,7 @@ from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.util.archive import MultiObjectiveArchive
 
-from meshsimp_pymoo import MeshProblem, nsga2_v1, nsga3
+from meshsimp_pymoo import MeshProblem, Moves, nsga2_v1, nsga3
 from meshsimp_pymoo.search import checkpoint as module
 from meshsimp_pymoo.search.checkpoint import (
     CheckpointError,
@@ -106,6 +106,17 @@ def test_every_preset_goes_on_to_the_same_end(problems, tmp_path, name, kind, at
     assert second.has_next()
     finish(second)
     assert state(second) == state(whole)
+
+
+def test_a_search_with_a_budget_in_moves_goes_on_with_what_is_left_of_them(problems, tmp_path):
+    whole, first, second = (set_up("memetic", problems["usual"], Moves(3_001)) for _ in range(3))
+    finish(whole)
+    steps(first, 2)
+    assert 0 < first.moves < 3_001
+    restore(saved(first, tmp_path / "c.npz"), second)
+    finish(second)
+    assert state(second) == state(whole)
+    assert second.moves == whole.moves == 3_001
 
 
 def test_a_search_that_is_at_its_end_is_restored_at_its_end(problems, tmp_path):
