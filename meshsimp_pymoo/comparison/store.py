@@ -69,7 +69,7 @@ class StoredRun:
         For an evolutionary run ``F`` (S, 2), ``kept`` (S, ceil(N / 8)) packed bits, and one value per
         solution of ``error_nearest`` (the error when uncovered vertices cost their distance) and of every
         measure but "error" and "triangles" (see `meshsimp_pymoo.surface.measures`). See the runner for what
-        the classic methods add.
+        baselines have.
     """
 
     path: Path
@@ -219,7 +219,7 @@ def read_run(path: Path) -> StoredRun:
 
 
 def classic_mesh(run: StoredRun, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
-    """Return a mesh of a stored classic method: vertices (V, 3) in the file's frame, faces (M, 3)."""
+    """Return a stored mesh of a tool: vertices (V, 3) in the file's frame, faces (M, 3)."""
     v, f = run.arrays["vertex_start"], run.arrays["face_start"]
     return run.arrays["mesh_vertices"][v[row] : v[row + 1]], run.arrays["mesh_faces"][f[row] : f[row + 1]]
 

@@ -4,11 +4,12 @@ Where the search did not charge for uncovered vertices (``outside: ignore``, the
 is scored in two ways:
 
 as searched
-    by the error that the algorithms saw. Of MeshLab's meshes only the paper's series, reductions of 5 to
-    50 %, is compared: the smaller ones abandon nearly all of the model, and score well by that.
+    by the error that the algorithms saw. Of the tools' meshes only the paper's series, reductions of 5 to
+    50 %, is compared: the smaller ones abandon nearly all of the model, and score well by that. Whole fronts
+    (thinning, insertion) are made under the problem's rules, so all of their meshes are compared.
 every vertex
-    by the error with ``outside: nearest``, where an uncovered vertex costs its distance to the mesh. All of
-    MeshLab's meshes are compared.
+    by the error with ``outside: nearest``, where an uncovered vertex costs its distance to the mesh. All
+    meshes are compared.
 
 Where the search charged for them already, there is the second scoring alone.
 
@@ -27,6 +28,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import (
@@ -42,7 +44,7 @@ from meshsimp_pymoo.comparison.analysis import (
     rank_sum,
     unary_scores,
 )
-from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.indicators import non_dominated
@@ -71,7 +73,7 @@ EPSILON_SHIFT = 0.01
 NO_SEED = 0
 
 # What tables call the methods without chance.
-CLASSIC_NAMES = {name: method.label for name, method in MESHLAB_METHODS.items()}
+CLASSIC_NAMES = {name: baseline.label for name, baseline in BASELINES.items()}
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,14 @@ class Problem:
     vertices: int
     triangles: int
     rules: Rules
+    limits: dict[str, float]
     stored: str
     hash: str
+
+    def meets_limits(self, F: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which solutions (n, 2), by the error that was searched, a search of this problem could find."""
+        most = [self.limits.get(name, np.inf) for name in ("max_error", "max_triangles")]
+        return np.all(np.less_equal(F, most), axis=1)
 
 
 @dataclass(frozen=True)
@@ -267,6 +275,7 @@ class Study:
                 vertices=item["vertices"],
                 triangles=item["triangles"],
                 rules=read_back(Rules, item["rules"]),
+                limits=item["limits"],
                 stored=item["stored"],
                 hash=item["hash"],
             )
@@ -405,8 +414,8 @@ class Study:
             if name != problem.name:
                 continue
             F = scored(run, scoring)
-            usable = np.isfinite(F[:, 0]) & (F[:, 1] > 0)
-            if scoring == "searched":
+            usable = np.isfinite(F[:, 0]) & (F[:, 1] > 0) & problem.meets_limits(run.arrays["F"])
+            if scoring == "searched" and BASELINES[method].tool:
                 usable &= run.arrays["paper"].astype(bool)
             if usable.any():
                 label = CLASSIC_NAMES[method]

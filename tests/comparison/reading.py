@@ -14,13 +14,15 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, Case, Study
+from meshsimp_pymoo.comparison.baselines import BASELINES
+from meshsimp_pymoo.comparison.study import Case, Study
 from meshsimp_pymoo.indicators import epsilon, non_dominated
 from meshsimp_pymoo.search.greedy import thinning
 
 FloatArray = npt.NDArray[np.float64]
 
 BUDGET = "50 generations"
+MESHLAB = tuple(baseline.label for baseline in BASELINES.values() if baseline.group == "meshlab")
 
 # The founding paper's Tables 1 and 2: NSGA-II v1 over MOEA/D, and the reverse, for its models M1 to M6.
 PAPER_COVERAGE = ((0.57, 0.34), (0.38, 0.50), (0.59, 0.21), (0.42, 0.48), (0.28, 0.16), (0.37, 0.56))
@@ -101,7 +103,7 @@ def over_meshlab(case: Case, method: str, front: FloatArray) -> list[float]:
 
 
 def against_meshlab(study: Study, names: list[str]) -> Iterator[str]:
-    methods = list(CLASSIC_NAMES.values())
+    methods = list(MESHLAB)
     rows = []
     for name in names:
         searched, nearest = (study.cases[name, BUDGET, scoring] for scoring in ("searched", "nearest"))
@@ -120,7 +122,7 @@ def against_meshlab(study: Study, names: list[str]) -> Iterator[str]:
 
 
 def abandoned(cases: list[Case]) -> Iterator[str]:
-    methods = ("NSGA-II v1", "NSGA-II v2", "MOEA/D", "GA v1", *CLASSIC_NAMES.values())
+    methods = ("NSGA-II v1", "NSGA-II v2", "MOEA/D", "GA v1", *MESHLAB)
     rows = []
     for case in cases:
         row = [case.problem.name]
