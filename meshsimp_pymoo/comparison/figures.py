@@ -40,6 +40,9 @@ CLASSIC_MARKS = ("+", "x", "1", "2", "3", "4", "*")
 CLASSIC_LINES = dict(zip([b.label for b in BASELINES.values() if b.front], ("-", "--", ":"), strict=True))
 KINDS = {"fewest_triangles": "fewest triangles", "trade_off": "best trade-off", "least_error": "least error"}
 
+# An entry of a legend below the panels; the longest names are those of baselines.
+LEGEND_INCHES = 2.6
+
 # At most so many meshes beside the original: more would be too small to see.
 MOST_MESHES = 5
 # Views of a relief: from the front, and from the side.
@@ -166,7 +169,14 @@ def selected_figure(study: Study, cases: Sequence[Case]) -> Figure:
         f"error {SCORINGS[cases[0].scoring]}",
         fontsize=11,
     )
-    figure.legend(list(seen.values()), list(seen), frameon=False, loc="outside lower center", ncols=5, fontsize=8.5)
+    figure.legend(
+        list(seen.values()),
+        list(seen),
+        frameon=False,
+        loc="outside lower center",
+        ncols=max(1, int(figure.get_figwidth() / LEGEND_INCHES)),
+        fontsize=8.5,
+    )
     return figure
 
 
