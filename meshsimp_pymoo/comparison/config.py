@@ -16,7 +16,7 @@
         merged_over: {w: [0, 0.5, 1]}     # one run for each value, merged to one front for each seed
     seeds: [1, 2, 3]
     budgets: [{generations: 50}, {evaluations: 5000}, {seconds: 10}]
-    baselines: {meshlab: {methods: [...], down_to_fronts: true, steps: 10}}    # optional
+    baselines: [thinning, meshlab]        # optional; names in baselines.BASELINES, groups of them, or true for all
 
 `read_experiment_file` reads it, opens every model, builds every algorithm and lets it run for two generations
 on a tiny model, so that whatever is wrong is known before the first run. Every mistake is a `ConfigError` of
@@ -49,7 +49,7 @@ from pydantic import AfterValidator, BaseModel, Field, PlainValidator, Validatio
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
-from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.errors import InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
@@ -70,10 +70,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AlgorithmConfig",
+    "BaselinesConfig",
     "Budget",
     "ConfigError",
     "Experiment",
-    "MeshLabConfig",
     "OperatorConfig",
     "ProblemConfig",
     "read_experiment_file",
@@ -482,23 +482,39 @@ class Budget(Part):
         return getattr(self, self.kind)
 
 
-class MeshLabConfig(Part):
-    """MeshLab's methods: which, and whether also down to the fewest triangles of the evolutionary fronts."""
+def _baselines(given: Any) -> tuple[str, ...]:
+    """Return the methods that a name, a list of names or true (all of them) stands for, in the order of the table."""
+    named: dict[str, tuple[str, ...]] = {name: (name,) for name in BASELINES}
+    for baseline in BASELINES.values():
+        named[baseline.group] = tuple(name for name, other in BASELINES.items() if other.group == baseline.group)
+    if given is True:
+        return tuple(BASELINES)
+    if not isinstance(given, (str, list)) or not given:
+        raise ValueError(f"expected true, or a list of some of {', '.join(named)}")
+    names = [given] if isinstance(given, str) else given
+    chosen: set[str] = set()
+    for place, name in enumerate(names):
+        with _blaming(*[place] * isinstance(given, list)):
+            members = named[Choice(tuple(named)).from_plain(name)]
+            if twice := sorted(chosen.intersection(members)):
+                raise ValueError(f"{twice[0]} is there twice")
+            chosen.update(members)
+    return tuple(name for name in BASELINES if name in chosen)
 
-    methods: Different[Annotated[str, _of(Choice(tuple(MESHLAB_METHODS)))]] = tuple(MESHLAB_METHODS)
+
+class BaselinesConfig(Part):
+    """Methods without chance: which, and whether the tools go down to the fewest triangles of the searched fronts."""
+
+    methods: Annotated[tuple[str, ...], _of(_baselines)] = tuple(BASELINES)
     down_to_fronts: bool = Field(True, strict=True)
     steps: Count = 10
 
     @classmethod
-    def read(cls, given: Any) -> MeshLabConfig | None:
-        """Return what a file says of them: true for all of them, false for none, or more."""
-        return None if given is False else cls.model_validate({} if given is True else given)
-
-
-class Baselines(Part):
-    """The methods that are compared with."""
-
-    meshlab: Annotated[MeshLabConfig | None, _of(MeshLabConfig.read)] = None
+    def read(cls, given: Any) -> BaselinesConfig | None:
+        """Return what a file says of them: false for none, true for all of them, names, or a mapping."""
+        if given is False:
+            return None
+        return cls.model_validate(given if isinstance(given, dict) else {"methods": list(_baselines(given))})
 
 
 class _File(Part):
@@ -509,12 +525,12 @@ class _File(Part):
     algorithms: Different[AlgorithmConfig]
     seeds: Different[Annotated[int, _of(Whole(0))]]
     budgets: Different[Budget]
-    baselines: Baselines = Baselines()
+    baselines: Annotated[BaselinesConfig | None, _of(BaselinesConfig.read)] = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Experiment:
-    """Everything to be done: problems x algorithms x seeds x budgets, and the classic methods."""
+    """Everything to be done: problems x algorithms x seeds x budgets, and the baselines."""
 
     path: Path
     title: str
@@ -522,7 +538,7 @@ class Experiment:
     algorithms: tuple[AlgorithmConfig, ...]
     seeds: tuple[int, ...]
     budgets: tuple[Budget, ...]
-    meshlab: MeshLabConfig | None
+    baselines: BaselinesConfig | None
     # algorithms whose state cannot be saved, by name, and why: their searches begin anew after a crash
     not_resumable: Mapping[str, str]
 
@@ -566,7 +582,7 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
         algorithms=file.algorithms,
         seeds=file.seeds,
         budgets=file.budgets,
-        meshlab=file.baselines.meshlab,
+        baselines=file.baselines,
         not_resumable={name: reason for name, reason in reasons.items() if reason},
     )
 

@@ -32,10 +32,11 @@ VERDICT_CLASSES = {HOLDS: "holds", DOES_NOT_HOLD: "fails", UNDECIDED: "open"}
 # The page's marks by matplotlib's names.
 MARKS = {
     "o": "circle", "s": "square", "^": "up", "D": "diamond", "v": "down", "P": "plus", "X": "cross", "<": "left",
-    "+": "plus", "x": "cross", "1": "down", "2": "up", ".": "circle",
+    "+": "plus", "x": "cross", "1": "down", "2": "up", "3": "left", "4": "diamond", "*": "star",
+    ".": "circle",
 }  # fmt: skip
 # Parts of experiment.json that the page shows as the configuration.
-CONFIGURATION = ("title", "problems", "algorithms", "seeds", "budgets", "meshlab")
+CONFIGURATION = ("title", "problems", "algorithms", "seeds", "budgets", "baselines")
 
 
 def experiment_page(study: Study, found: Sequence[Finding]) -> str:
@@ -71,7 +72,7 @@ def experiment_page(study: Study, found: Sequence[Finding]) -> str:
         own_first=any(study.kind(method) == "own" for method in study.methods),
         sections=sections,
         models=list(_models(study)),
-        meshlab=[table for budget in study.budgets if (table := tables.meshlab(study, budget)) is not None],
+        baselines=[table for budget in study.budgets if (table := tables.baselines(study, budget)) is not None],
         times=[_times(study, budget) for budget in study.budgets],
         configuration=_configuration(study),
         versions=study.versions,

@@ -92,9 +92,9 @@ def write_tables(study: Study) -> list[Finding]:
                 for make in tables.COMPARISONS:
                     tables.write_table(place, make(study, budget, scoring))
                 found += findings(study, budget, scoring)
-            meshlab = tables.meshlab(study, budget)
-            if meshlab is not None:
-                tables.write_table(folder / slug(budget), meshlab)
+            baselines = tables.baselines(study, budget)
+            if baselines is not None:
+                tables.write_table(folder / slug(budget), baselines)
         tables.write_table(folder, findings_page.table(found))
         (folder / "runs.csv").write_text(tables.runs(study).csv(), encoding="utf-8")
     put_text(study.out / "findings.md", findings_page.findings_page(study, found))

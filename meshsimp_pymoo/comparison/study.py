@@ -4,11 +4,12 @@ Where the search did not charge for uncovered vertices (``outside: ignore``, the
 is scored in two ways:
 
 as searched
-    by the error that the algorithms saw. Of MeshLab's meshes only the paper's series, reductions of 5 to
-    50 %, is compared: the smaller ones abandon nearly all of the model, and score well by that.
+    by the error that the algorithms saw. Of the tools' meshes only the paper's series, reductions of 5 to
+    50 %, is compared: the smaller ones abandon nearly all of the model, and score well by that. Whole fronts
+    (thinning, insertion) are made under the problem's rules, so all of their meshes are compared.
 every vertex
-    by the error with ``outside: nearest``, where an uncovered vertex costs its distance to the mesh. All of
-    MeshLab's meshes are compared.
+    by the error with ``outside: nearest``, where an uncovered vertex costs its distance to the mesh. All
+    meshes are compared.
 
 Where the search charged for them already, there is the second scoring alone.
 
@@ -41,6 +42,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import (
@@ -57,7 +59,7 @@ from meshsimp_pymoo.comparison.analysis import (
     trade_off,
     unary_scores,
 )
-from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.statistics import rank_sum
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
@@ -113,7 +115,7 @@ SMALLER_IS_BETTER = ("epsilon", "epsilon_optimal", "least_error", "fewest_triang
 NO_SEED = 0
 
 # What tables call the methods without chance.
-CLASSIC_NAMES = {name: method.label for name, method in MESHLAB_METHODS.items()}
+CLASSIC_NAMES = {name: baseline.label for name, baseline in BASELINES.items()}
 
 
 @dataclass(frozen=True)
@@ -125,8 +127,14 @@ class Problem:
     vertices: int
     triangles: int
     rules: Rules
+    limits: dict[str, float]
     stored: str
     hash: str
+
+    def meets_limits(self, F: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which solutions (n, 2), by the error that was searched, a search of this problem could find."""
+        most = [self.limits.get(name, np.inf) for name in ("max_error", "max_triangles")]
+        return np.all(np.less_equal(F, most), axis=1)
 
 
 @dataclass(frozen=True)
@@ -372,6 +380,7 @@ class Study:
                 vertices=item["vertices"],
                 triangles=item["triangles"],
                 rules=read_back(Rules, item["rules"]),
+                limits=item["limits"],
                 stored=item["stored"],
                 hash=item["hash"],
             )
@@ -530,8 +539,8 @@ class Study:
             if name != problem.name:
                 continue
             F = scored(run, scoring)
-            usable = np.isfinite(F[:, 0]) & (F[:, 1] > 0)
-            if scoring == "searched":
+            usable = np.isfinite(F[:, 0]) & (F[:, 1] > 0) & problem.meets_limits(run.arrays["F"])
+            if scoring == "searched" and BASELINES[method].tool:
                 usable &= run.arrays["paper"].astype(bool)
             if usable.any():
                 label = CLASSIC_NAMES[method]

@@ -11,7 +11,7 @@ wilcoxon   every two methods with chance, by rank sums: raw and corrected p, eff
            the p of the signed-rank test, by seeds
 selected   least error, fewest triangles, best trade-off (by the ranges, and by the paper's Eq. 11) and knees of
            every method
-meshlab    every mesh of MeshLab's methods, with the vertices that it leaves uncovered
+baselines  the meshes of the methods without chance, with the vertices that they leave uncovered
 runs       every run: solutions, generations, evaluations
 ========== =====================================================================================
 
@@ -38,9 +38,9 @@ from meshsimp_pymoo.surface.measures import MEASURES
 __all__ = [
     "COMPARISONS",
     "Table",
+    "baselines",
     "coverage",
     "epsilon",
-    "meshlab",
     "ranking",
     "runs",
     "scores",
@@ -313,8 +313,8 @@ COMPARISONS: tuple[Callable[[Study, str, str], Table], ...] = (ranking, scores, 
 """The tables of one budget and scoring."""
 
 
-def meshlab(study: Study, budget: str) -> Table | None:
-    """Return every mesh of MeshLab's methods, and the least error of an evolutionary one no larger.
+def baselines(study: Study, budget: str) -> Table | None:
+    """Return the baselines' meshes of the sizes asked for, and the least error of an evolutionary one no larger.
 
     None if there is no such mesh. The last columns compare by the error of every vertex.
     """
@@ -330,6 +330,8 @@ def meshlab(study: Study, budget: str) -> Table | None:
             if name != problem.name:
                 continue
             for k, asked in enumerate(run.arrays["asked"].tolist()):
+                if not asked:  # of a whole front, between the sizes that all are asked for
+                    continue
                 a, (error, triangles) = run.arrays, run.arrays["F"][k]
                 label, note = CLASSIC_NAMES[method], run.record["notes"][k]
                 series = "paper" if a["paper"][k] else "down to the fronts"
@@ -347,13 +349,13 @@ def meshlab(study: Study, budget: str) -> Table | None:
                 )  # fmt: skip
     if not rows:
         return None
-    title = f"MeshLab's meshes, and the best evolutionary one of at most as many triangles ({budget})"
+    title = f"Meshes of the baselines, and the best evolutionary one of at most as many triangles ({budget})"
     shown_columns = {
         "model": "model", "method": "method", "asked": "asked", "triangles": "triangles",
         "error_as_searched": "error as searched", "error_every_vertex": "error, every vertex",
         "uncovered": "uncovered", "evolution_error_every_vertex": "evolution, every vertex", "evolution_method": "by",
     }  # fmt: skip
-    table = Table("meshlab", title, columns, tuple(rows))
+    table = Table("baselines", title, columns, tuple(rows))
     return replace(table, shown=table.part(shown_columns, rows))
 
 

@@ -79,7 +79,7 @@ def store(
                 "vertex_start": np.zeros(len(F) + 1, int), "face_start": np.zeros(len(F) + 1, int),
             }  # fmt: skip
             facts = {"seconds": 0.5, "notes": [""] * len(F), "versions": {}}
-            description = {"meshlab": method, "model": problem}
+            description = {"baseline": method, "model": problem}
             path = write_run(out / "runs", f"{problem} {method}", description, arrays(F, nearest) | extra, facts)
             rows.append({"key": path.stem.rpartition(".")[2], "problem": problem, "method": method})
     names = list(dict.fromkeys(method for methods in fronts.values() for method in methods))
@@ -104,7 +104,7 @@ def store(
             ],
             "seeds": seeds,
             "budgets": [{"name": BUDGET, "generations": 9}],
-            "meshlab": None,
+            "baselines": None,
             "runs": runs,
             "classic": rows,
             "skipped": [],

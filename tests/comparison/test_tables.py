@@ -130,12 +130,12 @@ def test_uncovered_vertices_cost_under_one_scoring_and_not_under_the_other(tmp_p
     # the mesh of 2 triangles, which abandons the model, is compared only where that costs
     assert searched.runs["MeshLab quadric"][0].tolist() == [[1.0, 50.0]]
     assert nearest.runs["MeshLab quadric"][0].tolist() == [[1.5, 2.0]]
-    row = read(tables.meshlab(study, BUDGET))[0]
+    row = read(tables.baselines(study, BUDGET))[0]
     assert (row["asked"], row["triangles"], row["series"], row["uncovered"]) == ("50", "50", "paper", "3")
     assert (row["error_as_searched"], row["error_every_vertex"]) == ("1.0", "3.0")
     assert float(row["uncovered_share"]) == pytest.approx(3 / 9)
     assert (row["evolution_error_every_vertex"], row["evolution_method"]) == ("15.0", "N1")
-    assert read(tables.meshlab(study, BUDGET))[1]["evolution_method"] == ""
+    assert read(tables.baselines(study, BUDGET))[1]["evolution_method"] == ""
 
 
 def test_every_method_keeps_its_row_in_every_table(tmp_path):
