@@ -69,7 +69,7 @@ def experiment_page(study: Study, found: Sequence[Finding]) -> str:
         how=findings_page.HOW.replace("*", ""),
         columns=[f"{_setting(f.budget, f.scoring)}, {f.start}" for f in _columns(found)],
         claims=list(_claims(found)),
-        own_first=any(study.kind(method) == "own" for method in study.methods),
+        own_first=any(study.kind(method) in ("own", "pymoo") for method in study.methods),
         sections=sections,
         models=list(_models(study)),
         baselines=[table for budget in study.budgets if (table := tables.baselines(study, budget)) is not None],

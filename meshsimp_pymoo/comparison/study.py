@@ -387,9 +387,10 @@ class Study:
             for item in self.content["problems"]
         ]
         self.budgets: list[str] = [item["name"] for item in self.content["budgets"]]
-        # the reader's own algorithms first: they are what the experiment is about
+        # what the reader added comes first: it is what the experiment is about
         self.methods: list[str] = sorted(
-            (item["name"] for item in self.content["algorithms"]), key=lambda name: self.kind(name) != "own"
+            (item["name"] for item in self.content["algorithms"]),
+            key=lambda name: ("own", "pymoo", "preset", "paper").index(self.kind(name)),
         )
         self._runs: dict[tuple[str, str, str, int], list[StoredRun]] = {}
         self._expected = {item["name"]: len(item["merged_values"]) for item in self.content["algorithms"]}
@@ -503,13 +504,13 @@ class Study:
         return [Start(name, roles) for name, roles in found.items()]
 
     def kind(self, method: str) -> str:
-        """Return what a method is: "own" (by import path), "paper" (a preset of the paper's), "preset", "baseline"."""
-        preset = {item["name"]: item["preset"] for item in self.content["algorithms"]}.get(method)
-        if preset is None:
+        """Return what a method is: "own" and "pymoo" (by import path), "preset", "paper" (a preset too), "baseline"."""
+        item = next((item for item in self.content["algorithms"] if item["name"] == method), None)
+        if item is None:
             return "baseline"
-        if not preset:
-            return "own"
-        return "paper" if PRESETS[preset].is_the_papers else "preset"
+        if not item["preset"]:
+            return "pymoo" if item["class"].startswith("pymoo.") else "own"
+        return "paper" if PRESETS[item["preset"]].is_the_papers else "preset"
 
     @cached_property
     def versions(self) -> list[dict[str, str]]:
