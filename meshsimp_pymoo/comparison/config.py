@@ -52,7 +52,7 @@ from meshsimp_pymoo.errors import InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.search.operators import OPERATORS
+from meshsimp_pymoo.search.operators import OPERATORS, RandomSubset
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -638,7 +638,10 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None
     built = [problem.build() for problem in problems]
     for entry, problem in zip(problems, built, strict=True):
         with _blaming(what=f"the algorithm {config.name!r} cannot be used on the problem {entry.name!r}"):
-            config.build(config.merged_values[0]).setup(problem, termination=("n_gen", 1), seed=1)
+            for value in config.merged_values:
+                algorithm = config.build(value).setup(problem, termination=("n_gen", 1), seed=1)
+                if sampling := _sized_sampling(algorithm):
+                    sampling(problem, 1, random_state=algorithm.random_state)  # whether the problem has such subsets
     few = {
         key: min(value, TRIAL_POPULATION) if key in MOST and isinstance(value, int) else value
         for key, value in config.parameters.items()
@@ -654,9 +657,17 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None
         ):
             warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
             algorithm = small.build(config.merged_values[0])
+            if sampling := _sized_sampling(algorithm):
+                sampling.size = None  # meant for the problems, on which it was tried
             result = minimize(trial, algorithm, ("n_gen", TRIAL_GENERATIONS), seed=1, copy_algorithm=False)
             if result.opt is not None and result.opt.get("F").shape[1:] != (2,):  # None: nothing feasible yet
                 raise ValueError("its result is no front of (error, triangles)")
+
+
+def _sized_sampling(algorithm: Any) -> RandomSubset | None:
+    """Return what makes an algorithm's first population, if it makes subsets of sizes that were asked for."""
+    sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
+    return sampling if isinstance(sampling, RandomSubset) else None
 
 
 # ------------------------------------------------------------------------------------------- classes by name
