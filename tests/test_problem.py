@@ -13,6 +13,7 @@ from pymoo.algorithms.soo.nonconvex.ga import BGA, GA
 from pymoo.algorithms.soo.nonconvex.ga_niching import NicheGA
 from pymoo.algorithms.soo.nonconvex.random_search import RandomSearch
 from pymoo.core.population import Population
+from pymoo.core.problem import ElementwiseEvaluationFunction
 from pymoo.indicators.hv import HV
 from pymoo.operators.crossover.ux import UX
 from pymoo.operators.mutation.bitflip import BitflipMutation
@@ -77,6 +78,50 @@ def test_the_other_quality_numbers_come_along(problem):
         quality = problem.quality(kept)
         for key in ("vertices", "mean_error", "rms_error", "max_error", "uncovered"):
             assert out[key][i] == pytest.approx(getattr(quality, key))
+
+
+@pytest.mark.parametrize("arguments", [{}, {"max_triangles": 30, "max_error": 2.0}, {"regions": 5}, {"memo": 0}])
+def test_one_chromosome_gets_what_it_gets_among_many_to_the_type(arguments):
+    problem = MeshProblem("peaks:6", **arguments)
+    X = np.vstack([subsets(problem, 4), np.zeros(36, bool)])
+    values = {"return_as_dictionary": True, "return_values_of": ["F", "G", "H"]}
+    together = problem.evaluate(X, **values)
+    for i, kept in enumerate(X):
+        alone = problem.evaluate(kept, **values)
+        assert alone.keys() == together.keys()
+        for name, column in together.items():
+            np.testing.assert_array_equal(alone[name], column[i])
+            assert type(alone[name]) is type(column[i])
+            assert alone[name].dtype == column[i].dtype
+
+
+@pytest.mark.parametrize("part", ["runner", "callback", "nan", "function"])
+def test_whoever_takes_part_in_evaluating_is_asked_for_one_chromosome_too(part):
+    asked = []
+
+    class Runner(ThreadRunner):
+        def __call__(self, f, X):
+            asked.append(len(X))
+            return super().__call__(f, X)
+
+    class Function(ElementwiseEvaluationFunction):
+        def __init__(self, *args):
+            asked.append(1)
+            super().__init__(*args)
+
+    options = {
+        "runner": {"elementwise_runner": Runner(1)},
+        "callback": {"callback": lambda X, out: asked.append(len(X))},
+        "nan": {"replace_nan_values_by": 7.0},
+        "function": {"elementwise_func": Function},
+    }
+    problem = MeshProblem("peaks:6", **options[part])
+    if part == "nan":
+        problem.outcome = lambda row: {"F": [np.nan, 1.0]}
+    out = problem.evaluate(problem.pinned, return_as_dictionary=True, return_values_of=["F"])
+    assert out["F"].tolist() == [7.0, 1.0] if part == "nan" else asked == [1]
+    with pytest.raises(AssertionError, match="Input dimension 5"):
+        problem.evaluate(np.ones(5, bool), return_as_dictionary=True, return_values_of=["F"])
 
 
 def test_a_known_chromosome_is_not_triangulated_again(monkeypatch):

@@ -55,7 +55,7 @@ from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.problem import MeshProblem, minimises_one_number
 from meshsimp_pymoo.search.checkpoint import Checkpoints, NotResumable
-from meshsimp_pymoo.search.operators import OPERATORS
+from meshsimp_pymoo.search.operators import OPERATORS, RandomSubset
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
@@ -702,7 +702,11 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
     value, built, reason = config.merged_values[0], [problem.build() for problem in problems], ""
     for entry, problem in zip(problems, built, strict=True):
         with _blaming(what=f"the algorithm {config.name!r} cannot be used on the problem {entry.name!r}"):
-            config.build(value).setup(config.searched(problem, value), termination=("n_gen", 1), seed=1)
+            for one in config.merged_values:
+                searched = config.searched(problem, one)
+                algorithm = config.build(one).setup(searched, termination=("n_gen", 1), seed=1)
+                if sampling := _sized_sampling(algorithm):
+                    sampling(searched, 1, random_state=algorithm.random_state)  # whether it has such subsets
     few = {
         key: min(number, TRIAL_POPULATION) if key in MOST and isinstance(number, int) else number
         for key, number in config.parameters.items()
@@ -719,6 +723,8 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
             warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
             searched = config.searched(trial, value)
             algorithm = small.build(value)
+            if sampling := _sized_sampling(algorithm):
+                sampling.size = None  # meant for the problems, on which it was tried
             if searched.n_obj > 1 and minimises_one_number(algorithm):
                 way_out = f"as in merged_over: {{{WEIGHT}: [0, 0.5, 1]}}, and it searches the weighted sum"
                 raise ValueError(f"it minimises one number; give it weights of the error, {way_out}")
@@ -744,6 +750,12 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
             if algorithm.opt is not None and algorithm.opt.get("F").shape[1:] != (searched.n_obj,):
                 raise ValueError("its result is no front of (error, triangles)")
     return reason
+
+
+def _sized_sampling(algorithm: Any) -> RandomSubset | None:
+    """Return what makes an algorithm's first population, if it makes subsets of sizes that were asked for."""
+    sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
+    return sampling if isinstance(sampling, RandomSubset) else None
 
 
 # ------------------------------------------------------------------------------------------- classes by name

@@ -8,9 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.algorithms.moo.moead import MOEAD
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.individual import Individual
+from pymoo.core.mating import Mating
 from pymoo.core.problem import Problem
 
-from meshsimp_pymoo.search.operators import PackedDuplicates, SubsetUniformCrossover
+from meshsimp_pymoo.search.operators import NeighbourShift, PackedDuplicates, PinnedCorners, SubsetUniformCrossover
+from meshsimp_pymoo.search.operators.neighbour_shift import shift_drawn
+from meshsimp_pymoo.search.operators.subset_uniform_crossover import from_either
 from meshsimp_pymoo.search.paper import CROSSOVER_PROBABILITY, GENERATIONS, POP_SIZE, paper_operators
 from meshsimp_pymoo.search.requirements import require_probability
 from meshsimp_pymoo.search.selection import objectives
@@ -35,8 +40,8 @@ def moead(
         Number of sub-problems: weight vectors (i / (n - 1), 1 - i / (n - 1)), at least 2.
     normalised : bool
         False: the raw objectives, as in the paper. The error (in file units) and the number of triangles then
-        have the influence that their units happen to give them. True: both are divided by their range in the
-        initial population, which random subsets of all sizes spread over nearly the whole front.
+        have the influence that their units happen to give them. True: both are divided by their ranges, from the
+        best value found so far to the worst in the population, anew in each generation (Zhang and Li 2007, Sec. V).
     n_neighbors : int
         Size of the neighbourhood, the sub-problem itself included.
     prob_neighbor_mating : float
@@ -65,12 +70,31 @@ class TchebycheffMOEAD(MOEAD):
 
     Sub-problem i minimises max_j w_ij |f_j - z_j| / s_j: w the weight vectors (i / (n - 1), 1 - i / (n - 1)),
     z the best value of each objective found so far (at first, in the initial population), s = 1 (the raw
-    objectives) or the ranges of the initial population. In each generation every sub-problem, in random
-    order, makes one child of two different neighbours; the child replaces whatever it is not worse than in
-    the whole neighbourhood.
+    objectives) or their ranges now. In each generation every sub-problem, in random order, makes one child of two
+    different neighbours; the child replaces whatever it is not worse than in the whole neighbourhood.
+
+    What of it is the paper's (Sec. 3.5, 3.8):
+
+    * z begins as the best of the initial population, W = 20 neighbours, weights as in Zhang and Li, ``<=`` in the
+      replacement of neighbours: as printed.
+    * Eq. 7 prints the minimum over the weighted distances; it is the maximum, as in Zhang and Li, or the better
+      objective alone would count.
+    * "If z_j < f_j(y') then set z_j = f_j(y')" is the rule of Zhang and Li, who maximise; where both objectives are
+      minimised z falls.
+    * The paper's crossover makes two offspring and its update takes one y; here one is made. The paper serves the
+      sub-problems in the order of their weights, here the order is random, as in pymoo. Its two indices from the
+      neighbourhood may coincide, these do not.
+
+    **Ranges.** ``normalised=True`` divides by s = (worst value in the population) - z, with the population and z at the
+    beginning of each generation, as Zhang and Li do ("the largest value of f_i in the current population" for the
+    nadir point). The range follows the front wherever the search began: random subsets of a single size vary in the
+    number of triangles by ten or so, and a range that stays there lets the triangles decide everything.
 
     Differences from pymoo's ``MOEAD``, whose interface it keeps (``ask`` gives one individual at a time):
 
+    * ``next`` does a generation, not one sub-problem; with the paper's operators, whose random numbers do not depend
+      on the parents, it draws for a generation at once and makes the children without populations around them: the
+      same children as one gets by ``ask``;
     * operators are told the ``algorithm``, its ``evaluator`` and the ``score`` that the sub-problem
       minimises, so that `OAX` works, and works on that;
     * it can be pickled at any time, in the middle of a generation too;
@@ -81,7 +105,7 @@ class TchebycheffMOEAD(MOEAD):
     pop_size : int
         Number of sub-problems, at least 2.
     normalised : bool
-        Whether to divide the objectives by their ranges in the initial population.
+        Whether to divide the objectives by their ranges, those at the beginning of each generation.
     n_neighbors : int
         Size of the neighbourhood, the sub-problem itself included, at least 2.
     prob_neighbor_mating : float
@@ -126,6 +150,10 @@ class TchebycheffMOEAD(MOEAD):
         self.order: NDArray[np.int64] = np.empty(0, dtype=np.int64)
         self.parents: NDArray[np.int64] = np.empty((0, 2), dtype=np.int64)
         self.position = 0
+        # What was drawn for it: which genes children take from the second parent (packed), where the moves of each
+        # child begin, and the moves. Empty where operators are asked child by child.
+        self.from_second: NDArray[np.uint8] = np.empty((0, 0), dtype=np.uint8)
+        self.moves: tuple[NDArray[np.int64], ...] = ()
 
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         if problem.has_constraints():
@@ -147,14 +175,41 @@ class TchebycheffMOEAD(MOEAD):
                 "give as many as pop_size"
             )
         super()._initialize_advance(infills, **kwargs)
-        if self.normalised:
-            extent = np.ptp(self.pop.get("F"), axis=0)
-            self.scale = np.where(extent > 0, extent, 1.0)
 
-    def _infill(self) -> Any:
+    def next(self) -> None:
+        """Do the rest of a generation: all sub-problems that have not been served."""
+        if self.is_initialized:
+            if self.position == len(self.order):
+                self._begin_generation()
+            # whoever takes part in evaluating is shown every child as pymoo shows it
+            alone = type(self.evaluator) is Evaluator and self.evaluator.callback is None and self.archive is None
+            while self.position < len(self.order) - 1:
+                if alone and self.moves:
+                    self._serve()
+                else:
+                    super().next()
+        super().next()
+
+    def _serve(self) -> None:
+        """Do what ``super().next()`` does before the end of a generation, at a third of the time."""
+        child, evaluator = self._infill(), self.evaluator
+        out = self.problem.evaluate(
+            child.X, return_values_of=evaluator.evaluate_values_of, return_as_dictionary=True, algorithm=self
+        )
+        for name, value in out.items():
+            child.set(name, value)
+        child.evaluated.update(out)
+        child.set("n_gen", self.n_iter)
+        child.set("n_iter", self.n_iter)
+        evaluator.n_eval += 1
+        self._advance(child)
+
+    def _infill(self) -> Individual:
         if self.position == len(self.order):
             self._begin_generation()
         pair = self.pop[self.parents[self.position]]
+        if self.moves:
+            return Individual(X=self._child(*[parent.X for parent in pair]))
         children = self.mating.do(
             self.problem,
             self.pop,
@@ -166,7 +221,17 @@ class TchebycheffMOEAD(MOEAD):
             evaluator=self.evaluator,
             score=partial(self.tchebycheff, subproblems=self.order[self.position]),
         )
-        return children[0]
+        child: Individual = children[0]
+        return child
+
+    def _child(self, first: NDArray[np.bool_], second: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return the child, (N,), of two parents by the paper's operators, with what was drawn for it."""
+        starts, vertex, target = self.moves
+        child = from_either(first, second, self.from_second[self.position])
+        mine = slice(*starts[self.position : self.position + 2])
+        shift_drawn(child, vertex[mine], target[mine])
+        child |= self.problem.pinned
+        return child
 
     def _begin_generation(self) -> None:
         rng, n = self.random_state, len(self.pop)
@@ -179,8 +244,26 @@ class TchebycheffMOEAD(MOEAD):
         self.parents = np.column_stack([one, other])
         near = self.neighbors[self.order[local]]
         self.parents[local] = np.take_along_axis(near, self.parents[local], axis=1)
+        if self.normalised:
+            extent = objectives(self.pop).max(axis=0) - self.ideal
+            self.scale = np.where(extent > 0, extent, 1.0)
+        if self._draws_ahead():
+            self.from_second = self.mating.crossover.draw(n, self.problem.n_var, rng)
+            self.moves = self.mating.mutation.draw(self.problem, n, rng)
+
+    def _draws_ahead(self) -> bool:
+        """Whether children are made by the paper's operators and nothing else."""
+        mating = self.mating
+        operators = (mating.crossover, mating.mutation, mating.repair)
+        return (
+            type(mating) is Mating
+            and tuple(map(type, operators)) == (SubsetUniformCrossover, NeighbourShift, PinnedCorners)
+            and mating.crossover.n_offsprings == 1
+            and all(operator.repair is None and operator.vtype is None for operator in operators)
+        )
 
     def _advance(self, infills: Any = None, **kwargs: Any) -> bool:
+        # the paper prints z_j < f_j, the rule for maximising
         self.ideal = np.minimum(self.ideal, infills.F)
         self._replace(self.order[self.position], infills)
         self.position += 1
@@ -201,7 +284,9 @@ class TchebycheffMOEAD(MOEAD):
         (n,) float array
             max_j w_j |f_j - z_j| / s_j.
         """
-        return np.max(np.abs(F - self.ideal) * (self.ref_dirs[subproblems] / self.scale), axis=1)
+        # the paper prints min_j, which Zhang and Li, its source, have not
+        weighted = np.abs(F - self.ideal) * (self.ref_dirs[subproblems] / self.scale)
+        return np.maximum(weighted[:, 0], weighted[:, 1])
 
     def _replace(self, k: int, off: Any) -> None:
         neighbors = self.neighbors[k]

@@ -103,6 +103,25 @@ def test_an_algorithm_by_import_path_gets_the_papers_operators_and_those_that_ar
     assert described["duplicates"]["class"].endswith("PackedDuplicates")
 
 
+@pytest.mark.parametrize(
+    ("spelled", "size"), [("0.2", 0.2), ("9", 9), ("1.0", 1.0), ("[5, 9]", [5, 9]), ("[5, 0.5]", [5, 0.5])]
+)
+def test_the_size_of_the_first_subsets_is_a_setting(tmp_path, spelled, size):
+    operators = f"operators: {{sampling: {{name: random_subset, size: {spelled}}}}}"
+    lines = f"[{{preset: nsga2_v1, {operators}}}, {{class: pymoo.algorithms.moo.spea2.SPEA2, {operators}}}]"
+    for algorithm in read_experiment_file(changed(tmp_path, algorithms=lines)).algorithms:
+        described = algorithm.description()["settings"]["sampling"]
+        assert described == {"class": "meshsimp_pymoo.RandomSubset", "size": size}
+        assert type(described["size"]) is type(size)
+
+
+def test_a_size_that_a_problem_has_not_is_refused_before_anything_runs(tmp_path):
+    lines = "[{preset: moead, operators: {sampling: {name: random_subset, size: 400}}}]"
+    said = message(changed(tmp_path, algorithms=lines))
+    assert "algorithms[0]" in said
+    assert "size=400 asks for 400 of" in said
+
+
 def test_reference_directions_are_given_as_a_number(tmp_path):
     spelled = "[{name: N3, class: pymoo.algorithms.moo.nsga3.NSGA3, parameters: {ref_dirs: 5}}]"
     (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms

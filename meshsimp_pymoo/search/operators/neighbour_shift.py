@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
+from pymoo.core.variable import get
 
 from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool, require_probability, surface_of
 
@@ -71,6 +72,37 @@ class NeighbourShift(Mutation):
             shift_kept(shifted[start : start + rows], pinned, rate, neighbours, random_state)
         return shifted
 
+    def draw(self, problem: Any, n: int, random_state: np.random.Generator) -> tuple[NDArray[np.int64], ...]:
+        """Draw the moves that vertices of n solutions will try, before it is known which vertices they keep.
+
+        For an algorithm that makes one child after the other, but draws for all of them at once; with `shift_drawn`
+        it is the mutation itself, the numbers only drawn in another order.
+
+        Parameters
+        ----------
+        problem : MeshProblem
+            The problem being solved.
+        n : int
+            Number of solutions.
+        random_state : numpy.random.Generator
+            Source of randomness.
+
+        Returns
+        -------
+        starts : (n + 1,) int array
+            Where the moves of each solution begin; at last, where they end.
+        vertex, target : (k,) int arrays
+            From where to where, in ascending order of the vertex within a solution; neither is pinned.
+        """
+        pinned = pinned_vertices(problem, self)
+        neighbours = surface_of(problem, self).neighbours if self.along == "mesh" else None
+        rate = float(self.get_prob_var(problem))
+        row, vertex = np.divmod(bernoulli_positions(n * len(pinned), rate, random_state), len(pinned))
+        target = drawn_targets(vertex, len(pinned), neighbours, random_state)
+        is_mutated = random_state.random(n) <= get(self.prob, size=n)
+        possible = is_mutated[row] & ~pinned[vertex] & ~pinned[target]
+        return np.searchsorted(row[possible], np.arange(n + 1)), vertex[possible], target[possible]
+
 
 def shift_kept(
     X: NDArray[np.bool_],
@@ -101,19 +133,7 @@ def shift_kept(
     if not movable.any():
         return
     row, vertex = row[movable], vertex[movable]
-
-    if neighbours is None:
-        target = vertex + np.where(rng.random(len(vertex)) < 0.5, -1, 1)
-        target[target < 0] = 1
-        target[target == n_vertices] = n_vertices - 2
-    else:
-        indptr, indices = neighbours
-        degree = indptr[vertex + 1] - indptr[vertex]
-        chosen = (rng.random(len(vertex)) * degree).astype(np.int64)
-        connected = degree > 0
-        row, vertex, chosen = row[connected], vertex[connected], chosen[connected]
-        target = indices[indptr[vertex] + chosen].astype(np.int64)
-
+    target = drawn_targets(vertex, n_vertices, neighbours, rng)
     free = ~(X[row, target] | pinned[target])
     row, vertex, target = row[free], vertex[free], target[free]
     if len(row) > 1:
@@ -121,6 +141,36 @@ def shift_kept(
         row, vertex, target = row[first], vertex[first], target[first]
     X[row, vertex] = False
     X[row, target] = True
+
+
+def shift_drawn(kept: NDArray[np.bool_], vertex: NDArray[np.int64], target: NDArray[np.int64]) -> None:
+    """Make the moves that `NeighbourShift.draw` has drawn for a solution (N,), in place, by the rules of the class."""
+    possible = kept[vertex] & ~kept[target]
+    if possible.any():
+        # the first to choose a position gets it
+        target, first = np.unique(target[possible], return_index=True)
+        kept[vertex[possible][first]] = False
+        kept[target] = True
+
+
+def drawn_targets(
+    vertex: NDArray[np.int64],
+    n_vertices: int,
+    neighbours: tuple[NDArray[np.integer], NDArray[np.integer]] | None,
+    rng: np.random.Generator,
+) -> NDArray[np.int64]:
+    """Draw a neighbour of each vertex, (k,), uniformly; a vertex without any gets itself."""
+    if neighbours is None:
+        target = vertex + np.where(rng.random(len(vertex)) < 0.5, -1, 1)
+        target[target < 0] = 1
+        target[target == n_vertices] = n_vertices - 2
+        return target
+    indptr, indices = neighbours
+    degree = indptr[vertex + 1] - indptr[vertex]
+    chosen = (rng.random(len(vertex)) * degree).astype(np.int64)
+    target, connected = vertex.copy(), degree > 0
+    target[connected] = indices[indptr[vertex[connected]] + chosen[connected]]
+    return target
 
 
 def bernoulli_positions(n: int, rate: float, rng: np.random.Generator) -> NDArray[np.int64]:
