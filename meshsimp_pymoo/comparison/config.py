@@ -18,7 +18,7 @@
     budgets: [{generations: 50}, {evaluations: 5000}, {seconds: 10}]
     baselines: [thinning, meshlab]        # optional; names in baselines.BASELINES, groups of them, or true for all
 
-`read_experiment_file` reads it, opens every model, builds every algorithm and lets it run for two generations
+`read_experiment_file` reads it, opens every model, builds every algorithm and lets it run for three generations
 on a tiny model, so that whatever is wrong is known before the first run. Every mistake is a `ConfigError` of
 one line: file, line, place, value, what was expected. The file is data: only plain YAML is understood.
 """
@@ -124,7 +124,8 @@ BUDGET_KINDS = ("generations", "evaluations", "seconds")
 # Every algorithm is tried out on this model, and on problems that are even smaller.
 TRIAL_MODEL = "pyramid:9"
 TRIAL_VERTICES = 81
-TRIAL_GENERATIONS = 2
+# Local searches sample in the first, and begin after the second.
+TRIAL_GENERATIONS = 3
 # What a trial finds out does not depend on a large population; its time does.
 TRIAL_POPULATION = 100
 # Settings of an algorithm that do not change what it finds.
@@ -445,6 +446,11 @@ class AlgorithmConfig(Part):
                 for name, value in arguments.items():
                     for one in value if arguments is self.merged_over else [value]:
                         _argument(name, one)
+        if "automated_dm" in (_parameters(self.target) or ()):
+            name = self.path.rpartition(".")[2]
+            raise _Mistake(
+                f"{name} asks a person between generations, and an experiment has none; use it in Python", "class"
+            )
         if self.merged_parameter in self.parameters:
             way_out = f"{self.merged_parameter!r} is in 'parameters' too; give it in one place"
             raise _Mistake(way_out, "merged_over", self.merged_parameter)
@@ -557,7 +563,7 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
     Raises
     ------
     ConfigError
-        If anything in it is wrong; nothing has been run then but two generations on a tiny model.
+        If anything in it is wrong; nothing has been run then but three generations on a tiny model.
     """
     path = Path(path)
     source = _Source(path)
@@ -747,7 +753,7 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
                     keeper.check()
             except NotResumable as problem:
                 reason = str(problem)
-            if algorithm.opt is not None and algorithm.opt.get("F").shape[1:] != (searched.n_obj,):
+            if algorithm.opt is None or algorithm.opt.get("F").shape[1:] != (searched.n_obj,):
                 raise ValueError("its result is no front of (error, triangles)")
     return reason
 
