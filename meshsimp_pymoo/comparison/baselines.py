@@ -70,9 +70,10 @@ NEAR, NEAR_SHARE = 2, 0.002
 # Meshes that a tool makes at most for one size.
 TRIES = 16
 
-# Of a whole front at most so many meshes are stored, each of them of so much more triangles than the one before
-# that the steps between them hardly show: 2 % where the largest has 500 times the triangles of the smallest.
-MOST_ROWS = 300
+# Of a whole front so many meshes are stored at most, and the sizes that were asked for. From each to the next the
+# triangles grow by the same share, by which an epsilon can be too large: 2 % where the largest mesh has 20 000 times the
+# triangles of the smallest.
+MOST_ROWS = 500
 
 
 @dataclass(frozen=True)

@@ -13,19 +13,17 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from meshsimp_pymoo.comparison import meshlab
+from meshsimp_pymoo.comparison.baselines import BASELINES, BaselineMesh, baseline_meshes, reductions
 from meshsimp_pymoo.comparison.meshlab import (
     CLUSTERING,
-    MESHLAB_METHODS,
     QUADRIC,
-    BaselineMesh,
-    MeshLabUnavailable,
     meshlab_available,
-    meshlab_front,
     quadric_collapse,
-    reductions,
     vertex_clustering,
 )
-from meshsimp_pymoo.errors import way_to_install
+from meshsimp_pymoo.errors import ToolUnavailable, way_to_install
+
+MESHLAB_METHODS = {name: known.tool.args[0] for name, known in BASELINES.items() if known.group == "meshlab"}
 
 SIDE = 21
 
@@ -50,8 +48,8 @@ VERTICES, FACES = hills()
 def pymeshlab():
     """Import pymeshlab as the package does; the reason of a skip names the packages to install."""
     try:
-        return meshlab._pymeshlab()
-    except MeshLabUnavailable as reason:
+        return meshlab.load_pymeshlab()
+    except ToolUnavailable as reason:
         pytest.skip(str(reason))
 
 
@@ -242,81 +240,17 @@ def test_meshlabs_own_collapse_abandons_the_border_and_the_unit_matters(shared_m
     assert score("quadric_collapse_boundary")[1] == 0
 
 
-@pytest.fixture(scope="module")
-def surface():
-    from meshsimp_pymoo.formats.source import SourceMesh
-    from meshsimp_pymoo.surface.height import HeightSurface
-    from meshsimp_pymoo.surface.model import build_model
-
-    points = np.add(VERTICES, [5e5, 4e6, 0])
-    return HeightSurface(build_model(SourceMesh(points=points, faces=FACES, attributes={}, name="hills")))
-
-
 @pytest.mark.usefixtures("pymeshlab")
-class TestFront:
-    def test_scores_every_mesh_of_every_method_as_the_referee_does(self, surface, vertical_error):
-        front = meshlab_front(surface, (400, 120))
-        assert [(mesh.method, mesh.asked) for mesh in front] == [
-            (name, asked) for name in MESHLAB_METHODS for asked in (400, 120)
-        ]
-        for mesh in front:
-            error, uncovered, _ = vertical_error(surface.model.file_points, mesh.vertices, mesh.faces)
-            assert_allclose(mesh.quality.error, error, rtol=1e-6)
-            assert mesh.quality.uncovered == uncovered
-            assert mesh.quality.triangles == mesh.triangles == len(mesh.faces)
-            assert mesh.seconds > 0
+def test_every_mesh_is_scored_as_the_referee_does(shared_data, vertical_error):
+    from meshsimp_pymoo.opening import open_model
+    from meshsimp_pymoo.surface.height import HeightSurface
 
-    def test_ignoring_what_is_uncovered_costs_no_more(self, surface):
-        from meshsimp_pymoo.surface.height import HeightSurface
-        from meshsimp_pymoo.surface.rules import Rules
-
-        ignoring = HeightSurface(surface.model, Rules(outside="ignore"))
-        for strict, lenient in zip(meshlab_front(surface, [100]), meshlab_front(ignoring, [100]), strict=True):
-            assert_array_equal(strict.faces, lenient.faces)
-            assert lenient.quality.error <= strict.quality.error
-            assert (lenient.quality.error < strict.quality.error) == (strict.quality.uncovered > 0)
-
-    def test_agrees_with_the_referee_on_a_bust(self, shared_data, vertical_error):
-        from meshsimp_pymoo.opening import open_model
-        from meshsimp_pymoo.surface.height import HeightSurface
-
-        bust = HeightSurface(open_model(shared_data / "m1_laurana.ply"))
-        for mesh in meshlab_front(bust, [1000, 300]):
+    bust = HeightSurface(open_model(shared_data / "m1_laurana.ply"))
+    for name in MESHLAB_METHODS:
+        for mesh in baseline_meshes(bust, name, [1000, 300]):
             error, uncovered, _ = vertical_error(bust.model.file_points, mesh.vertices, mesh.faces)
             assert_allclose(mesh.quality.error, error, rtol=1e-6)
             assert mesh.quality.uncovered == uncovered
-
-    def test_refuses_everything_before_it_computes_anything(self, surface, monkeypatch):
-        monkeypatch.setattr(meshlab, "_filtered", None)
-        with pytest.raises(TypeError, match="meshlab_front: a OpenModel has no rules; give a surface"):
-            meshlab_front(surface.model, [4])
-        with pytest.raises(ValueError, match="unknown MeshLab method 'qem': choose among quadric_collapse, "):
-            meshlab_front(surface, [100], methods=("quadric_collapse", "qem"))
-        with pytest.raises(ValueError, match="801 triangles were asked for"):
-            meshlab_front(surface, [100, 801])
-
-
-class TestReductions:
-    def test_are_the_papers_ten(self):
-        assert reductions(200) == (190, 180, 170, 160, 150, 140, 130, 120, 110, 100)
-
-    def test_go_on_down_to_a_given_size(self):
-        series = reductions(1667, down_to=12)
-        assert len(series) == 20
-        assert series[:10] == reductions(1667)
-        assert series[-1] == 12
-        ratios = np.divide(series[10:], series[9:-1])
-        assert_allclose(ratios, ratios[0], rtol=0.05)
-
-    def test_never_repeat_a_number_and_never_ask_for_nothing(self):
-        assert reductions(6, down_to=1) == (6, 5, 4, 3, 2, 1)
-        assert reductions(1) == (1,)
-        assert reductions(100, down_to=70) == reductions(100)
-
-    @pytest.mark.parametrize("wrong", [{"triangles": 0}, {"triangles": 9, "down_to": 0}])
-    def test_refuse_nonsense(self, wrong):
-        with pytest.raises(ValueError, match="at least 1"):
-            reductions(**wrong)
 
 
 class TestWhereMeshLabIsMissing:
@@ -339,7 +273,7 @@ import meshsimp_pymoo.comparison.meshlab as meshlab
 assert not meshlab.meshlab_available()
 try:
     meshlab.quadric_collapse([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], 1, preserve_boundary=True)
-except ImportError as error:
+except meshlab.ToolUnavailable as error:
     print(error)
 """
 
