@@ -618,7 +618,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(tmp_path, capsy
         (("--moves", "0"), r"'0' is not a whole number of at least 1"),
         (
             ("--moves", "9", "--algorithm", "moead"),
-            r"for --algorithm memetic, .* give moead --generations or --evaluat",
+            r"for --algorithm memetic, .* give moead --generations, --evalua",
         ),
         (("--evaluations", "many"), r"'many' is not a whole number of at least 1"),
         (("--population", "1"), r"'1' is not a whole number of at least 2"),

@@ -31,7 +31,7 @@ from meshsimp_pymoo.cli.terminal import (
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
-from meshsimp_pymoo.formats.table import format_to_write
+from meshsimp_pymoo.formats.table import format_to_write, listed
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.budgets import Moves, WholeGenerations, moves_of, spread
@@ -132,10 +132,10 @@ def _check_budget(search: Search) -> None:
         movers = [name for name, preset in PRESETS.items() if "moves" in preset.measured_by]
         raise UsageError(
             f"--moves is for --algorithm {' or '.join(movers)}, whose annealing makes them; give {search.algorithm} "
-            f"{' or '.join(f'--{kind}' for kind in (*measured_by, 'time'))}"
+            f"{listed((f'--{kind}' for kind in (*measured_by, 'time')), 'or')}"
         )
     if search.evaluations is not None and "evaluations" not in measured_by:
-        way_out = " or ".join(f"--{kind}" for kind in (*measured_by, "time"))
+        way_out = listed((f"--{kind}" for kind in (*measured_by, "time")), "or")
         say(f"warning: evaluations do not measure {search.algorithm}, whose children cost any work; use {way_out}")
 
 

@@ -15,7 +15,7 @@
         operators: {crossover: {name: oax, arrays: L4}}    # keys of operators.OPERATORS, or import paths
         merged_over: {w: [0, 0.5, 1]}     # one run for each value, merged to one front for each seed
     seeds: [1, 2, 3]
-    budgets: [{generations: 50}, {evaluations: 5000}, {seconds: 10}]
+    budgets: [{generations: 50}, {evaluations: 55000, shared: true}, {moves: 1000000}, {seconds: 10}]
     baselines: [thinning, meshlab]        # optional; names in baselines.BASELINES, groups of them, or true for all
 
 `read_experiment_file` reads it, opens every model, builds every algorithm and lets it run for three generations
@@ -53,10 +53,11 @@ from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.errors import InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.problem import MeshProblem, minimises_one_number
 from meshsimp_pymoo.search.checkpoint import Checkpoints, NotResumable
 from meshsimp_pymoo.search.operators import OPERATORS, RandomSubset
-from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.search.presets import PRESETS, Preset
 from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -120,7 +121,7 @@ BASES = {
     "repair": "pymoo.core.repair.Repair",
     "duplicates": "pymoo.core.duplicate.DuplicateElimination",
 }
-BUDGET_KINDS = ("generations", "evaluations", "seconds")
+BUDGET_KINDS = ("generations", "evaluations", "moves", "seconds")
 # Every algorithm is tried out on this model, and on problems that are even smaller.
 TRIAL_MODEL = "pyramid:9"
 TRIAL_VERTICES = 81
@@ -362,6 +363,11 @@ class AlgorithmConfig(Part):
         return self.own_name or self.preset or self.path.rpartition(".")[2]
 
     @property
+    def measured_by(self) -> tuple[str, ...]:
+        """The kinds of budget that fit it: what measures its work, and seconds."""
+        return (*(PRESETS[self.preset] if self.preset else Preset).measured_by, "seconds")
+
+    @property
     def target(self) -> Any:
         """The function or class that makes it."""
         return PRESETS[self.preset].function if self.preset else _imported(self.path)
@@ -464,18 +470,23 @@ class AlgorithmConfig(Part):
 
 
 class Budget(Part):
-    """When a run ends: after the generation that reaches a number of generations, of evaluations, or of seconds."""
+    """When a run ends: after the generation that reaches a number of generations, evaluations, moves or seconds.
+
+    A shared one is divided among the values of `AlgorithmConfig.merged_over`, whose runs make one front.
+    """
 
     one_of = {kind: kind for kind in BUDGET_KINDS}
     own_name: Name = Field("", alias="name")
     generations: Count = 0
     evaluations: Count = 0
+    moves: Count = 0
     seconds: Annotated[float, _of(Real(0, strict=True))] = 0
+    shared: bool = Field(False, strict=True)
 
     @property
     def name(self) -> str:
         """What tables call it."""
-        return self.own_name or f"{self.amount:g} {self.kind}"
+        return self.own_name or f"{self.amount:.15g} {self.kind}{', shared' if self.shared else ''}"
 
     @property
     def kind(self) -> str:
@@ -486,6 +497,11 @@ class Budget(Part):
     def amount(self) -> float:
         """How many of them."""
         return getattr(self, self.kind)
+
+    def of_each(self, n_values: int) -> Budget:
+        """Return the budget of each of several runs that make one front: its share of a shared one, else all of it."""
+        share = self.amount / n_values if self.kind == "seconds" else max(self.amount // n_values, 1)
+        return self.model_copy(update={"own_name": self.name, self.kind: share}) if self.shared else self
 
 
 def _baselines(given: Any) -> tuple[str, ...]:
@@ -532,6 +548,16 @@ class _File(Part):
     seeds: Different[Annotated[int, _of(Whole(0))]]
     budgets: Different[Budget]
     baselines: Annotated[BaselinesConfig | None, _of(BaselinesConfig.read)] = None
+
+    @model_validator(mode="after")
+    def _every_algorithm_has_a_budget(self) -> _File:
+        for place, algorithm in enumerate(self.algorithms):
+            if not any(budget.kind in algorithm.measured_by for budget in self.budgets):
+                way_out = "add one under 'budgets', such as {seconds: 10}"
+                kinds = listed(algorithm.measured_by, "or")
+                reason = f"no budget fits {algorithm.name}, whose work is measured by {kinds}"
+                raise _Mistake(f"{reason}; {way_out}", "algorithms", place)
+        return self
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

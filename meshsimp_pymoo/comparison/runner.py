@@ -4,7 +4,8 @@ A *task* is one algorithm on one problem with one seed (and, for an algorithm wh
 of the merged parameter). It makes one *run* for each budget. The runs of a preset are moments of one search:
 the first 25 generations of a search of 50 are a search of 25. An algorithm given by import path may look at
 its budget (some adapt to the share of it that is left), so there each budget is a search of its own; and so
-is every budget in seconds.
+is every budget in seconds or moves. A budget that does not measure an algorithm's work (evaluations, of `memetic`)
+is left out for it, with a line.
 
 Each run is written as soon as it is finished, by the process that made it (see `meshsimp_pymoo.comparison.store`), so
 that nothing depends on this process living on. While a search goes on, its state is saved every minute or so (see
@@ -66,8 +67,10 @@ from meshsimp_pymoo.comparison.store import (
 from meshsimp_pymoo.comparison.trace import Trace
 from meshsimp_pymoo.errors import ResultError, ToolUnavailable
 from meshsimp_pymoo.files import locked
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.search.budgets import Moves, moves_of
 from meshsimp_pymoo.search.checkpoint import (
     INTERVAL,
     CheckpointError,
@@ -94,6 +97,9 @@ Progress = Callable[[float, float, str], None]
 OVERHEAD_VERTICES = 600
 # What a second of budget counts as, in the same unit; roughly what a core does.
 WORK_PER_SECOND = 1e7
+# A move of the annealing takes 1.5 microseconds; and what is done besides, about so many evaluations an individual.
+WORK_PER_MOVE = 15.0
+BESIDE_MOVES = 7.0
 # Work of a baseline on a model, in evaluations.
 BASELINE_EVALUATIONS = 2000
 
@@ -150,18 +156,14 @@ class Task:
     def search(self) -> dict[str, Any]:
         """What the search is; the same, whichever of its runs are finished."""
         description: dict[str, Any] = dict(self.descriptions[0])
-        if self.is_shared:
+        if _is_moment(self.algorithm, self.budgets[0]):
             del description["budget"]
         return description
 
-    @property
-    def is_shared(self) -> bool:
-        """Whether all budgets are moments of the same search; else there is but one of them."""
-        return _is_shared(self.algorithm, self.budgets[0])
-
     def without(self, finished: Collection[str]) -> Task:
-        """Return the task without runs that are finished."""
-        left = [k for k, key in enumerate(self.keys) if key not in finished]
+        """Return the task without runs that are finished, and with each of the others once."""
+        keys = self.keys
+        left = [k for k, key in enumerate(keys) if key not in finished and key not in keys[:k]]
         return replace(
             self,
             budgets=tuple(self.budgets[k] for k in left),
@@ -182,7 +184,7 @@ class Done:
     reused : int
         Runs that were there already.
     skipped : tuple of str
-        What could not be done on this machine, and what to install.
+        What was left out, and why: budgets that do not fit an algorithm, and what this machine cannot do.
     """
 
     out: Path
@@ -246,9 +248,9 @@ def run_experiment(
         tasks = plan(experiment)
         finished = _finished(tasks, store)
         content = _content(experiment, tasks, out)
-        write_experiment(out, content | {"classic": [], "skipped": []})
-        missing = [task.without(finished) for task in tasks]
-        missing = [task for task in missing if task.budgets]
+        left_out = _left_out(experiment)
+        write_experiment(out, content | {"classic": [], "skipped": left_out})
+        missing = _missing(tasks, finished)
         n_baselines = len(experiment.problems) * len(experiment.baselines.methods if experiment.baselines else ())
         shown = _Shown(progress, sum(task.work for task in missing) + _baseline_work(experiment))
         at_once = min(jobs, max(len(missing), n_baselines))
@@ -259,7 +261,8 @@ def run_experiment(
             _perform_all(missing, store, engine or own, shown, shared)
             with contextlib.suppress(OSError):
                 shutil.rmtree(out / CHECKPOINTS)
-            rows, skipped, computed = _baselines(experiment, tasks, store, own, shown, shared)
+            rows, not_here, computed = _baselines(experiment, tasks, store, own, shown, shared)
+        skipped = (*left_out, *not_here)
         write_experiment(out, content | {"classic": rows, "skipped": list(skipped)})
         asked = {key for task in tasks for key in task.keys} | {row["key"] for row in rows}
         _name_stale(store, asked)
@@ -334,6 +337,7 @@ def perform(
             terminations = {
                 "generations": MaximumGenerationTermination,
                 "evaluations": MaximumFunctionCallTermination,
+                "moves": Moves,
                 "seconds": TimeBasedTermination,
             }
             termination = terminations[budget.kind](budget.amount)
@@ -369,7 +373,8 @@ def perform(
             ended = not algorithm.has_next()
         seconds = time.perf_counter() - start - set_aside
         generations, evaluations = int(algorithm.n_iter) - 1, int(algorithm.evaluator.n_eval)
-        reached = {"generations": generations, "evaluations": evaluations, "seconds": seconds}
+        moves = moves_of(algorithm)
+        reached = {"generations": generations, "evaluations": evaluations, "moves": moves or 0, "seconds": seconds}
         trace.keep(algorithm, generations, seconds)
         for k in list(left):
             if ended or reached[task.budgets[k].kind] >= task.budgets[k].amount:
@@ -381,6 +386,7 @@ def perform(
                     "budget": task.budgets[k].name,
                     "generations": generations,
                     "evaluations": evaluations,
+                    "moves": moves,
                     "seconds": round(seconds, 4),
                     "trace_seconds": until_now.seconds,
                     "versions": package_versions(),
@@ -389,7 +395,7 @@ def perform(
                 left.remove(k)
         if left and keeper is not None and keeper.due():
             try:
-                keeper.save(seconds=seconds, generations=generations, evaluations=evaluations, trace=trace.plain)
+                keeper.save(**reached, trace=trace.plain)
             except (CheckpointError, NotResumable) as trouble:
                 warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
                 keeper = None
@@ -475,14 +481,38 @@ def _quality_arrays(quality: Sequence[Quality]) -> dict[str, npt.NDArray[Any]]:
 
 
 def _moments(algorithm: AlgorithmConfig, budgets: Sequence[Budget]) -> list[tuple[Budget, ...]]:
-    """Return the budgets that one search can serve, together."""
-    together = tuple(b for b in budgets if _is_shared(algorithm, b))
-    alone = [(b,) for b in budgets if b not in together]
+    """Return the budgets that fit, together where one search can serve them."""
+    fitting = [b.of_each(len(algorithm.merged_values)) for b in budgets if b.kind in algorithm.measured_by]
+    together = tuple(b for b in fitting if _is_moment(algorithm, b))
+    alone = [(b,) for b in fitting if b not in together]
     return ([together] if together else []) + alone
 
 
-def _is_shared(algorithm: AlgorithmConfig, budget: Budget) -> bool:
-    return bool(algorithm.preset) and budget.kind != "seconds"
+def _is_moment(algorithm: AlgorithmConfig, budget: Budget) -> bool:
+    """Tell whether a budget is a moment of one search for all of them: of one that does not look at its budget."""
+    return bool(algorithm.preset) and budget.kind in ("generations", "evaluations")
+
+
+def _left_out(experiment: Experiment) -> list[str]:
+    """Return a line for each algorithm that some budgets do not fit."""
+    lines = []
+    for algorithm in experiment.algorithms:
+        names = [budget.name for budget in experiment.budgets if budget.kind not in algorithm.measured_by]
+        if names:
+            kinds = listed(algorithm.measured_by, "or")
+            lines.append(f"skipped: {algorithm.name} under {listed(names)}: its work is measured by {kinds}")
+    return lines
+
+
+def _missing(tasks: Sequence[Task], finished: Collection[str]) -> list[Task]:
+    """Return what is left to do, each run once: two budgets may come to the same."""
+    known, missing = set(finished), []
+    for task in tasks:
+        left = task.without(known)
+        if left.budgets:
+            missing.append(left)
+            known.update(left.keys)
+    return missing
 
 
 def _work(problem: ProblemConfig, algorithm: AlgorithmConfig, budgets: Sequence[Budget]) -> float:
@@ -492,6 +522,9 @@ def _work(problem: ProblemConfig, algorithm: AlgorithmConfig, budgets: Sequence[
     for budget in budgets:
         if budget.kind == "seconds":
             return WORK_PER_SECOND * budget.amount
+        if budget.kind == "moves":
+            beside = BESIDE_MOVES * population * (problem.model.n_vertices + OVERHEAD_VERTICES)
+            return WORK_PER_MOVE * budget.amount + beside
         one = budget.amount * population if budget.kind == "generations" else budget.amount
         if budget.kind == "generations" and algorithm.preset:
             one *= PRESETS[algorithm.preset].evaluations
@@ -540,7 +573,10 @@ def _content(experiment: Experiment, tasks: Sequence[Task], out: Path) -> dict[s
             for algorithm in experiment.algorithms
         ],
         "seeds": list(experiment.seeds),
-        "budgets": [{"name": budget.name, budget.kind: budget.amount} for budget in experiment.budgets],
+        "budgets": [
+            {"name": budget.name, budget.kind: budget.amount} | ({"shared": True} if budget.shared else {})
+            for budget in experiment.budgets
+        ],
         "baselines": experiment.baselines and dict(experiment.baselines),
         "runs": [
             {

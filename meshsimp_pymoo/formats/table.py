@@ -322,14 +322,14 @@ def _way_out(path: Path) -> str:
     return f"known are {listed(known)}"
 
 
-def listed(words: Iterable[str]) -> str:
+def listed(words: Iterable[str], link: str = "and") -> str:
     """Return words as a text lists them.
 
-    >>> listed(["spacing", "nodata", "window"]), listed(["max_edge"])
+    >>> listed(["spacing", "nodata", "window"]), listed(["max_edge"], "or")
     ('spacing, nodata and window', 'max_edge')
     """
     *others, last = words
-    return f"{', '.join(others)} and {last}" if others else last
+    return f"{', '.join(others)} {link} {last}" if others else last
 
 
 def described(*models: str) -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshsimp_pymoo.comparison.config import PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
+from meshsimp_pymoo.comparison.config import BUDGET_KINDS, PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh
@@ -77,7 +77,7 @@ def test_the_papers_configuration_has_the_papers_numbers():
 def test_the_quick_configuration_names_all_that_can_stand_there():
     words = set(re.findall(r"\w+", (CONFIGS / "quick.yaml").read_text(encoding="utf-8")))
     assert words >= {*PROBLEM_OPTIONS, *PRESETS, *OPERATORS, *(name for kind in OPERATORS.values() for name in kind)}
-    assert words >= {"generations", "evaluations", "seconds"}
+    assert words >= {*BUDGET_KINDS, "shared"}
 
 
 def test_shared_options_hold_for_all_problems_and_a_problem_overrides_them(tmp_path):
@@ -223,7 +223,7 @@ MISTAKES = {
         ["problem.objectives", "two objectives", "nsga3()"],
     ),
     "measure that an algorithm cannot lower": (
-        {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]"},
+        {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]", "budgets": "[{moves: 9}]"},
         ["algorithms[0]", "'memetic' cannot be used on the problem 'A'", "lower a sum"],
     ),
     "weights not in the file": ({"problem": "{weights: sharpness}"}, ["problems[0]", "'sharpness'", "it has: none"]),
@@ -314,6 +314,20 @@ MISTAKES = {
     "two kinds of budget": ({"budgets": "[{generations: 2, seconds: 3}]"}, ["budgets[0]", "one of"]),
     "budget twice": ({"budgets": "[{generations: 2}, {generations: 2}]"}, ["budgets[1]", "'2 generations'"]),
     "budget of nothing": ({"budgets": "[{evaluations: 0}]"}, ["budgets[0].evaluations", "0", "at least 1"]),
+    "budget of half a move": ({"budgets": "[{moves: 0.5}]"}, ["budgets[0].moves", "0.5", "whole number"]),
+    "budget shared in part": ({"budgets": "[{moves: 5, shared: 2}]"}, ["budgets[0].shared", "2", "true or false"]),
+    "no budget for memetic": (
+        {"algorithms": "[nsga2_v1, memetic]", "budgets": "[{generations: 2}, {evaluations: 90}]"},
+        [
+            "line 3",
+            "algorithms[1]",
+            "fits memetic, whose work is measured by moves or seconds; add one under 'budgets'",
+        ],
+    ),
+    "no budget but moves": (
+        {"budgets": "[{moves: 100}]"},
+        ["line 3", "algorithms[0]", "fits N, whose work is measured by generations, evaluations or seconds; add one"],
+    ),
     "budget of no time": ({"budgets": "[{seconds: 0}]"}, ["budgets[0].seconds", "more than 0"]),
     "MeshLab method unknown": (
         {"baselines": "{meshlab: {methods: [quadric_colapse]}}"},

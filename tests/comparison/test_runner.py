@@ -36,6 +36,8 @@ from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.search.budgets import Moves
+from meshsimp_pymoo.search.memetic import memetic
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import DaskEngine
@@ -243,6 +245,73 @@ def test_a_budget_in_seconds_ends(config, tmp_path):
     run = read_run(record_of(tmp_path / "out", algorithm="N1", budget="0.05 seconds"))
     assert run.record["seconds"] >= 0.05
     assert len(run.arrays["F"])
+
+
+def test_budgets_that_do_not_measure_an_algorithm_are_left_out_with_a_line(config, tmp_path):
+    text = CONFIG.replace("seeds: [1, 2, 3]", "seeds: [1, 2]").replace(
+        "{generations: 6}", "{moves: 30000}, {moves: 1000, name: Few}"
+    )
+    config.write_text(
+        text.replace("  - {name: N2, preset: nsga2_v2,", "  - {name: N2, preset: memetic,"), encoding="utf-8"
+    )
+    kinds = "generations, evaluations or seconds"
+    expected = (
+        f"skipped: N1 under 30000 moves and Few: its work is measured by {kinds}",
+        "skipped: N2 under 60 evaluations: its work is measured by moves or seconds",
+        f"skipped: G1 under 30000 moves and Few: its work is measured by {kinds}",
+    )
+    with pytest.warns(ExperimentWarning, match="skipped: ") as caught:
+        done = run_experiment(config, tmp_path / "out")
+    assert done.skipped == expected == tuple(str(warning.message) for warning in caught)
+    assert (done.finished, done.reused) == (2 * 2 * (1 + 2 + 3), 0)
+    problem = MeshProblem("face:90", footprint="hull", outside="ignore")
+    result = minimize(problem, memetic(12), Moves(30_000), seed=2)
+    run = read_run(record_of(tmp_path / "out", problem="Face", algorithm="N2", seed=2, budget="30000 moves"))
+    np.testing.assert_array_equal(run.arrays["F"], non_dominated(result.F))
+    assert run.record["moves"] == 30_000
+    assert run.arrays["trace_evaluations"][-1] == run.record["evaluations"] == result.algorithm.evaluator.n_eval
+    assert read_run(record_of(tmp_path / "out", algorithm="N1")).record["moves"] is None
+    write_tables(study := Study(tmp_path / "out"))
+    assert set(study.cases["Face", "30000 moves", "searched"].runs) == {"N2"}
+    assert set(study.cases["Face", "60 evaluations", "searched"].runs) == {"N1", "G1"}
+    assert not study.missing
+    said = (tmp_path / "out" / "findings.md").read_text(encoding="utf-8")
+    assert all(line.removeprefix("skipped: ") in said for line in expected)
+
+
+def test_a_shared_budget_is_divided_among_the_runs_that_make_one_front(config, tmp_path):
+    spelled = "{evaluations: 24, name: each}, {evaluations: 74, shared: true}, {generations: 2, shared: true}"
+    config.write_text(
+        CONFIG.replace("{generations: 6}, {evaluations: 60}", spelled).replace("[1, 2, 3]", "[1]"), encoding="utf-8"
+    )
+    out = tmp_path / "out"
+    tasks = plan(read_experiment_file(config))
+    amounts = {task.algorithm.name: [budget.amount for budget in task.budgets] for task in tasks}
+    assert amounts == {"N1": [24, 74, 2], "N2": [24, 74, 2], "G1": [24, 24, 1]}
+    keys = {key for task in tasks for key in task.keys}
+    assert len(keys) == 2 * (3 + 3 + 3 * 2)  # two of the budgets are one run of G1
+    assert run_experiment(config, out).finished == len(keys) == len(list((out / "runs").glob("*.json")))
+    assert run_experiment(config, out).reused == len(keys)
+    study = Study(out)
+    assert study.budgets == ["each", "74 evaluations, shared", "2 generations, shared"]
+    case = study.cases["Face", "74 evaluations, shared", "searched"]
+    assert case.evaluations("N1").tolist() == [84]  # the generation of 12 that reaches 74
+    assert case.evaluations("G1").tolist() == [3 * 24]
+    content = json.loads((out / "experiment.json").read_text())["budgets"]
+    assert [budget.get("shared", False) for budget in content] == [False, True, True]
+
+
+def test_seconds_are_shared_as_they_are(config):
+    config.write_text(
+        CONFIG.replace("{generations: 6}, {evaluations: 60}", "{seconds: 0.75, shared: true}"), encoding="utf-8"
+    )
+    tasks = plan(read_experiment_file(config))
+    assert {(task.algorithm.name, task.budgets[0].amount) for task in tasks} == {
+        ("N1", 0.75),
+        ("N2", 0.75),
+        ("G1", 0.25),
+    }
+    assert {task.budgets[0].name for task in tasks} == {"0.75 seconds, shared"}
 
 
 def test_a_changed_configuration_does_what_is_new_and_names_what_is_stale(config, stored):
