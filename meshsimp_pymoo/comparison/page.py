@@ -32,7 +32,7 @@ VERDICT_CLASSES = {verdicts.HOLDS: "holds", verdicts.DOES_NOT_HOLD: "fails", ver
 # The page's marks by matplotlib's names.
 MARKS = {
     "o": "circle", "s": "square", "^": "up", "D": "diamond", "v": "down", "P": "plus", "X": "cross", "<": "left",
-    "+": "plus", "x": "cross", "1": "down", "2": "up", ".": "circle",
+    "+": "plus", "x": "cross", "1": "down", "2": "up",
 }  # fmt: skip
 # Parts of experiment.json that the page shows as the configuration.
 CONFIGURATION = ("title", "problems", "algorithms", "seeds", "budgets", "meshlab")
@@ -114,6 +114,10 @@ def _section(
         "hvr": "hypervolume ratio of every run",
         "cardinality": "cardinality of every run",
         "selected": "fewest triangles, best trade-off and least error of every method",
+        "convergence_evaluations": "hypervolume ratio over evaluations",
+        "convergence_seconds": "hypervolume ratio over seconds",
+        "critical_difference": "mean ranks of every method over the models",
+        "profile": "performance profiles of every method by epsilon",
     }
     pictures = [_picture(figures / f"{name}.png", f"{alt} ({_setting(budget, scoring)})") for name, alt in alts.items()]
     reasons = [f for f in found if (f.budget, f.scoring) == (budget, scoring) and (f.reason or f.background)]
