@@ -43,6 +43,7 @@ from meshsimp_pymoo.comparison.config import (
 )
 from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, meshlab_front, reductions
 from meshsimp_pymoo.comparison.store import (
+    FORMAT,
     ExperimentWarning,
     RunStore,
     claim_experiment,
@@ -51,6 +52,7 @@ from meshsimp_pymoo.comparison.store import (
     write_model,
     write_run,
 )
+from meshsimp_pymoo.comparison.trace import Trace
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.indicators import non_dominated
@@ -325,10 +327,12 @@ def perform(
 
     start = time.perf_counter()
     algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
+    trace = Trace()
     if stored is not None:
         try:
             restore(stored, algorithm)
             start -= float(stored.facts["seconds"])
+            trace = Trace.from_plain(stored.facts["trace"])
         except CheckpointError as damage:
             warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=2)
             algorithm = set_up()
@@ -337,7 +341,7 @@ def perform(
         with contextlib.suppress(NotResumable):
             keeper = Checkpoints(checkpoint, algorithm, _search_and_versions(task), interval=interval)
     left = list(range(len(task.budgets)))
-    set_aside = 0.0  # seconds spent on runs already yielded
+    set_aside = 0.0  # seconds spent on runs already yielded, on the trace and on checkpoints
     while left:
         ended = not algorithm.has_next()
         if not ended:
@@ -347,30 +351,34 @@ def perform(
                 continue
             ended = not algorithm.has_next()
         seconds = time.perf_counter() - start - set_aside
-        generations, evaluations = algorithm.n_iter - 1, algorithm.evaluator.n_eval
+        generations, evaluations = int(algorithm.n_iter) - 1, int(algorithm.evaluator.n_eval)
         reached = {"generations": generations, "evaluations": evaluations, "seconds": seconds}
+        trace.keep(algorithm, generations, seconds)
         for k in list(left):
             if ended or reached[task.budgets[k].kind] >= task.budgets[k].amount:
+                until_now = trace.until(algorithm, generations, seconds)
                 facts = {
                     "problem": task.problem,
                     "algorithm": task.algorithm.name,
                     "seed": task.seed,
                     "budget": task.budgets[k].name,
-                    "generations": int(generations),
-                    "evaluations": int(evaluations),
+                    "generations": generations,
+                    "evaluations": evaluations,
                     "seconds": round(seconds, 4),
+                    "trace_seconds": until_now.seconds,
                     "versions": package_versions(),
                 }
-                yield k, _front_arrays(problem, algorithm.opt), facts
+                yield k, _front_arrays(problem, algorithm.opt) | until_now.arrays, facts
                 left.remove(k)
-        set_aside = time.perf_counter() - start - seconds
         if left and keeper is not None and keeper.due():
             try:
-                keeper.save(seconds=seconds, generations=int(generations), evaluations=int(evaluations))
+                keeper.save(seconds=seconds, generations=generations, evaluations=evaluations, trace=trace.plain)
             except (CheckpointError, NotResumable) as trouble:
                 warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
                 keeper = None
-            set_aside = time.perf_counter() - start - seconds
+        so_far = time.perf_counter() - start - seconds
+        algorithm.start_time += so_far - set_aside  # a budget in seconds looks at the algorithm's own clock
+        set_aside = so_far
     if checkpoint is not None:
         with contextlib.suppress(OSError):
             checkpoint.unlink(missing_ok=True)
@@ -380,7 +388,8 @@ def _search_and_versions(task: Task) -> dict[str, Any]:
     """Return what a checkpoint of a task belongs to."""
     versions = package_versions()
     return {name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")} | {
-        "search": fingerprint(task.search)
+        "search": fingerprint(task.search),
+        "format": FORMAT,
     }
 
 

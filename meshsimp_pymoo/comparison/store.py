@@ -40,8 +40,8 @@ from meshsimp_pymoo.surface.model import OpenModel
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 EXPERIMENT_FILE = "experiment.json"
-# Of the records; another number wherever what they hold is spelled otherwise. 3: vertices that repeat others.
-FORMAT = 3
+# Of the records; another number wherever what they hold is spelled otherwise. 4: how each run converged.
+FORMAT = 4
 WAY_OUT = "mend that, and the same command does what is missing"
 
 # Hexadecimal digits of a key: 64 bits, where a study has some thousand runs.
@@ -68,8 +68,11 @@ class StoredRun:
     arrays : dict of str to array
         For an evolutionary run ``F`` (S, 2), ``kept`` (S, ceil(N / 8)) packed bits, and one value per
         solution of ``error_nearest`` (the error when uncovered vertices cost their distance) and of every
-        measure but "error" and "triangles" (see `meshsimp_pymoo.surface.measures`). See the runner for what
-        the classic methods add.
+        measure but "error" and "triangles" (see `meshsimp_pymoo.surface.measures`); and how it converged, at K
+        moments, the last of them its end: ``trace_generations`` (K,), ``trace_evaluations`` (K,), and the front at
+        moment k, error as searched and triangles, sorted by triangles, as the rows ``trace_start[k]`` to
+        ``trace_start[k + 1]`` of ``trace_F``; ``trace_start`` is (K + 1,). The record has the K
+        ``trace_seconds``, which are never the same twice. See the runner for what the classic methods add.
     """
 
     path: Path

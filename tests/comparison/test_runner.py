@@ -12,10 +12,12 @@ import sys
 import time
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from counts import tried
+from pymoo.core.population import Population
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo.cli import main
@@ -24,9 +26,10 @@ from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.comparison.figures import meshes_figure
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
 from meshsimp_pymoo.comparison.report import write_report, write_tables
-from meshsimp_pymoo.comparison.runner import plan, run_experiment
+from meshsimp_pymoo.comparison.runner import perform, plan, run_experiment
 from meshsimp_pymoo.comparison.store import FORMAT, ExperimentWarning, RunStore, read_run
 from meshsimp_pymoo.comparison.study import Study
+from meshsimp_pymoo.comparison.trace import Trace
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import locked
@@ -120,6 +123,73 @@ def test_a_stored_run_is_what_pymoo_finds_in_one_go(reference, config):
         assert q.uncovered == run.arrays["uncovered"][row]
     charged = MeshProblem(problem.model, footprint="hull", outside="nearest")
     np.testing.assert_array_equal(run.arrays["error_nearest"], [charged.quality(row).error for row in kept])
+
+
+def trace_of(run) -> list[np.ndarray]:
+    """The fronts of a run's trace."""
+    start = run.arrays["trace_start"]
+    assert len(run.arrays["trace_F"]) == start[-1]
+    return np.split(run.arrays["trace_F"], start[1:-1])
+
+
+def test_a_run_holds_the_fronts_by_which_it_converged(reference, config):
+    (algorithm,) = [a for a in read_experiment_file(config).algorithms if a.name == "N1"]
+    fronts = []
+
+    def note(search):
+        fronts.append(non_dominated(search.opt.get("F")))
+
+    problem = MeshProblem("face:90", footprint="hull", outside="ignore")
+    minimize(problem, algorithm.build(), ("n_gen", 6), seed=2, callback=note)
+    assert len({front.tobytes() for front in fronts}) == 6
+    for budget, count in (("6 generations", 6), ("60 evaluations", 5)):
+        run = read_run(record_of(reference, problem="Face", algorithm="N1", seed=2, budget=budget))
+        assert run.arrays["trace_generations"].tolist() == list(range(1, count + 1))
+        assert run.arrays["trace_evaluations"].tolist() == [12 * k for k in range(1, count + 1)]
+        traced = trace_of(run)
+        assert len(traced) == count
+        for front, expected in zip(traced, fronts, strict=False):
+            np.testing.assert_array_equal(front, expected)
+        np.testing.assert_array_equal(traced[-1], run.arrays["F"])
+        seconds = run.record["trace_seconds"]
+        assert len(seconds) == count
+        assert seconds == sorted(seconds)
+        assert seconds[-1] == run.record["seconds"]
+
+
+def test_a_trace_keeps_generations_that_are_spaced_geometrically_and_of_them_the_front_of_feasible_meshes():
+    F = np.array([[3.0, 4], [np.inf, 0], [0.0, 2], [1.0, 9], [2.0, 9], [3.0, 4]])
+    opt = Population.new("F", F)
+    for one, feasible in zip(opt, [True, True, False, True, True, True], strict=True):
+        one.CV = np.array([0.0 if feasible else 1.0])
+        one.evaluated |= {"CV"}
+    trace, search = Trace(), SimpleNamespace(opt=opt, evaluator=SimpleNamespace(n_eval=7))
+    for generation in range(1, 51):
+        trace.keep(search, generation, 0.1 * generation)
+    search.opt = None
+    run = Trace.from_plain(json.loads(json.dumps(trace.plain))).until(search, 50, 5.0)
+    expected = [1, 2, 3, 4, 5, 7, 9, 12, 15, 19, 24, 30, 38, 48, 50]
+    assert run.arrays["trace_generations"].tolist() == expected
+    assert run.seconds == pytest.approx([0.1 * generation for generation in expected])
+    assert run.arrays["trace_start"].tolist() == [*range(0, 30, 2), 28]
+    np.testing.assert_array_equal(run.arrays["trace_F"], 14 * [[3.0, 4], [1.0, 9]])
+
+
+def test_a_search_that_goes_on_from_its_checkpoint_has_the_trace_from_before(config, tmp_path, reference):
+    task = next(t for t in plan(read_experiment_file(config)) if t.label == "Face / N1 / seed 2")
+    problem = MeshProblem("face:90", footprint="hull", outside="ignore")
+    short = [budget.kind for budget in task.budgets].index("evaluations")  # 60 of them come before 6 generations
+    begun = perform(task, problem, checkpoint=tmp_path / "state.npz", interval=0.0)
+    assert next(begun)[0] == short
+    begun.close()  # as if killed: after the checkpoint of some generation
+    assert (tmp_path / "state.npz").exists()
+    rest = task.without([task.keys[short]])
+    ((_, arrays, facts),) = perform(rest, problem, checkpoint=tmp_path / "state.npz")
+    run = read_run(record_of(reference, problem="Face", algorithm="N1", seed=2, budget="6 generations"))
+    assert set(arrays) == set(run.arrays)
+    for name, values in arrays.items():
+        np.testing.assert_array_equal(values, run.arrays[name])
+    assert len(facts["trace_seconds"]) == 6
 
 
 def test_a_budget_ends_with_the_generation_that_reaches_it(reference):
@@ -634,7 +704,7 @@ def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp
 def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one_line(stored, capsys):
     record = stored / "experiment.json"
     content = json.loads(record.read_text(encoding="utf-8"))
-    assert content["format"] == FORMAT == 3
+    assert content["format"] == FORMAT == 4
 
     def told(**changed):
         record.write_text(json.dumps(content | changed), encoding="utf-8")
@@ -643,7 +713,7 @@ def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one
         return line
 
     without_rules = [{key: item[key] for key in item if key != "rules"} for item in content["problems"]]
-    assert "experiment.json: is not of the format 3 that this version reads; run it again" in told(
+    assert "experiment.json: is not of the format 4 that this version reads; run it again" in told(
         format=1, problems=without_rules
     )
     assert "experiment.json: is damaged ('rules' is missing); `meshsimp run` writes it anew" in told(
