@@ -16,6 +16,7 @@ from meshsimp_pymoo.problem import MeshProblem as MeshProblem
 from meshsimp_pymoo.report.figures import plot_error as plot_error
 from meshsimp_pymoo.report.figures import plot_front as plot_front
 from meshsimp_pymoo.report.figures import plot_mesh as plot_mesh
+from meshsimp_pymoo.search.budgets import Moves as Moves
 from meshsimp_pymoo.search.display import FrontOutput as FrontOutput
 from meshsimp_pymoo.search.greedy import greedy_insertion as greedy_insertion
 from meshsimp_pymoo.search.greedy import thinning as thinning

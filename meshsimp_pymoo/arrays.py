@@ -17,6 +17,36 @@ IntArray: TypeAlias = npt.NDArray[np.integer[Any]]
 Csr: TypeAlias = tuple[IntArray, IntArray]
 
 
+def require_bool(X: Any, what: str, way_out: str = "give True where a vertex is kept") -> AnyArray:
+    """Return subsets of the vertices as an array, if they are bool.
+
+    Parameters
+    ----------
+    X : array
+        The subsets.
+    what : str
+        What is asked for, the beginning of the message.
+    way_out : str
+        What to do, unless they are but the numbers 0 and 1.
+
+    Raises
+    ------
+    TypeError
+        If they are of any other type: 0 and 1 as numbers too, which arithmetic treats otherwise.
+
+    Examples
+    --------
+    >>> require_bool([0, 1, 1], "a subset is a bool array")
+    Traceback (most recent call last):
+    TypeError: a subset is a bool array, not int64; these are 0 and 1: give X.astype(bool)
+    """
+    X = np.asarray(X)
+    if X.dtype != np.bool_:
+        is_01 = X.dtype.kind in "iuf" and X.size > 0 and bool(((X == 0) | (X == 1)).all())
+        raise TypeError(f"{what}, not {X.dtype}; {'these are 0 and 1: give X.astype(bool)' if is_01 else way_out}")
+    return X
+
+
 class Rows:
     """Rows of an array that are made when they are asked for, by number; ``numpy.asarray`` makes all of them.
 

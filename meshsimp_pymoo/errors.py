@@ -29,6 +29,10 @@ class ResultError(InputError):
     """An output folder cannot be used or does not hold what it should: one line with the way out."""
 
 
+class ToolUnavailable(Exception):
+    """A tool that is no part of this package cannot be used here, or not on this model: one line with the way out."""
+
+
 class UsageError(InputError):
     """Options that do not go together, or a command line that cannot be understood."""
 
@@ -86,8 +90,8 @@ def printable(text: object, *, keep: str = "") -> str:
     )
 
 
-def way_to_install(extra: str) -> str:
-    """Return the command that installs what an extra of this package brings, wherever the package came from.
+def way_to_install(extra: str, package: str = "") -> str:
+    """Return the command that installs what an extra of this package brings, wherever it came from, or one package.
 
     >>> way_to_install("geo")
     "pip install 'rasterio>=1.4'"
@@ -99,6 +103,8 @@ def way_to_install(extra: str) -> str:
     except PackageNotFoundError:  # run from a clone that is not installed
         return f"pip install '.[{extra}]' in the folder of its pyproject.toml"
     needed = [name.strip() for name, _, marker in parts if re.search(rf"extra\s*==\s*['\"]{extra}['\"]", marker)]
+    if package:
+        needed = [name for name in needed if re.match(rf"{package}\b(?!-)", name)] or [package]
     return f"pip install {' '.join(map(repr, needed))}"
 
 

@@ -34,6 +34,7 @@ from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
+from meshsimp_pymoo.search.budgets import moves_of
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
@@ -352,6 +353,7 @@ class Front(Sequence[FrontSolution]):
             "seed": getattr(algorithm, "seed", None),
             "generations": getattr(algorithm, "n_iter", 1) - 1,
             "evaluations": getattr(getattr(algorithm, "evaluator", None), "n_eval", None),
+            "moves": moves_of(algorithm),
             "seconds": getattr(result, "exec_time", None),
         }
         front.run |= {key: value for key, value in facts.items() if value is not None}

@@ -13,9 +13,11 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 import trimesh
+from pymoo.algorithms.soo.nonconvex.random_search import RandomSearch
 from pymoo.core.problem import ElementwiseProblem, Problem
+from pymoo.util.display.single import SingleObjectiveOutput
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.errors import meant
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -214,7 +216,17 @@ class MeshProblem(ElementwiseProblem):
         return self.surface.pinned
 
     def evaluate(self, X: npt.NDArray[Any], *args: Any, **kwargs: Any) -> Any:
-        """Evaluate one chromosome (N,) or many (P, N) as any pymoo problem does; float genomes are refused."""
+        """Evaluate one chromosome (N,) or many (P, N) as any pymoo problem does; float genomes are refused.
+
+        So are algorithms of one objective, where there are more: pymoo's evaluator tells which one asks.
+        """
+        algorithm = kwargs.get("algorithm")
+        if self.n_obj > 1 and minimises_one_number(algorithm):
+            name = type(algorithm).__name__
+            raise TypeError(
+                f"{name} minimises one number, and this problem has {self.n_obj} objectives; give {name} "
+                "WeightedSum(problem, w), or use weighted_ga_v1(w) or an algorithm for several objectives, as NSGA2"
+            )
         _require_bool(X)
         return super().evaluate(X, *args, **kwargs)
 
@@ -367,11 +379,20 @@ def _refuse_unknown(kwargs: dict[str, Any]) -> None:
         raise TypeError(f"MeshProblem has no argument {unknown[0]!r}{meant(unknown[0], names)}")
 
 
+def minimises_one_number(algorithm: Any) -> bool:
+    """Tell whether an algorithm of pymoo is for one objective alone, by what it prints of a run.
+
+    pymoo marks them in no other way. `WeightedGA` prints something else, and `RandomSearch` keeps fronts all the same.
+    """
+    return isinstance(getattr(algorithm, "output", None), SingleObjectiveOutput) and not isinstance(
+        algorithm, RandomSearch
+    )
+
+
 def _require_bool(X: Any) -> None:
-    kind = np.asarray(X).dtype
-    if kind != np.bool_:
-        raise TypeError(
-            f"chromosomes are bool vectors, one entry a vertex, but these are {kind}; pass sampling=RandomSubset(), "
-            "crossover=SubsetUniformCrossover() or OAX(), mutation=NeighbourShift() and repair=PinnedCorners() "
-            "to the algorithm, since pymoo's defaults make real numbers"
-        )
+    require_bool(
+        X,
+        "chromosomes are bool vectors, one entry a vertex",
+        "pass sampling=RandomSubset(), crossover=SubsetUniformCrossover() or OAX(), mutation=NeighbourShift() and "
+        "repair=PinnedCorners() to the algorithm, since pymoo's defaults make real numbers",
+    )

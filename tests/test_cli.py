@@ -104,7 +104,7 @@ def test_the_front_is_what_a_pymoo_user_gets(tmp_path):
 
 @pytest.mark.parametrize(
     ("algorithm", "budget"),
-    [("memetic", ("--generations", "2"))]
+    [("memetic", ("--generations", "2")), ("memetic", ("--moves", "20000"))]
     + [(name, budget) for name in ALGORITHMS[1:] for budget in (("--generations", "4"), ("--evaluations", "40"))],
 )
 def test_one_seed_gives_the_same_bytes_with_one_and_two_threads(tmp_path, monkeypatch, algorithm, budget):
@@ -139,6 +139,7 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
         "evaluations": 30,
         "time": None,
         "generations": None,
+        "moves": None,
         "algorithm": "nsga2_v1",
         "population": 12,
         "threads": None,
@@ -153,6 +154,23 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
     assert record["evaluations"] == 36
     assert record["seconds"] > 0
     assert record["interrupted"] is False
+
+
+def test_a_budget_in_moves_is_kept_and_recorded(tmp_path, capsys):
+    options = ("-o", tmp_path / "out", "--moves", "5000", "--population", "12")
+    assert run("simplify", "face:150", *options, "--json") == 0
+    said = capsys.readouterr()
+    assert "warning" not in said.err
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["settings"]["moves"] == record["moves"] == json.loads(said.out)["moves"] == 5000
+
+
+def test_evaluations_of_the_memetic_search_are_taken_with_a_warning(tmp_path, capsys):
+    options = ("-o", tmp_path / "out", "--evaluations", "20", "--population", "12")
+    assert run("simplify", "roof:5", *options, "--quiet", "--no-page") == 0
+    assert one_line(capsys) == (
+        "meshsimp: warning: evaluations do not measure memetic, whose children cost any work; use --moves or --time\n"
+    )
 
 
 def test_the_budget_in_seconds_is_kept(tmp_path):
@@ -596,6 +614,12 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(tmp_path, capsy
         (("--time", "10parsecs"), r"'10parsecs' is not a duration; write 60s, 10min or 1h"),
         (("--time", "0s"), r"'0s' is not a duration"),
         (("--time", "1s", "--generations", "3"), r"not allowed with argument"),
+        (("--moves", "1000", "--time", "1s"), r"not allowed with argument"),
+        (("--moves", "0"), r"'0' is not a whole number of at least 1"),
+        (
+            ("--moves", "9", "--algorithm", "moead"),
+            r"for --algorithm memetic, .* give moead --generations or --evaluat",
+        ),
         (("--evaluations", "many"), r"'many' is not a whole number of at least 1"),
         (("--population", "1"), r"'1' is not a whole number of at least 2"),
         (("--seed", "-1"), r"--seed"),

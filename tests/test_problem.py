@@ -9,14 +9,22 @@ import numpy as np
 import pytest
 import trimesh
 from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.algorithms.soo.nonconvex.ga import BGA, GA
+from pymoo.algorithms.soo.nonconvex.ga_niching import NicheGA
+from pymoo.algorithms.soo.nonconvex.random_search import RandomSearch
+from pymoo.core.population import Population
 from pymoo.indicators.hv import HV
+from pymoo.operators.crossover.ux import UX
 from pymoo.operators.mutation.bitflip import BitflipMutation
+from pymoo.operators.sampling.rnd import BinaryRandomSampling
 from pymoo.optimize import minimize
 from pymoo.parallelization import DaskParallelization, JoblibParallelization, StarmapParallelization
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from meshsimp_pymoo import (
     OAX,
+    Front,
+    LiveTriangulation,
     MeshProblem,
     NeighbourShift,
     NestedSubsets,
@@ -25,11 +33,14 @@ from meshsimp_pymoo import (
     RandomSubset,
     Relocation,
     Rules,
+    WeightedSum,
     memetic,
     moead,
     nsga2_v1,
     nsga2_v2,
     nsga3,
+    thinning,
+    weighted_ga_v1,
 )
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
@@ -37,6 +48,7 @@ from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import ThreadRunner
+from meshsimp_pymoo.search.paper import paper_operators
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import ERROR, MEASURES, OBJECTIVES, TRIANGLES
 
@@ -89,13 +101,60 @@ def test_the_memo_is_bounded_and_forgets_the_oldest():
     np.testing.assert_array_equal(MeshProblem("roof:9", memo=0).evaluate(X), F)
 
 
-@pytest.mark.parametrize("dtype", [float, np.int8, object])
-def test_genomes_that_are_not_bool_are_refused_with_the_operators_to_pass(problem, dtype):
-    X = np.ones((2, problem.n_var), dtype)
+@pytest.mark.parametrize("values", [np.full(300, 0.5), np.arange(300), np.ones(300, object)], ids=lambda X: X.dtype)
+def test_genomes_that_are_not_bool_are_refused_with_the_operators_to_pass(problem, values):
     with pytest.raises(TypeError, match=r"RandomSubset.*PinnedCorners"):
-        problem.evaluate(X)
+        problem.evaluate(np.array([values, values]))
     with pytest.raises(TypeError, match="NeighbourShift"):
-        problem.mesh(X[0])
+        problem.mesh(values)
+
+
+ASKS_FOR_BOOL = {
+    "evaluate": lambda problem, X: problem.evaluate(X),
+    "evaluate_subsets": lambda problem, X: problem.evaluate_subsets(X),
+    "simplify": lambda problem, X: problem.simplify(X[0]),
+    "weighted": lambda problem, X: WeightedSum(problem, 0.5).evaluate(X),
+    "Front": lambda problem, X: Front.from_subsets(problem, X),
+    "surface": lambda problem, X: problem.surface.evaluate(X),
+    "surface.simplify": lambda problem, X: problem.surface.simplify(X[0]),
+    "live": lambda problem, X: LiveTriangulation(problem.surface, X[0]),
+    "thinning": lambda problem, X: thinning(problem.surface, X[0]),
+    "repair": lambda problem, X: PinnedCorners().do(problem, Population.new("X", X)),
+    "mutation": lambda problem, X: NeighbourShift().do(problem, Population.new("X", X)),
+    "crossover": lambda problem, X: OAX().do(problem, Population.new("X", X)[None]),
+}
+
+
+@pytest.mark.parametrize("dtype", [float, np.uint8, np.int64])
+@pytest.mark.parametrize("name", ASKS_FOR_BOOL)
+def test_0_and_1_as_numbers_are_refused_with_what_makes_them_bool(problem, name, dtype):
+    with pytest.raises(TypeError, match=rf"not {np.dtype(dtype)}; these are 0 and 1: give X\.astype\(bool\)$"):
+        ASKS_FOR_BOOL[name](problem, subsets(problem, 2).astype(dtype))
+
+
+SINGLE = [GA, BGA, NicheGA]
+
+
+@pytest.mark.parametrize("algorithm", SINGLE)
+@pytest.mark.parametrize("own", [True, False])
+def test_algorithms_of_one_objective_are_refused_before_pymoo_stumbles_whatever_the_operators(algorithm, own):
+    problem = MeshProblem("roof:5")
+    binary = {"sampling": BinaryRandomSampling(), "crossover": UX(), "mutation": BitflipMutation()}
+    chosen = algorithm(pop_size=8, **(paper_operators() | {"crossover": OAX()} if own else binary))
+    line = (
+        rf"^{algorithm.__name__} minimises one number, .* 2 objectives.*WeightedSum\(problem, w\).*weighted_ga_v1\(w\)"
+    )
+    with pytest.raises(TypeError, match=line):
+        minimize(problem, chosen, ("n_gen", 2), seed=1)
+    found = minimize(WeightedSum(problem, 0.5), chosen, ("n_gen", 2), seed=1)
+    assert found.opt.get("F").shape[1] == 1
+
+
+def test_algorithms_that_keep_fronts_are_not_taken_for_ones_of_one_objective():
+    problem = MeshProblem("roof:5")
+    found = minimize(problem, RandomSearch(20, sampling=RandomSubset()), ("n_gen", 2), seed=1)
+    assert found.F.shape[1] == 2
+    assert minimize(problem, weighted_ga_v1(0.5, 8), ("n_gen", 2), seed=1).F.shape == (1, 2)
 
 
 def test_pymoo_s_default_operators_are_refused_at_the_first_generation(problem):

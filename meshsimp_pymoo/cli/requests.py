@@ -22,7 +22,7 @@ TILED_FROM = 2_000_000
 
 @dataclass(frozen=True)
 class Search:
-    """How to search; of the three budgets at most one is given."""
+    """How to search; of the four budgets at most one is given."""
 
     algorithm: str = DEFAULT
     population: int = 100
@@ -30,6 +30,7 @@ class Search:
     time: float | None = None
     evaluations: int | None = None
     generations: int | None = None
+    moves: int | None = None
     threads: int | None = None
     checkpoint: float | None = 60.0
 

@@ -36,7 +36,7 @@ from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import known_units, reference_system
 
 # What of a record the summary says again.
-SAID = ("evaluations", "seconds", "compile_seconds", "seed", "mesh_origin")
+SAID = ("evaluations", "moves", "seconds", "compile_seconds", "seed", "mesh_origin")
 
 
 def lacks_pictures(output: Output, what: Mapping[str, Any]) -> bool:
@@ -137,7 +137,8 @@ def _tell(front: Front, output: Output) -> None:
     tell(f"{Path(model.name).name}: {whole}" + f"; {system}" * bool(system))
     effort = [f"{run['seconds']:.1f} s"]
     if "evaluations" in run:
-        effort = [f"{run['evaluations']:,} evaluations", *effort, f"seed {run['seed']}"]
+        moves = [f"{run['moves']:,} moves"] if "moves" in run else []
+        effort = [f"{run['evaluations']:,} evaluations", *moves, *effort, f"seed {run['seed']}"]
     tell(
         f"front: {len(front)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
         f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} ({', '.join(effort)})"

@@ -34,6 +34,7 @@ from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.search.budgets import Moves, WholeGenerations, moves_of, spread
 from meshsimp_pymoo.search.checkpoint import (
     CheckpointError,
     Checkpoints,
@@ -44,7 +45,6 @@ from meshsimp_pymoo.search.checkpoint import (
 )
 from meshsimp_pymoo.search.memetic import sweep_generations
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
-from meshsimp_pymoo.search.time_limit import WholeGenerations, spread
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import (
     CHECKPOINT,
@@ -85,6 +85,7 @@ def _simplify(request: Request, shown: Stages) -> int:
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     else:
         refuse_alone(request.tiling)
+    _check_budget(search)
     what = {"settings": request.recorded | budget(search), "seed": search.seed, "interrupted": False}
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
@@ -124,6 +125,20 @@ def _claim(output: Output, search: Search) -> None:
         claim_output(output.folder, overwrite=output.overwrite)
 
 
+def _check_budget(search: Search) -> None:
+    """Refuse moves for an algorithm that makes none; warn where evaluations do not measure what is done."""
+    measured_by = PRESETS[search.algorithm].measured_by
+    if search.moves is not None and "moves" not in measured_by:
+        movers = [name for name, preset in PRESETS.items() if "moves" in preset.measured_by]
+        raise UsageError(
+            f"--moves is for --algorithm {' or '.join(movers)}, whose annealing makes them; give {search.algorithm} "
+            f"{' or '.join(f'--{kind}' for kind in (*measured_by, 'time'))}"
+        )
+    if search.evaluations is not None and "evaluations" not in measured_by:
+        way_out = " or ".join(f"--{kind}" for kind in (*measured_by, "time"))
+        say(f"warning: evaluations do not measure {search.algorithm}, whose children cost any work; use {way_out}")
+
+
 def _refuse_impossible(problem: MeshProblem, wish: Wish) -> None:
     """Stop before the search if no subset of the vertices is a mesh, or none can meet the target."""
     table = problem.evaluate_subsets(np.array([np.ones(problem.n_var, dtype=bool), problem.pinned]))
@@ -153,6 +168,7 @@ class _Found:
     front: Front
     generations: int
     evaluations: int
+    moves: int | None
     seconds: float
     interrupted: bool
 
@@ -160,7 +176,8 @@ class _Found:
 def budget(search: Search) -> dict[str, float]:
     """Return the budget of a search by kind; where none is given, generations as is usual for its algorithm."""
     given: dict[str, float | None] = {
-        "time": search.time, "evaluations": search.evaluations, "generations": search.generations
+        "time": search.time, "evaluations": search.evaluations, "generations": search.generations,
+        "moves": search.moves,
     }  # fmt: skip
     found = {kind: amount for kind, amount in given.items() if amount is not None}
     if found:
@@ -177,6 +194,7 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
         "time": TimeBasedTermination if preset.sweeps else WholeGenerations,
         "evaluations": MaximumFunctionCallTermination,
         "generations": MaximumGenerationTermination,
+        "moves": Moves,
     }
     ((kind, amount),) = budget(search).items()
     if kind == "time" and request.output.refit:
@@ -217,7 +235,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             "inside its outline; search longer, or pass --footprint hull"
         ) from None
     front.series |= starting_front(problem, algorithm)
-    return _Found(front, generations, algorithm.evaluator.n_eval, seconds, interrupted)
+    return _Found(front, generations, algorithm.evaluator.n_eval, moves_of(algorithm), seconds, interrupted)
 
 
 class Keeper:
@@ -327,6 +345,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
             "seed": search.seed,
             "generations": found.generations,
             "evaluations": found.evaluations,
+            **({} if found.moves is None else {"moves": found.moves}),
             "seconds": round(found.seconds, 3),
             **{name: round(seconds, 3) for name, seconds in keeper.before.items()},
             **({} if fitted is None else {"refit_seconds": round(shown.seconds["refitting"], 3)}),

@@ -16,7 +16,7 @@
         merged_over: {w: [0, 0.5, 1]}     # one run for each value, merged to one front for each seed
     seeds: [1, 2, 3]
     budgets: [{generations: 50}, {evaluations: 5000}, {seconds: 10}]
-    baselines: {meshlab: {methods: [...], down_to_fronts: true, steps: 10}}    # optional
+    baselines: [thinning, meshlab]        # optional; names in baselines.BASELINES, groups of them, or true for all
 
 `read_experiment_file` reads it, opens every model, builds every algorithm and lets it run for two generations
 on a tiny model, so that whatever is wrong is known before the first run. Every mistake is a `ConfigError` of
@@ -25,6 +25,7 @@ one line: file, line, place, value, what was expected. The file is data: only pl
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import copy
 import importlib
@@ -33,9 +34,10 @@ import math
 import os
 import re
 import sys
+import textwrap
 import typing
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -47,13 +49,15 @@ from pydantic import AfterValidator, BaseModel, Field, PlainValidator, Validatio
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
-from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.errors import InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.problem import MeshProblem, minimises_one_number
+from meshsimp_pymoo.search.checkpoint import Checkpoints, NotResumable
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import OBJECTIVES
@@ -62,13 +66,14 @@ from meshsimp_pymoo.surface.rules import Rules
 
 if TYPE_CHECKING:
     from pymoo.core.algorithm import Algorithm
+    from pymoo.core.problem import Problem
 
 __all__ = [
     "AlgorithmConfig",
+    "BaselinesConfig",
     "Budget",
     "ConfigError",
     "Experiment",
-    "MeshLabConfig",
     "OperatorConfig",
     "ProblemConfig",
     "read_experiment_file",
@@ -83,7 +88,19 @@ MAX_DEPTH = 40
 MAX_NAME = 60
 MAX_FILE_NAME = 255
 # Parameters that decide how much memory and time a trial takes, and the most of them that can be meant.
-MOST = {"pop_size": 5_000, "n_offsprings": 5_000, "ref_dirs": 5_000, "n_neighbors": 5_000, "moves_per_vertex": 1_000}
+MOST = {
+    "pop_size": 5_000,
+    "n_offsprings": 5_000,
+    "pop_per_ref_point": 5_000,
+    "n_points_per_iteration": 5_000,
+    "ref_dirs": 5_000,
+    "n_neighbors": 5_000,
+    "moves_per_vertex": 1_000,
+}
+# The weight of the error, for algorithms of one objective.
+WEIGHT = "w"
+# Parameters that are points or directions in the space of the two objectives.
+IN_OBJECTIVES = ("ref_dirs", "ref_points")
 
 # What a pymoo algorithm calls the operator of a kind.
 ARGUMENT_OF_KIND = {kind: "eliminate_duplicates" if kind == "duplicates" else kind for kind in OPERATORS}
@@ -374,12 +391,33 @@ class AlgorithmConfig(Part):
 
         pymoo's default operators are objects that all instances share, some with a memory: hence the copy.
         """
-        arguments: dict[str, Any] = {key: _argument(key, value) for key, value in self.parameters.items()}
-        if self.merged_parameter:
-            arguments[self.merged_parameter] = merged_value
+        arguments: dict[str, Any] = {
+            key: _argument(key, value)
+            for key, value in self._all_parameters(merged_value).items()
+            if not (key == WEIGHT and self.weighs_the_problem)
+        }
         for kind, operator in self.operators.items():
             arguments[ARGUMENT_OF_KIND[kind]] = _class_of(kind, operator.name)(**operator.parameters)
-        return copy.deepcopy(self.target(**arguments))
+        algorithm = self.target(**arguments)
+        # pymoo's MOEAD does not tell its operators who is calling: those that evaluate get its evaluator here
+        for kind in self.operators:
+            operator = arguments[ARGUMENT_OF_KIND[kind]]
+            if getattr(operator, "evaluator", algorithm) is None:
+                operator.evaluator = algorithm.evaluator
+        return copy.deepcopy(algorithm)
+
+    def searched(self, problem: MeshProblem, merged_value: Any = None) -> Problem:
+        """Return what the algorithm is set up for: the problem, or its weighted sum."""
+        return WeightedSum(problem, self._all_parameters(merged_value)[WEIGHT]) if self.weighs_the_problem else problem
+
+    @property
+    def weighs_the_problem(self) -> bool:
+        """Whether ``w`` makes one objective of the problem's two, for an algorithm that takes no such argument."""
+        known = _parameters(self.target)
+        return WEIGHT in {*self.parameters, *self.merged_over} and known is not None and WEIGHT not in known
+
+    def _all_parameters(self, merged_value: Any) -> dict[str, Any]:
+        return self.parameters | ({self.merged_parameter: merged_value} if self.merged_over else {})
 
     def description(self, merged_value: Any = None) -> dict[str, Any]:
         """Return what decides the results: the algorithm, its parts and all their settings in effect."""
@@ -403,12 +441,17 @@ class AlgorithmConfig(Part):
                 raise _Mistake(f"operators stand under 'operators', this one as {kind!r}", "parameters", argument)
         for key, arguments in (("parameters", self.parameters), ("merged_over", self.merged_over)):
             with _blaming(key):
-                _check_arguments(arguments, self.target, self.preset or self.path)
+                _check_arguments(arguments, self.target, self.preset or self.path, {WEIGHT} if self.path else set())
+                for name, value in arguments.items():
+                    for one in value if arguments is self.merged_over else [value]:
+                        _argument(name, one)
         if self.merged_parameter in self.parameters:
             way_out = f"{self.merged_parameter!r} is in 'parameters' too; give it in one place"
             raise _Mistake(way_out, "merged_over", self.merged_parameter)
         for value in self.merged_values:
             at = f" with {self.merged_parameter} = {value!r}" if self.merged_over else ""
+            if "ref_dirs" in (_parameters(self.target) or ()) and "ref_dirs" not in self._all_parameters(value):
+                at += " without ref_dirs (under 'parameters': a number of directions, or the list of pairs)"
             with _blaming(what=f"the algorithm {self.name!r} cannot be made{at}"):
                 self.build(value)
         return self
@@ -439,23 +482,39 @@ class Budget(Part):
         return getattr(self, self.kind)
 
 
-class MeshLabConfig(Part):
-    """MeshLab's methods: which, and whether also down to the fewest triangles of the evolutionary fronts."""
+def _baselines(given: Any) -> tuple[str, ...]:
+    """Return the methods that a name, a list of names or true (all of them) stands for, in the order of the table."""
+    named: dict[str, tuple[str, ...]] = {name: (name,) for name in BASELINES}
+    for baseline in BASELINES.values():
+        named[baseline.group] = tuple(name for name, other in BASELINES.items() if other.group == baseline.group)
+    if given is True:
+        return tuple(BASELINES)
+    if not isinstance(given, (str, list)) or not given:
+        raise ValueError(f"expected true, or a list of some of {', '.join(named)}")
+    names = [given] if isinstance(given, str) else given
+    chosen: set[str] = set()
+    for place, name in enumerate(names):
+        with _blaming(*[place] * isinstance(given, list)):
+            members = named[Choice(tuple(named)).from_plain(name)]
+            if twice := sorted(chosen.intersection(members)):
+                raise ValueError(f"{twice[0]} is there twice")
+            chosen.update(members)
+    return tuple(name for name in BASELINES if name in chosen)
 
-    methods: Different[Annotated[str, _of(Choice(tuple(MESHLAB_METHODS)))]] = tuple(MESHLAB_METHODS)
+
+class BaselinesConfig(Part):
+    """Methods without chance: which, and whether the tools go down to the fewest triangles of the searched fronts."""
+
+    methods: Annotated[tuple[str, ...], _of(_baselines)] = tuple(BASELINES)
     down_to_fronts: bool = Field(True, strict=True)
     steps: Count = 10
 
     @classmethod
-    def read(cls, given: Any) -> MeshLabConfig | None:
-        """Return what a file says of them: true for all of them, false for none, or more."""
-        return None if given is False else cls.model_validate({} if given is True else given)
-
-
-class Baselines(Part):
-    """The methods that are compared with."""
-
-    meshlab: Annotated[MeshLabConfig | None, _of(MeshLabConfig.read)] = None
+    def read(cls, given: Any) -> BaselinesConfig | None:
+        """Return what a file says of them: false for none, true for all of them, names, or a mapping."""
+        if given is False:
+            return None
+        return cls.model_validate(given if isinstance(given, dict) else {"methods": list(_baselines(given))})
 
 
 class _File(Part):
@@ -466,12 +525,12 @@ class _File(Part):
     algorithms: Different[AlgorithmConfig]
     seeds: Different[Annotated[int, _of(Whole(0))]]
     budgets: Different[Budget]
-    baselines: Baselines = Baselines()
+    baselines: Annotated[BaselinesConfig | None, _of(BaselinesConfig.read)] = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Experiment:
-    """Everything to be done: problems x algorithms x seeds x budgets, and the classic methods."""
+    """Everything to be done: problems x algorithms x seeds x budgets, and the baselines."""
 
     path: Path
     title: str
@@ -479,7 +538,9 @@ class Experiment:
     algorithms: tuple[AlgorithmConfig, ...]
     seeds: tuple[int, ...]
     budgets: tuple[Budget, ...]
-    meshlab: MeshLabConfig | None
+    baselines: BaselinesConfig | None
+    # algorithms whose state cannot be saved, by name, and why: their searches begin anew after a crash
+    not_resumable: Mapping[str, str]
 
 
 def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathLike[str] | None = None) -> Experiment:
@@ -508,9 +569,10 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
         for place, entry in enumerate(file.problems):
             with _blaming("problems", place):
                 problems.append(_opened(entry, file, models))
+        reasons = {}
         for place, algorithm in enumerate(file.algorithms):
             with _blaming("algorithms", place):
-                _try_out(algorithm, problems)
+                reasons[algorithm.name] = _try_out(algorithm, problems)
     except (ValidationError, _Mistake) as error:
         raise source.answer(error) from error.__cause__
     return Experiment(
@@ -520,7 +582,8 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
         algorithms=file.algorithms,
         seeds=file.seeds,
         budgets=file.budgets,
-        meshlab=file.baselines.meshlab,
+        baselines=file.baselines,
+        not_resumable={name: reason for name, reason in reasons.items() if reason},
     )
 
 
@@ -619,11 +682,11 @@ def _model_path(source: str, models: Path, named: str) -> str:
     raise _Mistake(f"there is no file {path}{near}", "model")
 
 
-def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str) -> None:
+def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str, besides: Collection[str] = ()) -> None:
     """Refuse arguments that something does not take, or that would let a trial take all memory or time."""
     known = _parameters(target)
     for name, value in arguments.items():
-        if known is not None and name not in known:
+        if known is not None and name not in known and name not in besides:
             listed = ", ".join(sorted(known)) or "none"
             raise _Mistake(f"{owner} has no such parameter{meant(name, known)}; it takes: {listed}", name)
         for place, number in enumerate(value if isinstance(value, (list, tuple)) else [value]):
@@ -631,17 +694,18 @@ def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str) -> N
                 raise _Mistake(f"expected at most {MOST[name]:,}", name, place)
 
 
-def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None:
-    """Let an algorithm run on a tiny model, and set it up for every problem, before anything is run."""
-    from pymoo.optimize import minimize
+def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
+    """Let an algorithm run on a tiny model, and set it up for every problem, before anything is run.
 
-    built = [problem.build() for problem in problems]
+    Return why its state cannot be saved; nothing if it can.
+    """
+    value, built, reason = config.merged_values[0], [problem.build() for problem in problems], ""
     for entry, problem in zip(problems, built, strict=True):
         with _blaming(what=f"the algorithm {config.name!r} cannot be used on the problem {entry.name!r}"):
-            config.build(config.merged_values[0]).setup(problem, termination=("n_gen", 1), seed=1)
+            config.build(value).setup(config.searched(problem, value), termination=("n_gen", 1), seed=1)
     few = {
-        key: min(value, TRIAL_POPULATION) if key in MOST and isinstance(value, int) else value
-        for key, value in config.parameters.items()
+        key: min(number, TRIAL_POPULATION) if key in MOST and isinstance(number, int) else number
+        for key, number in config.parameters.items()
     }
     small = config.model_copy(update={"parameters": few})
     wanted = dict.fromkeys((problem.objectives, problem.regions) for problem in built)
@@ -653,10 +717,33 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> None
             warnings.catch_warnings(),
         ):
             warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
-            algorithm = small.build(config.merged_values[0])
-            result = minimize(trial, algorithm, ("n_gen", TRIAL_GENERATIONS), seed=1, copy_algorithm=False)
-            if result.opt is not None and result.opt.get("F").shape[1:] != (2,):  # None: nothing feasible yet
+            searched = config.searched(trial, value)
+            algorithm = small.build(value)
+            if searched.n_obj > 1 and minimises_one_number(algorithm):
+                way_out = f"as in merged_over: {{{WEIGHT}: [0, 0.5, 1]}}, and it searches the weighted sum"
+                raise ValueError(f"it minimises one number; give it weights of the error, {way_out}")
+            algorithm.setup(searched, termination=("n_gen", TRIAL_GENERATIONS), seed=1)
+            try:
+                keeper: Checkpoints | None = Checkpoints(Path(), algorithm, {})
+            except NotResumable as problem:
+                keeper, reason = None, str(problem)
+            try:
+                while algorithm.has_next():
+                    algorithm.next()
+            except TypeError as problem:
+                if "numpy boolean" not in str(problem):
+                    raise
+                raise ValueError(
+                    f"it calculates with variables as real numbers, and subsets are bool ({problem})"
+                ) from None
+            try:
+                if keeper is not None:
+                    keeper.check()
+            except NotResumable as problem:
+                reason = str(problem)
+            if algorithm.opt is not None and algorithm.opt.get("F").shape[1:] != (searched.n_obj,):
                 raise ValueError("its result is no front of (error, triangles)")
+    return reason
 
 
 # ------------------------------------------------------------------------------------------- classes by name
@@ -688,26 +775,52 @@ def _parameters(target: Any) -> set[str] | None:
                 names.add(parameter.name)
         made = typing.get_type_hints(target).get("return")
         return names | (_parameters(made) or set()) - {"ref_dirs"} if inspect.isclass(made) else None
+    variadic = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
+    n_given, given = 0, set[str]()  # what the children of a class pass to it themselves
     for parent in target.__mro__:
         if parent is object or "__init__" not in vars(parent):
             continue
-        parameters = list(inspect.signature(vars(parent)["__init__"]).parameters.values())[1:]
-        variadic = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
-        names |= {parameter.name for parameter in parameters if parameter.kind not in variadic}
+        constructor = vars(parent)["__init__"]
+        parameters = list(inspect.signature(constructor).parameters.values())[1:]
+        own = [parameter.name for parameter in parameters if parameter.kind not in variadic]
+        names |= set(own[n_given:]) - given
         if not any(parameter.kind is inspect.Parameter.VAR_KEYWORD for parameter in parameters):
             break
+        n_given, passed = _given_to_the_parent(constructor)
+        given |= passed
     return names
 
 
+def _given_to_the_parent(constructor: Any) -> tuple[int, set[str]]:
+    """Return how many arguments and which keywords a constructor passes to its parent's, not counting what it is given.
+
+    MOEAD says itself how it treats duplicates, so ``eliminate_duplicates`` is no argument of it.
+    """
+    try:
+        source = textwrap.dedent(inspect.getsource(constructor))
+    except (OSError, TypeError):  # no source, no knowledge: such a class answers for itself when it is made
+        return 0, set()
+    for call in ast.walk(ast.parse(source)):
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr == "__init__":
+            return len(call.args), {keyword.arg for keyword in call.keywords if keyword.arg}
+    return 0, set()
+
+
 def _argument(name: str, value: Any) -> Any:
-    """Return a parameter as pymoo wants it: ``ref_dirs: n`` means n even directions, lists are arrays."""
-    if name != "ref_dirs":
-        return value
-    if isinstance(value, int):
+    """Return a parameter as pymoo wants it: ``ref_dirs: n`` means n even directions, lists of numbers are arrays."""
+    if name == "ref_dirs" and isinstance(value, int):
         from pymoo.util.ref_dirs import get_reference_directions
 
         return get_reference_directions("uniform", 2, n_partitions=max(1, value - 1))
-    return np.asarray(value, dtype=float)
+    if not isinstance(value, list):
+        return value
+    try:
+        array = np.array(value)
+    except ValueError:
+        raise _Mistake("expected rows of equal length", name) from None
+    if name in IN_OBJECTIVES and (array.ndim != 2 or array.shape[1] != 2):
+        raise _Mistake("expected a list of pairs, [error, triangles] each", name)
+    return array.astype(float) if array.dtype.kind in "iuf" else value
 
 
 def _sorted(values: Mapping[str, Any]) -> dict[str, Any]:

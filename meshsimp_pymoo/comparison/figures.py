@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import TRADE_OFFS, anytime, attainment_surfaces, selected_solutions
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.statistics import ALPHA, performance_profile
-from meshsimp_pymoo.comparison.store import classic_mesh
+from meshsimp_pymoo.comparison.store import StoredRun, classic_mesh
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study, ranked
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plain_numbers, plot_error, plot_mesh
@@ -47,8 +48,10 @@ __all__ = [
 # Okabe and Ito's colours, told apart by all eyes; methods beyond them have them again, with other marks.
 COLOURS = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73", "#CC79A7", "#6A3D9A", "#8C6D31")
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<")
+# As many colours as marks have no divisor in common, so no two baselines look the same; whole fronts are lines.
 CLASSIC_COLOURS = ("#222222", "#555555", "#888888", "#AAAAAA")
-CLASSIC_MARKS = ("+", "x", "1", "2")
+CLASSIC_MARKS = ("+", "x", "1", "2", "3", "4", "*")
+CLASSIC_LINES = dict(zip([b.label for b in BASELINES.values() if b.front], ("-", "--", ":"), strict=True))
 KINDS = {"fewest_triangles": "fewest triangles", "trade_off": "best trade-off", "least_error": "least error"}
 
 # Seconds: the shortest time that a logarithmic axis shows.
@@ -86,6 +89,10 @@ def fronts_figure(study: Study, case: Case) -> Figure:
         merged = np.vstack(list(runs.values()))
         front = non_dominated(merged)
         style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "zorder": 3}
+        if method in CLASSIC_LINES:
+            line = {"color": colour, "linestyle": CLASSIC_LINES[method], "linewidth": 1.3}
+            ax.step(front[:, 1], front[:, 0], where="post", label=method, zorder=2, **line)
+            continue
         if method in case.classic:
             ax.plot(front[:, 1], front[:, 0], markersize=7, label=method, **style)
             continue
@@ -365,7 +372,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     """Draw the original and the best trade-offs of some methods: from the front, from the side, and their error.
 
     First those that the paper shows (Figure 10), NSGA-II v2 and MOEA/D, then the best of the others by hypervolume.
-    Of a classic method the mesh whose size is nearest to that of the best evolutionary trade-off is shown.
+    Of one baseline, MeshLab's if it is there, the mesh whose size is nearest to that of the best evolutionary trade-off
+    is shown.
     """
     from matplotlib.figure import Figure
 
@@ -412,30 +420,38 @@ def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
     chosen = selected_solutions(case.runs, optimal=case.optimal)
     trade_offs = {method: next(s for s in solutions if s.kind == "trade_off") for method, solutions in chosen.items()}
     evolutionary = [m for m in case.runs if m not in case.classic]
-    papers = [study.role(preset) for preset in ("nsga2_v2", "moead")]
+    papers = [study.starts[0].roles.get(preset) for preset in ("nsga2_v2", "moead")] if study.starts else []
     best_first = sorted(evolutionary, key=lambda m: -case.scores[m].merged_hvr)
     order = [m for m in papers if m in evolutionary] + [m for m in best_first if m not in papers]
-    picked = order[: MOST_MESHES - bool(case.classic)]  # and one classic method, if there is one
+    picked = order[: MOST_MESHES - bool(case.classic)]  # and one baseline, if there is any
     size = trade_offs[best_first[0]].triangles
     shown = []
     for method in picked:
         solution = trade_offs[method]
         found = case.find(method, solution.error, solution.triangles)
-        kept = np.unpackbits(found.run.arrays["kept"][found.row])[: surface.n_vertices].astype(bool)
-        mesh = surface.simplify(kept)
-        deviation = np.abs(mesh.deviation)
-        title = _mesh_title(surface, method, len(mesh.faces), deviation, mesh.covered)
-        shown.append(_Shown(title, surface.points, mesh.faces, deviation, mesh.covered))
-    for (name, method), run in study.classic_runs.items():
-        if name == case.problem.name and method == "quadric_collapse":
-            sizes = run.arrays["F"][:, 1]
-            row = int(np.argmin(np.abs(np.log(np.maximum(sizes, 0.1) / size))))
-            vertices, faces = classic_mesh(run, row)
-            scored = surface.score(vertices, faces)
-            deviation, covered = scored.deviation, scored.covered
-            title = _mesh_title(surface, CLASSIC_NAMES[method], len(faces), deviation, covered)
-            shown.append(_Shown(title, surface.model.to_local(vertices), faces, deviation, covered))
+        shown.append(_subset_shown(surface, method, found.run, found.row))
+    baselines = [(method, run) for (name, method), run in study.classic_runs.items() if name == case.problem.name]
+    for method, run in sorted(baselines, key=lambda pair: pair[0] != "quadric_collapse")[:1]:
+        sizes = run.arrays["F"][:, 1]
+        row = int(np.argmin(np.abs(np.log(np.maximum(sizes, 0.1) / size))))
+        if BASELINES[method].front:
+            shown.append(_subset_shown(surface, CLASSIC_NAMES[method], run, row))
+            continue
+        vertices, faces = classic_mesh(run, row)
+        scored = surface.score(vertices, faces)
+        deviation, covered = scored.deviation, scored.covered
+        title = _mesh_title(surface, CLASSIC_NAMES[method], len(faces), deviation, covered)
+        shown.append(_Shown(title, surface.model.to_local(vertices), faces, deviation, covered))
     return shown
+
+
+def _subset_shown(surface: HeightSurface, method: str, run: StoredRun, row: int) -> _Shown:
+    """Return the mesh of a stored subset of the model's vertices."""
+    kept = np.unpackbits(run.arrays["kept"][row])[: surface.n_vertices].astype(bool)
+    mesh = surface.simplify(kept)
+    deviation = np.abs(mesh.deviation)
+    title = _mesh_title(surface, method, len(mesh.faces), deviation, mesh.covered)
+    return _Shown(title, surface.points, mesh.faces, deviation, mesh.covered)
 
 
 def _mesh_title(
@@ -452,8 +468,8 @@ def method_look(study: Study, case: Case, method: str) -> tuple[str, str]:
     if method in study.methods:
         again, place = divmod(study.methods.index(method), len(COLOURS))
         return COLOURS[place], MARKS[(place + again) % len(MARKS)]
-    place = case.classic.index(method) if method in case.classic else 0
-    return CLASSIC_COLOURS[place % 4], CLASSIC_MARKS[place % 4]
+    place = list(CLASSIC_NAMES.values()).index(method)
+    return CLASSIC_COLOURS[place % len(CLASSIC_COLOURS)], CLASSIC_MARKS[place % len(CLASSIC_MARKS)]
 
 
 def _absent(cases: Sequence[Case], methods: Sequence[str]) -> str:

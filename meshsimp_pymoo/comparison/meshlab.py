@@ -1,7 +1,7 @@
-"""What MeshLab makes of a mesh: quadric edge collapse and vertex clustering, the classic methods.
+"""What MeshLab makes of a mesh: quadric edge collapse and vertex clustering, the paper's classic methods.
 
 Both run through pymeshlab (GPL-3), which the extra ``[meshlab]`` installs and which is imported only when it is needed.
-It needs two libraries of the system; where something is missing, `MeshLabUnavailable` names it and everything else
+It needs two libraries of the system; where something is missing, a `ToolUnavailable` names it and everything else
 goes on working.
 
 Four properties of MeshLab decide how its filters are called here:
@@ -22,42 +22,23 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cache, partial
+from collections.abc import Callable, Iterator
+from functools import cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.errors import way_to_install
-from meshsimp_pymoo.surface.surface import Surface, require_rules
+from meshsimp_pymoo.errors import ToolUnavailable, way_to_install
 
-if TYPE_CHECKING:
-    from meshsimp_pymoo.surface.measures import Quality
-
-__all__ = [
-    "MESHLAB_METHODS",
-    "REDUCTIONS",
-    "BaselineMesh",
-    "MeshLabUnavailable",
-    "meshlab_available",
-    "meshlab_front",
-    "quadric_collapse",
-    "reductions",
-    "vertex_clustering",
-]
+__all__ = ["is_close", "load_pymeshlab", "local_frame", "meshlab_available", "quadric_collapse", "vertex_clustering"]
 
 Mesh = tuple[FloatArray, IntArray]
 
 QUADRIC = "meshing_decimation_quadric_edge_collapse"
 CLUSTERING = "meshing_decimation_clustering"
-
-# The paper's series: the share of the triangles that is removed.
-REDUCTIONS = tuple(percent / 100 for percent in range(5, 51, 5))
 
 # A count this close to the one asked for is what was asked for (1 off as well: a collapse removes two).
 TOLERANCE = 0.02
@@ -68,92 +49,13 @@ BISECTIONS = 24
 NEIGHBOURING_SIZES = 64
 
 
-class MeshLabUnavailable(ImportError):
-    """MeshLab's filters cannot be used on this machine; the message says what to install."""
-
-
-@dataclass(frozen=True)
-class BaselineMesh:
-    """A mesh made by a classic method, with its score.
-
-    Attributes
-    ----------
-    method : str
-        A key of `MESHLAB_METHODS`.
-    asked : int
-        Number of triangles that was asked for.
-    vertices : (V, 3) float array
-        In the file's frame [model units].
-    faces : (T, 3) int array
-        Its triangles, T of them: the number really obtained.
-    quality : Quality
-        The error at all vertices of the model, as for every other mesh.
-    seconds : float
-        Time the method took, scoring left out.
-    """
-
-    method: str
-    asked: int
-    vertices: FloatArray
-    faces: IntArray
-    quality: Quality
-    seconds: float
-
-    @property
-    def triangles(self) -> int:
-        """Number of triangles obtained."""
-        return len(self.faces)
-
-    @property
-    def note(self) -> str:
-        """The difference to the number of triangles asked for; empty if within 2 % (or one triangle)."""
-        if _close(self.triangles, self.asked):
-            return ""
-        return f"{self.method} was asked for {self.asked} triangles and gave {self.triangles}"
-
-
 def meshlab_available() -> bool:
     """Return whether MeshLab's filters can be used on this machine, without printing anything."""
     try:
-        _pymeshlab()
-    except MeshLabUnavailable:
+        load_pymeshlab()
+    except ToolUnavailable:
         return False
     return True
-
-
-def reductions(triangles: int, *, down_to: int | None = None, steps: int = 10) -> tuple[int, ...]:
-    """Return the numbers of triangles to simplify a mesh to, largest first.
-
-    Parameters
-    ----------
-    triangles : int
-        Number of triangles of the mesh.
-    down_to : int, optional
-        Add a second series of ``steps`` numbers from the end of the first one down to this number, each the
-        same fraction of the one before: the sizes that evolutionary fronts reach lie mostly below half.
-    steps : int
-        Length of the second series.
-
-    Returns
-    -------
-    tuple of int
-        95 %, 90 %, ..., 50 % of ``triangles``, then the second series; no number twice.
-
-    Examples
-    --------
-    >>> reductions(1000)
-    (950, 900, 850, 800, 750, 700, 650, 600, 550, 500)
-    >>> reductions(1000, down_to=4, steps=3)[10:]
-    (100, 20, 4)
-    """
-    if triangles < 1 or steps < 1 or (down_to is not None and down_to < 1):
-        raise ValueError(
-            f"triangles={triangles}, down_to={down_to}, steps={steps}: every one of them must be at least 1"
-        )
-    series = [round(triangles * (1 - share)) for share in REDUCTIONS]
-    if down_to is not None and down_to < series[-1]:
-        series += np.geomspace(series[-1], down_to, steps + 1)[1:].round().astype(int).tolist()
-    return tuple(sorted({max(1, number) for number in series}, reverse=True))
 
 
 def quadric_collapse(
@@ -194,16 +96,15 @@ def quadric_collapse(
 
     Raises
     ------
-    MeshLabUnavailable
+    ToolUnavailable
         If pymeshlab cannot be used here.
     ValueError
         If the mesh or the number of triangles is unusable.
     """
     points, corners = _checked_mesh(vertices, faces, triangles)
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    scale = 2.0 ** -np.floor(np.log2(_diagonal(points))) if unit_diagonal else 1.0
+    local, back = local_frame(points, unit_diagonal=unit_diagonal)
     collapsed, remaining = _filtered(
-        (points - centre) * scale,
+        local,
         corners,
         QUADRIC,
         targetfacenum=int(triangles),
@@ -220,7 +121,7 @@ def quadric_collapse(
         autoclean=True,
         selected=False,
     )
-    return collapsed / scale + centre, remaining
+    return back(collapsed), remaining
 
 
 def vertex_clustering(vertices: ArrayLike, faces: ArrayLike, triangles: int) -> Mesh:
@@ -254,21 +155,21 @@ def vertex_clustering(vertices: ArrayLike, faces: ArrayLike, triangles: int) -> 
 
     Raises
     ------
-    MeshLabUnavailable
+    ToolUnavailable
         If pymeshlab cannot be used here.
     ValueError
         If the mesh or the number of triangles is unusable.
     """
     points, corners = _checked_mesh(vertices, faces, triangles)
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    local, back = local_frame(points, unit_diagonal=False)
     diagonal = _diagonal(points)
     best: tuple[int, float, Mesh] | None = None
 
     def count(size: float) -> int:
         """Try a cell size and remember the mesh if it is the closest so far (the coarser one of equals)."""
         nonlocal best
-        cell = _pymeshlab().PureValue(size * diagonal)
-        mesh = _filtered(points - centre, corners, CLUSTERING, threshold=cell)
+        cell = load_pymeshlab().PureValue(size * diagonal)
+        mesh = _filtered(local, corners, CLUSTERING, threshold=cell)
         obtained = len(mesh[1])
         if obtained and (best is None or (abs(obtained - triangles), -size) < best[:2]):
             best = abs(obtained - triangles), -size, mesh
@@ -284,104 +185,34 @@ def vertex_clustering(vertices: ArrayLike, faces: ArrayLike, triangles: int) -> 
         if obtained == triangles:
             break
         low, high = (middle, high) if obtained > triangles else (low, middle)
-    if best is None or not _close(len(best[2][1]), triangles):
+    if best is None or not is_close(len(best[2][1]), triangles):
         for size in 2.0 ** (high + np.linspace(-0.5, 0.5, NEIGHBOURING_SIZES)):
-            if _close(count(float(size)), triangles):
+            if is_close(count(float(size)), triangles):
                 break
     if best is None:
         raise ValueError(f"MeshLab's clustering leaves none of {len(corners)} triangles at any cell size")
     merged, remaining = best[2]
-    return merged + centre, remaining
+    return back(merged), remaining
 
 
-@dataclass(frozen=True)
-class Method:
-    """A classic method: ``method(vertices, faces, triangles) -> (vertices, faces)``.
+def local_frame(points: FloatArray, *, unit_diagonal: bool) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+    """Return the points around their middle, and what brings others back to where they came from.
 
-    Attributes
-    ----------
-    label : str
-        What tables call it.
-    simplify : callable
-        The function that does it.
+    With ``unit_diagonal`` they are scaled, by a power of two, to a bounding box diagonal of 1 to 2, which the
+    thresholds of quadric methods suppose.
+
+    >>> local, back = local_frame(np.array([[10.0, 0, 0], [18, 0, 0]]), unit_diagonal=True)
+    >>> local[:, 0], back(local)[:, 0]
+    (array([-0.5,  0.5]), array([10., 18.]))
     """
-
-    label: str
-    simplify: Callable[[ArrayLike, ArrayLike, int], Mesh]
-
-    def __call__(self, vertices: ArrayLike, faces: ArrayLike, triangles: int) -> Mesh:
-        """Simplify a mesh to about so many triangles."""
-        return self.simplify(vertices, faces, triangles)
-
-
-MESHLAB_METHODS = {
-    "quadric_collapse": Method(
-        "MeshLab quadric", partial(quadric_collapse, preserve_boundary=False, unit_diagonal=False)
-    ),
-    "quadric_collapse_unit": Method(
-        "MeshLab quadric, unit size", partial(quadric_collapse, preserve_boundary=False, unit_diagonal=True)
-    ),
-    "quadric_collapse_boundary": Method(
-        "MeshLab quadric, border kept", partial(quadric_collapse, preserve_boundary=True, unit_diagonal=True)
-    ),
-    "vertex_clustering": Method("MeshLab clustering", vertex_clustering),
-}
-"""The methods by name."""
-
-
-def meshlab_front(
-    surface: Surface, triangles: Iterable[int], *, methods: Sequence[str] = tuple(MESHLAB_METHODS)
-) -> list[BaselineMesh]:
-    """Simplify a model by every method to every number of triangles, and score the meshes.
-
-    MeshLab gets the model as the file has it, not turned upright, as a user of MeshLab would give it.
-
-    Parameters
-    ----------
-    surface : Surface
-        The model and its rules, by which the meshes are scored.
-    triangles : iterable of int
-        Numbers of triangles, e.g. from `reductions`; none may exceed the model's own.
-    methods : sequence of str
-        Keys of `MESHLAB_METHODS`.
-
-    Returns
-    -------
-    list of BaselineMesh
-        Method by method, in the order of ``triangles``; as they come, dominated ones included.
-
-    Raises
-    ------
-    MeshLabUnavailable
-        If pymeshlab cannot be used here.
-    ValueError
-        If a method is unknown or a number of triangles impossible; nothing is computed then.
-    """
-    require_rules(surface, "meshlab_front")
-    model, scale = surface.model, surface.view.scale
-    measured = model.file_points * scale
-    numbers = [int(number) for number in triangles]
-    for name in methods:
-        if name not in MESHLAB_METHODS:
-            raise ValueError(f"unknown MeshLab method {name!r}: choose among {', '.join(MESHLAB_METHODS)}")
-    for number in numbers:
-        _checked_mesh(measured, model.faces, number)
-    _pymeshlab()
-    meshes = []
-    for name in methods:
-        for number in numbers:
-            start = time.perf_counter()
-            vertices, faces = MESHLAB_METHODS[name](measured, model.faces, number)
-            vertices = vertices / scale
-            seconds = time.perf_counter() - start
-            quality = surface.score(vertices, faces).quality
-            meshes.append(BaselineMesh(name, number, vertices, faces, quality, seconds))
-    return meshes
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    scale = 2.0 ** -np.floor(np.log2(_diagonal(points))) if unit_diagonal else 1.0
+    return (points - centre) * scale, lambda moved: np.asarray(moved, float) / scale + centre
 
 
 @cache
-def _pymeshlab() -> ModuleType:
-    """Import pymeshlab, quietly, and make sure that the filters are there."""
+def load_pymeshlab() -> ModuleType:
+    """Import pymeshlab, quietly, and make sure that the filters are there; a `ToolUnavailable` says what is missing."""
     try:
         with _quiet():
             import pymeshlab
@@ -390,12 +221,12 @@ def _pymeshlab() -> ModuleType:
             filters = set(pymeshlab.filter_list())
     except ModuleNotFoundError as error:
         way = way_to_install("meshlab")
-        raise MeshLabUnavailable(f"MeshLab's methods need pymeshlab; install it by {way}") from error
+        raise ToolUnavailable(f"MeshLab's methods need pymeshlab; install it by {way}") from error
     except ImportError as error:
-        raise MeshLabUnavailable(_unavailable(str(error))) from error
+        raise ToolUnavailable(_unavailable(str(error))) from error
     missing = {QUADRIC, CLUSTERING} - filters
     if missing:
-        raise MeshLabUnavailable(_unavailable(f"it lacks {' and '.join(sorted(missing))}"))
+        raise ToolUnavailable(_unavailable(f"it lacks {' and '.join(sorted(missing))}"))
     return pymeshlab
 
 
@@ -426,7 +257,7 @@ def _quiet() -> Iterator[None]:
 
 def _filtered(vertices: FloatArray, faces: IntArray, name: str, **parameters: Any) -> Mesh:
     """Apply a MeshLab filter to a mesh; return its result in the order of `_canonical`."""
-    pymeshlab = _pymeshlab()
+    pymeshlab = load_pymeshlab()
     meshes = pymeshlab.MeshSet()
     meshes.add_mesh(pymeshlab.Mesh(vertex_matrix=vertices, face_matrix=faces))
     meshes.apply_filter(name, **parameters)
@@ -486,6 +317,6 @@ def _diagonal(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _close(obtained: int, asked: int) -> bool:
+def is_close(obtained: int, asked: int) -> bool:
     """Return whether a number of triangles is what was asked for, to 2 % or one triangle."""
     return abs(obtained - asked) <= max(1.0, TOLERANCE * asked)

@@ -1,4 +1,4 @@
-"""The page of an experiment: findings, fronts, pictures, tables and configuration in one file.
+"""The page of an experiment: comparison, fronts, pictures, tables, findings and configuration in one file.
 
 The fronts are drawn by the page itself; the other figures are those of the folder ``figures``, made smaller.
 """
@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray
-from meshsimp_pymoo.comparison import findings as verdicts
-from meshsimp_pymoo.comparison import tables
+from meshsimp_pymoo.comparison import findings_page, tables
 from meshsimp_pymoo.comparison.analysis import attainment_surfaces
 from meshsimp_pymoo.comparison.figures import method_look
-from meshsimp_pymoo.comparison.study import SCORINGS, Case, Study
+from meshsimp_pymoo.comparison.findings import CLAIMS, DOES_NOT_HOLD, HOLDS, UNDECIDED, Finding
+from meshsimp_pymoo.comparison.study import INDICATORS, PROCEDURES, SCORINGS, Case, Study
 from meshsimp_pymoo.indicators import merged_front
 from meshsimp_pymoo.report.document import html_document, slug
 
@@ -28,17 +28,17 @@ __all__ = ["experiment_page"]
 SCRIPTS = ("vendor/d3.min.js", "chart.js", "experiment.js")
 # Pictures are as wide as they can be shown on a screen of twice the usual density, and no wider.
 PICTURE_WIDTH, PICTURE_QUALITY = 1600, 82
-VERDICT_CLASSES = {verdicts.HOLDS: "holds", verdicts.DOES_NOT_HOLD: "fails", verdicts.UNDECIDED: "open"}
+VERDICT_CLASSES = {HOLDS: "holds", DOES_NOT_HOLD: "fails", UNDECIDED: "open"}
 # The page's marks by matplotlib's names.
 MARKS = {
     "o": "circle", "s": "square", "^": "up", "D": "diamond", "v": "down", "P": "plus", "X": "cross", "<": "left",
-    "+": "plus", "x": "cross", "1": "down", "2": "up",
+    "+": "plus", "x": "cross", "1": "down", "2": "up", "3": "left", "4": "diamond", "*": "star",
 }  # fmt: skip
 # Parts of experiment.json that the page shows as the configuration.
-CONFIGURATION = ("title", "problems", "algorithms", "seeds", "budgets", "meshlab")
+CONFIGURATION = ("title", "problems", "algorithms", "seeds", "budgets", "baselines")
 
 
-def experiment_page(study: Study, found: Sequence[verdicts.Finding]) -> str:
+def experiment_page(study: Study, found: Sequence[Finding]) -> str:
     """Return the page of an experiment whose tables and figures are written already.
 
     Parameters
@@ -61,14 +61,17 @@ def experiment_page(study: Study, found: Sequence[verdicts.Finding]) -> str:
         SCRIPTS,
         {"charts": charts},
         title=study.title,
-        overview=verdicts.what_was_run(study),
-        warnings=verdicts.reservations(study),
+        overview=findings_page.what_was_run(study),
+        warnings=findings_page.reservations(study),
         verdict_class=VERDICT_CLASSES,
-        settings=[_setting(budget, scoring) for budget, scoring in settings],
-        claims=list(_claims(settings, found)),
+        rankings=[_ranking(study, budget, scoring) for budget, scoring in settings],
+        how=findings_page.HOW.replace("*", ""),
+        columns=[f"{_setting(f.budget, f.scoring)}, {f.start}" for f in _columns(found)],
+        claims=list(_claims(found)),
+        own_first=any(study.kind(method) in ("own", "pymoo") for method in study.methods),
         sections=sections,
         models=list(_models(study)),
-        meshlab=[table for budget in study.budgets if (table := tables.meshlab(study, budget)) is not None],
+        baselines=[table for budget in study.budgets if (table := tables.baselines(study, budget)) is not None],
         times=[_times(study, budget) for budget in study.budgets],
         configuration=_configuration(study),
         versions=study.versions,
@@ -80,19 +83,36 @@ def _setting(budget: str, scoring: str) -> str:
     return f"{budget}, error {SCORINGS[scoring]}"
 
 
-def _claims(settings: Sequence[tuple[str, str]], found: Sequence[verdicts.Finding]) -> Iterator[dict[str, Any]]:
-    """Yield the verdicts on each claim, one row for each indicator."""
-    by_place = {(f.claim.key, f.indicator, f.budget, f.scoring): f for f in found}
-    for claim in verdicts.CLAIMS:
+def _ranking(study: Study, budget: str, scoring: str) -> dict[str, Any]:
+    """Return the comparison of all methods at one budget and scoring, as a table and as a diagram."""
+    path = study.out / "figures" / slug(budget) / slug(scoring) / "critical_difference.png"
+    alt = f"mean ranks of the methods, bars over those that are not told apart ({_setting(budget, scoring)})"
+    return {"table": tables.ranking(study, budget, scoring), "picture": _picture(path, alt)}
+
+
+def _columns(found: Sequence[Finding]) -> list[Finding]:
+    """Return a finding of each budget, scoring and start."""
+    return list({(f.budget, f.scoring, f.start): f for f in reversed(found)}.values())[::-1]
+
+
+def _claims(found: Sequence[Finding]) -> Iterator[dict[str, Any]]:
+    """Yield the verdicts on each claim, one row for each procedure and indicator."""
+    places = [(f.budget, f.scoring, f.start) for f in _columns(found)]
+    by_place = {(f.claim.key, f.procedure, f.indicator, (f.budget, f.scoring, f.start)): f for f in found}
+    for claim in findings_page.shown_claims(CLAIMS, found):
         rows = [
-            (tables.INDICATOR_NAMES[key], [by_place[claim.key, key, budget, scoring] for budget, scoring in settings])
+            (
+                f"{PROCEDURES[procedure]}, {INDICATORS[key]}",
+                [by_place[claim.key, procedure, key, place] for place in places],
+            )
+            for procedure in claim.procedures
             for key in claim.indicators
         ]
-        yield {"text": claim.text + ("" if claim.in_paper else " (not in the paper)"), "rows": rows}
+        yield {"text": f"{claim.text} (Sec. {claim.section})", "rows": rows}
 
 
 def _section(
-    study: Study, budget: str, scoring: str, found: Sequence[verdicts.Finding], charts: dict[str, Any]
+    study: Study, budget: str, scoring: str, found: Sequence[Finding], charts: dict[str, Any]
 ) -> dict[str, Any]:
     """Return what the page says of one budget and scoring; its charts are added to ``charts`` by their id."""
     place = f"{slug(budget)}/{slug(scoring)}"
@@ -120,14 +140,15 @@ def _section(
         "profile": "performance profiles of every method by epsilon",
     }
     pictures = [_picture(figures / f"{name}.png", f"{alt} ({_setting(budget, scoring)})") for name, alt in alts.items()]
-    reasons = [f for f in found if (f.budget, f.scoring) == (budget, scoring) and (f.reason or f.background)]
+    shown = {claim.key for claim in findings_page.shown_claims(CLAIMS, found)}
+    reasons = [f for f in found if (f.budget, f.scoring) == (budget, scoring) and f.claim.key in shown]
     return {
         "id": f"at-{slug(budget)}-{slug(scoring)}",
         "title": _setting(budget, scoring),
         "models": models,
         "pictures": [picture for picture in pictures if picture],
-        "tables": [make(study, budget, scoring) for make in tables.COMPARISONS],
-        "reasons": [(f, tables.INDICATOR_NAMES[f.indicator]) for f in reasons],
+        "tables": [make(study, budget, scoring) for make in tables.COMPARISONS if make is not tables.ranking],
+        "reasons": [(f, f"{INDICATORS[f.indicator]}, {PROCEDURES[f.procedure]}, {f.start}") for f in reasons],
     }
 
 

@@ -2,7 +2,7 @@
 
 ::
 
-    OUT/findings.md                              the paper's claims, with verdicts and numbers
+    OUT/findings.md                              all methods compared, and the paper's claims with verdicts and numbers
     OUT/tables/BUDGET/SCORING/NAME.csv|md|tex    see `meshsimp_pymoo.comparison.tables`
     OUT/tables/runs.csv, findings.csv            all runs, all verdicts
     OUT/figures/BUDGET/SCORING/*.png             fronts_MODEL, hvr, cardinality, selected, meshes_MODEL, profile,
@@ -23,8 +23,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from meshsimp_pymoo.comparison import findings as verdicts
-from meshsimp_pymoo.comparison import tables
+from meshsimp_pymoo.comparison import findings_page, tables
+from meshsimp_pymoo.comparison.findings import Finding, findings
 from meshsimp_pymoo.comparison.page import experiment_page
 from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.comparison.study import Study
@@ -70,7 +70,7 @@ def write_report(out: str | os.PathLike[str], *, progress: Callable[[float, floa
     return study
 
 
-def write_tables(study: Study) -> list[verdicts.Finding]:
+def write_tables(study: Study) -> list[Finding]:
     """Write the tables, findings and times of an experiment, without its figures and its page; return the findings.
 
     Warns
@@ -82,7 +82,7 @@ def write_tables(study: Study) -> list[verdicts.Finding]:
         if items:
             more = f" and {len(items) - 1} more" if len(items) > 1 else ""
             warnings.warn(f"left out of the report, {what}: {items[0]}{more}", ExperimentWarning, stacklevel=3)
-    found: list[verdicts.Finding] = []
+    found: list[Finding] = []
     put_back(study.out / "tables")
     with new_folder(study.out / "tables", replace=True, flush=False) as folder:
         for budget in study.budgets:
@@ -92,15 +92,15 @@ def write_tables(study: Study) -> list[verdicts.Finding]:
                 place = folder / slug(budget) / slug(scoring)
                 for make in tables.COMPARISONS:
                     tables.write_table(place, make(study, budget, scoring))
-                found += verdicts.findings(study, budget, scoring)
-            meshlab = tables.meshlab(study, budget)
-            if meshlab is not None:
-                tables.write_table(folder / slug(budget), meshlab)
-        tables.write_table(folder, verdicts.table(found))
+                found += findings(study, budget, scoring)
+            baselines = tables.baselines(study, budget)
+            if baselines is not None:
+                tables.write_table(folder / slug(budget), baselines)
+        tables.write_table(folder, findings_page.table(found))
         (folder / "runs.csv").write_text(tables.runs(study).csv(), encoding="utf-8")
-    put_text(study.out / "findings.md", verdicts.page(study, found))
+    put_text(study.out / "findings.md", findings_page.findings_page(study, found))
     put_text(study.out / "times.csv", tables.times(study).csv())
-    put_text(study.out / "times.md", verdicts.times_page(study))
+    put_text(study.out / "times.md", findings_page.times_page(study))
     return found
 
 

@@ -11,11 +11,15 @@ that nothing depends on this process living on. While a search goes on, its stat
 `meshsimp_pymoo.search.checkpoint`): one that was killed goes on from there, to the same bytes. Results depend on
 neither the number of processes nor the order of the runs, except under a budget in seconds.
 
-Arrays of an evolutionary run: see `meshsimp_pymoo.comparison.store.StoredRun`. Arrays of a classic method on a model:
-``asked`` (R,), the numbers of triangles asked for; ``F``, ``vertices``, ``mean_error``, ... of the meshes
-obtained (all 0 and the error infinite where there is none); ``paper`` (R,) bool, whether it belongs to the
-paper's series of reductions; and the meshes, one after the other: ``mesh_vertices`` and ``mesh_faces``, with
-``vertex_start`` and ``face_start`` (R + 1,).
+The baselines follow once the searches are done, for their smallest sizes are those of the searched fronts; they are
+done and stored likewise, except that they stay on this machine.
+
+Arrays of an evolutionary run: see `meshsimp_pymoo.comparison.store.StoredRun`. Arrays of a baseline on a model:
+``asked`` (R,), the numbers of triangles asked for; ``F``, ``vertices``, ``mean_error``, ... of the meshes obtained (all
+0 and the error infinite where there is none); ``paper`` (R,) bool, whether it belongs to the paper's series of
+reductions; and the meshes, one after the other: ``mesh_vertices`` and ``mesh_faces``, with ``vertex_start`` and
+``face_start`` (R + 1,). A whole front has ``kept`` (R, ceil(N / 8)) in their place, and below the rows of what was
+asked for those of other sizes, for which ``asked`` is 0.
 """
 
 from __future__ import annotations
@@ -33,7 +37,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray
+from meshsimp_pymoo.comparison.baselines import (
+    BASELINES,
+    baseline_front,
+    baseline_meshes,
+    chosen_rows,
+    reductions,
+    size_note,
+)
 from meshsimp_pymoo.comparison.config import (
     AlgorithmConfig,
     Budget,
@@ -41,7 +53,6 @@ from meshsimp_pymoo.comparison.config import (
     ProblemConfig,
     read_experiment_file,
 )
-from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, meshlab_front, reductions
 from meshsimp_pymoo.comparison.store import (
     FORMAT,
     ExperimentWarning,
@@ -53,7 +64,7 @@ from meshsimp_pymoo.comparison.store import (
     write_run,
 )
 from meshsimp_pymoo.comparison.trace import Trace
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import ResultError, ToolUnavailable
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
@@ -71,7 +82,7 @@ from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import package_versions
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured, quality_of
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
 
 __all__ = ["Done", "Task", "perform", "plan", "run_experiment"]
@@ -83,7 +94,7 @@ Progress = Callable[[float, float, str], None]
 OVERHEAD_VERTICES = 600
 # What a second of budget counts as, in the same unit; roughly what a core does.
 WORK_PER_SECOND = 1e7
-# Work of a classic method on a model, in evaluations.
+# Work of a baseline on a model, in evaluations.
 BASELINE_EVALUATIONS = 2000
 
 # The folder, inside the experiment's, of the state of searches that are not finished.
@@ -203,8 +214,8 @@ def run_experiment(
         Number of processes. With 1, everything is done in this one. They are started anew, so in a script
         the call has to stand under ``if __name__ == "__main__":``.
     engine : Engine, optional
-        Where the searches are done, in place of ``jobs``: on a Dask cluster, say. The classic methods and the
-        writing are always done here.
+        Where the searches are done, in place of ``jobs``: on a Dask cluster, say. The baselines and the writing are
+        always done here.
     folder : path, optional
         Where the model files are, in place of what the configuration says.
     progress : callable, optional
@@ -238,14 +249,17 @@ def run_experiment(
         write_experiment(out, content | {"classic": [], "skipped": []})
         missing = [task.without(finished) for task in tasks]
         missing = [task for task in missing if task.budgets]
-        classic_work = _classic_work(experiment)
-        shown = _Shown(progress, sum(task.work for task in missing) + sum(classic_work.values()))
-        own = Serial() if jobs == 1 or len(missing) < 2 else Processes(min(jobs, len(missing)))
+        n_baselines = len(experiment.problems) * len(experiment.baselines.methods if experiment.baselines else ())
+        shown = _Shown(progress, sum(task.work for task in missing) + _baseline_work(experiment))
+        at_once = min(jobs, max(len(missing), n_baselines))
+        own = Serial() if at_once < 2 else Processes(at_once)
+        problems = {problem.name: problem for problem in experiment.problems}
+        shared = _Shared(problems, store.folder, checkpoint, experiment.not_resumable)
         with own:
-            _perform_all(missing, experiment, store, engine or own, shown, checkpoint)
-        with contextlib.suppress(OSError):
-            shutil.rmtree(out / CHECKPOINTS)
-        rows, skipped, computed = _classic(experiment, tasks, store, shown, classic_work)
+            _perform_all(missing, store, engine or own, shown, shared)
+            with contextlib.suppress(OSError):
+                shutil.rmtree(out / CHECKPOINTS)
+            rows, skipped, computed = _baselines(experiment, tasks, store, own, shown, shared)
         write_experiment(out, content | {"classic": rows, "skipped": list(skipped)})
         asked = {key for task in tasks for key in task.keys} | {row["key"] for row in rows}
         _name_stale(store, asked)
@@ -323,7 +337,8 @@ def perform(
                 "seconds": TimeBasedTermination,
             }
             termination = terminations[budget.kind](budget.amount)
-        return task.algorithm.build(task.merged_value).setup(problem, termination=termination, seed=task.seed)
+        searched = task.algorithm.searched(problem, task.merged_value)
+        return task.algorithm.build(task.merged_value).setup(searched, termination=termination, seed=task.seed)
 
     start = time.perf_counter()
     algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
@@ -338,8 +353,10 @@ def perform(
             algorithm = set_up()
     keeper = None
     if checkpoint is not None:
-        with contextlib.suppress(NotResumable):
+        try:
             keeper = Checkpoints(checkpoint, algorithm, _search_and_versions(task), interval=interval)
+        except NotResumable as trouble:
+            warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
     left = list(range(len(task.budgets)))
     set_aside = 0.0  # seconds spent on runs already yielded, on the trace and on checkpoints
     while left:
@@ -421,17 +438,22 @@ def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[A
     if optimum is not None and len(optimum):
         feasible = optimum.get("feas").ravel().astype(bool)
         kept = np.asarray(optimum.get("X"), dtype=bool).reshape(len(optimum), -1)[feasible] | problem.pinned
-    table = problem.evaluate_subsets(kept) if len(kept) else np.zeros((0, 6))
-    is_mesh = table[:, TRIANGLES] > 0
-    kept, table = kept[is_mesh], table[is_mesh]
+    arrays = _subset_arrays(problem, kept)
+    F = arrays["F"]
+    rows = np.flatnonzero(F[:, 1] > 0)  # is a mesh
+    if len(rows):
+        _, first = np.unique(F[rows, ::-1], axis=0, return_index=True)
+        best = {tuple(row) for row in non_dominated(F[rows[first]]).tolist()}
+        rows = np.array([row for row in rows[first] if tuple(F[row].tolist()) in best])
+    return {name: values[rows] for name, values in arrays.items()}
+
+
+def _subset_arrays(problem: MeshProblem, kept: BoolArray) -> dict[str, npt.NDArray[Any]]:
+    """Return what is stored of subsets (S, N)."""
     surface = problem.surface
     measure, total = surface.rules.measure, surface.total_weight
+    table = problem.evaluate_subsets(kept) if len(kept) else np.zeros((0, 6))
     F = np.column_stack([measured(table, measure, total), table[:, TRIANGLES]])
-    if len(F):
-        _, first = np.unique(F[:, ::-1], axis=0, return_index=True)
-        best = {tuple(row) for row in non_dominated(F[first]).tolist()}
-        rows = np.array([row for row in first if tuple(F[row].tolist()) in best])
-        kept, table, F = kept[rows], table[rows], F[rows]
     quality = [problem.as_quality(row) for row in table]
     nearest = F[:, 0]
     if surface.rules.outside != "nearest" and len(kept):
@@ -519,7 +541,7 @@ def _content(experiment: Experiment, tasks: Sequence[Task], out: Path) -> dict[s
         ],
         "seeds": list(experiment.seeds),
         "budgets": [{"name": budget.name, budget.kind: budget.amount} for budget in experiment.budgets],
-        "meshlab": experiment.meshlab and experiment.meshlab.model_dump(mode="json"),
+        "baselines": experiment.baselines and dict(experiment.baselines),
         "runs": [
             {
                 "key": key,
@@ -570,19 +592,18 @@ class _Shared:
     problems: Mapping[str, ProblemConfig]
     folder: Path | None
     checkpoint: float | None
+    not_resumable: Mapping[str, str]  # algorithms whose state cannot be saved, and why
 
 
-def _perform_all(
-    tasks: Sequence[Task],
-    experiment: Experiment,
-    store: RunStore,
-    engine: Engine,
-    shown: _Shown,
-    checkpoint: float | None,
-) -> None:
-    problems = {problem.name: problem for problem in experiment.problems}
-    shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint)
-    if shared.folder is not None and checkpoint is not None:
+def _perform_all(tasks: Sequence[Task], store: RunStore, engine: Engine, shown: _Shown, shared: _Shared) -> None:
+    if not engine.shares_files:
+        shared = replace(shared, folder=None)
+    if shared.folder is not None and shared.checkpoint is not None:
+        to_do = {task.algorithm.name for task in tasks}
+        for name, reason in shared.not_resumable.items():
+            if name in to_do:
+                line = f"{name}: a search that is cut off begins anew, for its state cannot be saved: {reason}"
+                warnings.warn(line, ExperimentWarning, stacklevel=3)
         for task in tasks:  # damage is named here, not by the processes
             _usable_checkpoint(task, _checkpoint_of(task, store.folder.parent))
     if shown.progress is not None:
@@ -595,9 +616,11 @@ def _perform_all(
                 store.add(run if isinstance(run, Path) else write_run(store.folder, *run))
             shown.add(tasks[place].work, tasks[place].label)
     except EngineError as problem:
-        raise ResultError(
-            f"{store.folder}: {problem}; what is finished is stored, the same command does the rest"
-        ) from None
+        raise _interrupted(store, problem) from None
+
+
+def _interrupted(store: RunStore, problem: EngineError) -> ResultError:
+    return ResultError(f"{store.folder}: {problem}; what is finished is stored, the same command does the rest")
 
 
 def _work_on(task: Task, shared: _Shared) -> list[Any]:
@@ -613,7 +636,7 @@ def _work_on(task: Task, shared: _Shared) -> list[Any]:
 def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
     problem = shared.problems[task.problem].build()
     saved: dict[str, Any] = {}
-    if shared.checkpoint is not None:
+    if shared.checkpoint is not None and task.algorithm.name not in shared.not_resumable:
         saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
     paths = []
     for k, arrays, facts in perform(task, problem, **saved):
@@ -622,66 +645,89 @@ def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
     return paths
 
 
-# ------------------------------------------------------------------------------------------------ classic methods
+# ------------------------------------------------------------------------------------------------------ baselines
 
 
-def _classic_work(experiment: Experiment) -> dict[str, float]:
-    """Return the work of a classic method on each problem."""
-    if experiment.meshlab is None:
-        return {}
-    return {
-        problem.name: len(experiment.meshlab.methods) * BASELINE_EVALUATIONS * float(problem.model.n_vertices)
-        for problem in experiment.problems
-    }
+@dataclass(frozen=True)
+class _BaselineTask:
+    """A baseline on a problem: its name, the numbers of triangles to ask for, and which are the paper's."""
+
+    problem: str
+    method: str
+    asked: tuple[int, ...]
+    paper: tuple[int, ...]
+    description: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        return fingerprint(self.description)
+
+    @property
+    def label(self) -> str:
+        return f"{self.problem} / {self.method}"
 
 
-def _classic(
-    experiment: Experiment,
-    tasks: Sequence[Task],
-    store: RunStore,
-    shown: _Shown,
-    work: Mapping[str, float],
+def _baseline_work(experiment: Experiment) -> float:
+    """Return the work of all baselines on all problems."""
+    methods = experiment.baselines.methods if experiment.baselines else ()
+    return sum(len(methods) * _work_of_one(problem) for problem in experiment.problems)
+
+
+def _work_of_one(problem: ProblemConfig) -> float:
+    return BASELINE_EVALUATIONS * float(problem.model.n_vertices)
+
+
+def _baselines(
+    experiment: Experiment, tasks: Sequence[Task], store: RunStore, engine: Engine, shown: _Shown, shared: _Shared
 ) -> tuple[list[dict[str, Any]], tuple[str, ...], int]:
-    """Do what is missing of the classic methods; return rows for the record, what was skipped, how many done."""
-    if experiment.meshlab is None:
-        return [], (), 0
-    config = experiment.meshlab
-    available = meshlab_available()
-    rows: list[dict[str, Any]] = []
-    missing: list[str] = []
-    computed = 0
-    for problem in experiment.problems:
-        down_to = _fewest_triangles(problem, tasks, store) if config.down_to_fronts else None
-        paper = reductions(len(problem.model.faces))
-        asked = reductions(len(problem.model.faces), down_to=down_to, steps=config.steps)
-        for method in config.methods:
-            description = {
-                "meshlab": method,
-                "model": problem.model.hash,
-                "rules": plain(problem.rules),
-                "asked": list(asked),
-            }
-            key = fingerprint(description)
-            if store.get(key) is None:
-                if not available:
-                    missing.append(f"{problem.name} / {method}")
-                    continue
-                label = f"{problem.name} / {method}"
-                store.add(_write_classic(store.folder, label, problem, method, asked, paper, description))
-                computed += 1
-            rows.append({"key": key, "problem": problem.name, "method": method})
-            shown.add(work[problem.name] / len(config.methods), f"{problem.name} / {method}")
+    """Do what is missing of the baselines; return rows for the record, what was skipped, how many were done."""
+    asked = [task for problem in experiment.problems for task in _baseline_tasks(problem, experiment, tasks, store)]
+    missing = [task for task in asked if store.get(task.key) is None]
     for line in store.damaged:
         warnings.warn(f"{line}; it is computed again", ExperimentWarning, stacklevel=3)
     store.damaged.clear()
-    if not missing:
-        return rows, (), computed
+    for task in asked:
+        if task not in missing:
+            shown.add(_work_of_one(shared.problems[task.problem]), task.label)
+    unavailable: dict[int, str] = {}
     try:
-        meshlab_front(experiment.problems[0].build().surface, [1])
-        reason = "MeshLab's methods cannot be used here"
-    except MeshLabUnavailable as problem_of_machine:
-        reason = str(problem_of_machine)
-    return rows, (f"skipped: {', '.join(missing)}: {reason}",), computed
+        for place, done in engine.each(_baseline_on, missing, shared):
+            if isinstance(done, Path):
+                store.add(done)
+            else:
+                unavailable[place] = done
+            shown.add(_work_of_one(shared.problems[missing[place].problem]), missing[place].label)
+    except EngineError as problem_of_engine:
+        raise _interrupted(store, problem_of_engine) from None
+    skipped: dict[str, list[str]] = {}
+    for place, reason in sorted(unavailable.items()):
+        skipped.setdefault(reason, []).append(missing[place].label)
+    lines = tuple(f"skipped: {', '.join(labels)}: {reason}" for reason, labels in skipped.items())
+    without = {missing[place].key for place in unavailable}
+    rows = [
+        {"key": task.key, "problem": task.problem, "method": task.method} for task in asked if task.key not in without
+    ]
+    return rows, lines, len(missing) - len(unavailable)
+
+
+def _baseline_tasks(
+    problem: ProblemConfig, experiment: Experiment, tasks: Sequence[Task], store: RunStore
+) -> Iterator[_BaselineTask]:
+    """Yield the baselines on a problem whose searches are done."""
+    config = experiment.baselines
+    if config is None:
+        return
+    triangles = len(problem.model.faces)
+    down_to = _fewest_triangles(problem, tasks, store) if config.down_to_fronts else None
+    asked = reductions(triangles, down_to=down_to, steps=config.steps)
+    for method in config.methods:
+        description = {
+            "baseline": method,
+            "model": problem.model.hash,
+            "rules": plain(problem.rules),
+            "asked": list(asked),
+        }
+        yield _BaselineTask(problem.name, method, asked, reductions(triangles), description)
 
 
 def _fewest_triangles(problem: ProblemConfig, tasks: Sequence[Task], store: RunStore) -> int | None:
@@ -695,62 +741,53 @@ def _fewest_triangles(problem: ProblemConfig, tasks: Sequence[Task], store: RunS
     return min(fewest, default=None)
 
 
-def _write_classic(
-    folder: Path,
-    label: str,
-    problem: ProblemConfig,
-    method: str,
-    asked: Sequence[int],
-    paper: Sequence[int],
-    description: Mapping[str, Any],
-) -> Path:
-    """Let a classic method simplify a model to all sizes, and write what it made."""
-    surface = problem.build().surface
+def _baseline_on(task: _BaselineTask, shared: _Shared) -> Path | str:
+    """Do a baseline; return the record of what it made, or why it cannot be used here."""
+    assert shared.folder is not None
+    problem, baseline = shared.problems[task.problem].build(), BASELINES[task.method]
+    try:
+        arrays, facts = (_meshes_of if baseline.tool else _front_of)(task, problem)
+    except ToolUnavailable as reason:
+        return str(reason)
+    arrays["paper"] = np.isin(arrays["asked"], task.paper)
+    facts |= {
+        "problem": task.problem,
+        "algorithm": task.method,
+        "versions": package_versions(*[baseline.package] * bool(baseline.package)),
+    }
+    return write_run(shared.folder, task.label, task.description, arrays, facts)
+
+
+def _meshes_of(task: _BaselineTask, problem: MeshProblem) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any]]:
+    """Let a tool simplify a model to all sizes; return arrays and facts."""
+    surface = problem.surface
     measure = surface.rules.measure
     charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))
-    none = quality_of((name, 0 if name in COUNTED else np.inf) for name in MEASURES)
-    none = replace(none, uncovered=surface.n_vertices)
-    quality, nearest, notes = [], [], []
-    vertices: list[FloatArray] = []
-    faces: list[IntArray] = []
-    start = time.perf_counter()
-    for number in asked:
-        try:
-            (mesh,) = meshlab_front(surface, [number], methods=[method])
-        except MeshLabUnavailable:
-            raise
-        except ValueError as nothing:  # too few triangles to have an area, say
-            quality.append(none)
-            nearest.append(np.inf)
-            vertices.append(np.empty((0, 3)))
-            faces.append(np.empty((0, 3), dtype=np.int64))
-            notes.append(f"no mesh: {nothing}")
-            continue
-        quality.append(mesh.quality)
-        everywhere = mesh.quality
-        if surface.rules.outside != "nearest":
-            everywhere = charged.score(mesh.vertices, mesh.faces).quality
-        nearest.append(getattr(everywhere, measure))
-        vertices.append(mesh.vertices)
-        faces.append(mesh.faces)
-        notes.append(mesh.note)
-    seconds = time.perf_counter() - start
+    meshes = baseline_meshes(surface, task.method, task.asked)
+    nearest = [mesh.quality for mesh in meshes]
+    if surface.rules.outside != "nearest":
+        nearest = [charged.score(m.vertices, m.faces).quality if m.triangles else m.quality for m in meshes]
     arrays = {
-        "asked": np.array(asked, dtype=np.int64),
-        "paper": np.isin(asked, paper),
-        "F": np.array([[getattr(q, measure), q.triangles] for q in quality], dtype=np.float64),
-        "error_nearest": np.array(nearest),
-        **_quality_arrays(quality),
-        "mesh_vertices": np.concatenate(vertices),
-        "mesh_faces": np.concatenate(faces).astype(np.int32),
-        "vertex_start": np.cumsum([0] + [len(v) for v in vertices]),
-        "face_start": np.cumsum([0] + [len(f) for f in faces]),
+        "asked": np.array(task.asked, dtype=np.int64),
+        "F": np.array([[getattr(m.quality, measure), m.triangles] for m in meshes], dtype=np.float64),
+        "error_nearest": np.array([getattr(quality, measure) for quality in nearest]),
+        **_quality_arrays([mesh.quality for mesh in meshes]),
+        "mesh_vertices": np.concatenate([mesh.vertices for mesh in meshes]),
+        "mesh_faces": np.concatenate([mesh.faces for mesh in meshes]).astype(np.int32),
+        "vertex_start": np.cumsum([0] + [len(mesh.vertices) for mesh in meshes]),
+        "face_start": np.cumsum([0] + [len(mesh.faces) for mesh in meshes]),
     }
-    facts = {
-        "problem": problem.name,
-        "algorithm": method,
-        "seconds": round(seconds, 4),
-        "notes": notes,
-        "versions": package_versions("pymeshlab"),
-    }
-    return write_run(folder, label, description, arrays, facts)
+    return arrays, {"seconds": round(sum(m.seconds for m in meshes), 4), "notes": [m.note for m in meshes]}
+
+
+def _front_of(task: _BaselineTask, problem: MeshProblem) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any]]:
+    """Return arrays and facts of a whole front."""
+    start = time.perf_counter()
+    front = baseline_front(problem.surface, task.method)
+    seconds = time.perf_counter() - start
+    answers, spread = chosen_rows(front, task.asked)
+    arrays = _subset_arrays(problem, np.array([front.kept(row) for row in (*answers, *spread)]))
+    arrays["asked"] = np.array([*task.asked, *[0] * len(spread)], dtype=np.int64)
+    sizes = arrays["F"][: len(answers), 1].astype(int).tolist()
+    notes = [size_note(task.method, number, obtained) for number, obtained in zip(task.asked, sizes, strict=True)]
+    return arrays, {"seconds": round(seconds, 4), "notes": notes + [""] * len(spread)}

@@ -72,7 +72,7 @@ class StoredRun:
         moments, the last of them its end: ``trace_generations`` (K,), ``trace_evaluations`` (K,), and the front at
         moment k, error as searched and triangles, sorted by triangles, as the rows ``trace_start[k]`` to
         ``trace_start[k + 1]`` of ``trace_F``; ``trace_start`` is (K + 1,). The record has the K
-        ``trace_seconds``, which are never the same twice. See the runner for what the classic methods add.
+        ``trace_seconds``, which are never the same twice. See the runner for what baselines have.
     """
 
     path: Path
@@ -222,7 +222,7 @@ def read_run(path: Path) -> StoredRun:
 
 
 def classic_mesh(run: StoredRun, row: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
-    """Return a mesh of a stored classic method: vertices (V, 3) in the file's frame, faces (M, 3)."""
+    """Return a stored mesh of a tool: vertices (V, 3) in the file's frame, faces (M, 3)."""
     v, f = run.arrays["vertex_start"], run.arrays["face_start"]
     return run.arrays["mesh_vertices"][v[row] : v[row + 1]], run.arrays["mesh_faces"][f[row] : f[row + 1]]
 

@@ -4,13 +4,26 @@ Where the search did not charge for uncovered vertices (``outside: ignore``, the
 is scored in two ways:
 
 as searched
-    by the error that the algorithms saw. Of MeshLab's meshes only the paper's series, reductions of 5 to
-    50 %, is compared: the smaller ones abandon nearly all of the model, and score well by that.
+    by the error that the algorithms saw. Of the tools' meshes only the paper's series, reductions of 5 to
+    50 %, is compared: the smaller ones abandon nearly all of the model, and score well by that. Whole fronts
+    (thinning, insertion) are made under the problem's rules, so all of their meshes are compared.
 every vertex
-    by the error with ``outside: nearest``, where an uncovered vertex costs its distance to the mesh. All of
-    MeshLab's meshes are compared.
+    by the error with ``outside: nearest``, where an uncovered vertex costs its distance to the mesh. All
+    meshes are compared.
 
 Where the search charged for them already, there is the second scoring alone.
+
+Methods are compared in two ways, the `PROCEDURES`:
+
+run against run
+    every run of the one with every run of the other;
+merged fronts
+    as in section 4.3 of the paper: the runs of a method merged to one front. A method whose every run is merged of
+    several already (the weighted-sum GA, of its eleven weights) keeps them apart: one of its fronts costs 11 searches,
+    one merged of ten runs of another method 10.
+
+Methods whose first population is drawn in the same way make up a `Start`; the paper's findings are looked at in each of
+them, among its methods alone.
 
 **Epsilon** compares errors by their ratio, and random subsets of every size include the whole mesh now and
 then, whose error is 0: one lucky draw would make the epsilon of everything else infinite. So `EPSILON_SHIFT`
@@ -22,12 +35,14 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.analysis import (
@@ -40,24 +55,32 @@ from meshsimp_pymoo.comparison.analysis import (
     dominance_rates,
     epsilon_table,
     pseudo_optimal,
+    scale_factor,
+    trade_off,
     unary_scores,
 )
-from meshsimp_pymoo.comparison.meshlab import MESHLAB_METHODS
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.statistics import Friedman, friedman, rank_sum
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
-from meshsimp_pymoo.indicators import hypervolume_ratio, non_dominated
+from meshsimp_pymoo.indicators import hypervolume_ratio, merged_front, non_dominated
+from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.rules import Rules
 
 __all__ = [
+    "BINARY",
     "CLASSIC_NAMES",
     "EPSILON_SHIFT",
+    "INDICATORS",
+    "PROCEDURES",
     "SCORINGS",
+    "SMALLER_IS_BETTER",
     "Case",
     "Picked",
     "Problem",
+    "Start",
     "Study",
     "ranked",
 ]
@@ -66,14 +89,34 @@ __all__ = [
 SCORINGS = {"searched": "as searched", "nearest": "every vertex"}
 """The scorings by key: what they are called."""
 
+PROCEDURES = {"runs": "run against run", "merged": "merged fronts (Sec. 4.3)"}
+"""How methods are compared, by key: what it is called."""
+
 EPSILON_SHIFT = 0.01
 """Share of the pseudo-optimal front's largest error that is added to every error before epsilon."""
+
+INDICATORS = {
+    "hvr": "HVR",
+    "cardinality": "cardinality",
+    "epsilon": "epsilon, each over the other",
+    "coverage": "coverage, each over the other",
+    "epsilon_optimal": "epsilon to the pseudo-optimal front",
+    "extent": "extent in triangles",
+    "least_error": "error of the least-error solution",
+    "fewest_triangles": "triangles of the smallest solution",
+    "trade_off": "value of the best trade-off",
+}
+"""What methods are compared by, by key: what it is called. The last three are of the solutions of section 4.7."""
+
+# Indicators between two fronts, and those of one front that are better when smaller.
+BINARY = ("epsilon", "coverage")
+SMALLER_IS_BETTER = ("epsilon", "epsilon_optimal", "least_error", "fewest_triangles", "trade_off")
 
 # A method without chance has one run, under this name.
 NO_SEED = 0
 
 # What tables call the methods without chance.
-CLASSIC_NAMES = {name: method.label for name, method in MESHLAB_METHODS.items()}
+CLASSIC_NAMES = {name: baseline.label for name, baseline in BASELINES.items()}
 
 
 @dataclass(frozen=True)
@@ -85,8 +128,30 @@ class Problem:
     vertices: int
     triangles: int
     rules: Rules
+    limits: dict[str, float]
     stored: str
     hash: str
+
+    def meets_limits(self, F: FloatArray) -> npt.NDArray[np.bool_]:
+        """Return which solutions (n, 2), by the error that was searched, a search of this problem could find."""
+        most = [self.limits.get(name, np.inf) for name in ("max_error", "max_triangles")]
+        return np.all(np.less_equal(F, most), axis=1)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Methods whose first population is drawn in the same way, and what they are in the paper.
+
+    Attributes
+    ----------
+    name : str
+        How it is drawn, in words.
+    roles : dict of str to str
+        The method that stands for a preset of the paper: the first one with the paper's settings.
+    """
+
+    name: str
+    roles: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -138,6 +203,29 @@ class Case:
     runs: dict[str, dict[int, FloatArray]]
     sources: dict[str, dict[int, list[StoredRun]]]
     classic: tuple[str, ...]
+    _parts: dict[frozenset[str], Case] = field(default_factory=dict, init=False, repr=False)
+
+    def only(self, methods: Collection[str]) -> Case:
+        """Return the case of some of the methods: compared with each other, by a pseudo-optimal front of their own."""
+        wanted = frozenset(methods) & frozenset(self.runs)
+        if wanted not in self._parts:
+            self._parts[wanted] = replace(
+                self,
+                runs={method: runs for method, runs in self.runs.items() if method in wanted},
+                sources={method: runs for method, runs in self.sources.items() if method in wanted},
+                classic=tuple(method for method in self.classic if method in wanted),
+            )
+        return self._parts[wanted]
+
+    @cached_property
+    def merged(self) -> Case:
+        """The fronts of section 4.3: of each method its runs merged to one, unless each is merged already."""
+        runs, sources = dict(self.runs), dict(self.sources)
+        for method, found in self.sources.items():
+            if all(len(made_of) == 1 for made_of in found.values()):
+                runs[method] = {NO_SEED: merged_front(self.runs[method].values())}
+                sources[method] = {NO_SEED: [run for made_of in found.values() for run in made_of]}
+        return replace(self, runs=runs, sources=sources)
 
     @cached_property
     def optimal(self) -> OptimalFront:
@@ -181,25 +269,49 @@ class Case:
         ----------
         a, b : str
             The methods.
-        indicator : {"hvr", "cardinality", "epsilon_optimal", "epsilon", "coverage"}
-            An indicator of each run (the epsilon to the pseudo-optimal front, which is better when smaller, is
-            negated), or for "epsilon" and "coverage" the rates of the other method's runs that each run
-            dominates, see `analysis.dominance_rates`.
+        indicator : str
+            A key of `INDICATORS`: a number of each run (negated where smaller is better), or for "epsilon" and
+            "coverage" the rates of the other method's runs that each run dominates, see `analysis.dominance_rates`.
         """
-        if indicator in ("epsilon", "coverage"):
+        if indicator in BINARY:
             table = self.literal_epsilon if indicator == "epsilon" else self.coverage
             forth, back = table.values[a, b], table.values[b, a]
             return dominance_rates(forth, back, indicator), dominance_rates(back, forth, indicator)
-        x, y = self.scores[a], self.scores[b]
-        if indicator == "epsilon_optimal":
-            return -x.epsilon, -y.epsilon
-        return getattr(x, indicator).astype(float), getattr(y, indicator).astype(float)
+        sign = -1.0 if indicator in SMALLER_IS_BETTER else 1.0
+        return sign * self.unary(a, indicator), sign * self.unary(b, indicator)
+
+    def unary(self, method: str, indicator: str) -> FloatArray:
+        """Return an indicator of every run of a method, as it is reported."""
+        if indicator in ("hvr", "cardinality", "epsilon_optimal"):
+            values = getattr(self.scores[method], indicator.removesuffix("_optimal"))
+            return np.asarray(values, dtype=float)
+        fronts = list(self.runs[method].values())
+        if indicator == "extent":
+            whole = float(np.ptp(self.optimal.front[:, 1]))
+            return np.array([float(np.ptp(F[:, 1])) / whole if whole else 1.0 for F in fronts])
+        if indicator == "trade_off":
+            # by the common scale, for a method's own (Eq. 10) compares nothing between methods
+            alpha = scale_factor(self.optimal.front)
+            chosen = [F[trade_off(F, alpha=alpha)] for F in fronts]
+            return np.array([(error + alpha * triangles) / 2 for error, triangles in chosen])
+        return np.array([F[:, ("least_error", "fewest_triangles").index(indicator)].min() for F in fronts])
+
+    def values(self, a: str, b: str, indicator: str) -> tuple[float, float]:
+        """Return the means of an indicator of two methods as it is reported."""
+        if indicator in BINARY:
+            pairs = self.epsilon if indicator == "epsilon" else self.coverage
+            return pairs.cell(a, b).mean, pairs.cell(b, a).mean
+        return float(self.unary(a, indicator).mean()), float(self.unary(b, indicator).mean())
 
     def evaluations(self, method: str) -> FloatArray:
         """Return the evaluations that each run of a method took, all its merged runs together."""
         return np.array(
             [sum(run.record["evaluations"] for run in runs) for runs in self.sources[method].values()], dtype=float
         )
+
+    def moves(self, method: str) -> int:
+        """Return the moves of vertices that the runs of a method made; 0 for a method that makes none."""
+        return sum(run.record.get("moves") or 0 for runs in self.sources[method].values() for run in runs)
 
     def seconds(self, method: str) -> FloatArray:
         """Return the seconds that every single search of a method took."""
@@ -314,13 +426,18 @@ class Study:
                 vertices=item["vertices"],
                 triangles=item["triangles"],
                 rules=read_back(Rules, item["rules"]),
+                limits=item["limits"],
                 stored=item["stored"],
                 hash=item["hash"],
             )
             for item in self.content["problems"]
         ]
         self.budgets: list[str] = [item["name"] for item in self.content["budgets"]]
-        self.methods: list[str] = [item["name"] for item in self.content["algorithms"]]
+        # what the reader added comes first: it is what the experiment is about
+        self.methods: list[str] = sorted(
+            (item["name"] for item in self.content["algorithms"]),
+            key=lambda name: ("own", "pymoo", "preset", "paper").index(self.kind(name)),
+        )
         self._runs: dict[tuple[str, str, str, int], list[StoredRun]] = {}
         self._expected = {item["name"]: len(item["merged_values"]) for item in self.content["algorithms"]}
         self._fill(store)
@@ -418,11 +535,28 @@ class Study:
     def _comparisons(self) -> dict[tuple[str, str, str], list[Comparison]]:
         return {}
 
-    def role(self, preset: str) -> str | None:
-        """Return the method that stands for a preset of the paper: the first with its own settings."""
-        found = [item for item in self.content["algorithms"] if item["preset"] == preset]
-        found.sort(key=lambda item: bool(item["description"]["parameters"].get("normalised")))
-        return found[0]["name"] if found else None
+    @cached_property
+    def starts(self) -> list[Start]:
+        """The first populations from which methods of the paper start, in the order of the methods."""
+        found: dict[str, dict[str, str]] = {}
+        for own_settings in (True, False):  # those with other settings stand for a preset where no other does
+            for item in self.content["algorithms"]:
+                if self.kind(item["name"]) != "paper":
+                    continue
+                description = item["description"]
+                roles = found.setdefault(_start(description.get("settings", {}).get("sampling", {})), {})
+                if own_settings != bool(description["parameters"].get("normalised")):
+                    roles.setdefault(item["preset"], item["name"])
+        return [Start(name, roles) for name, roles in found.items()]
+
+    def kind(self, method: str) -> str:
+        """Return what a method is: "own" and "pymoo" (by import path), "preset", "paper" (a preset too), "baseline"."""
+        item = next((item for item in self.content["algorithms"] if item["name"] == method), None)
+        if item is None:
+            return "baseline"
+        if not item["preset"]:
+            return "pymoo" if item["class"].startswith("pymoo.") else "own"
+        return "paper" if PRESETS[item["preset"]].is_the_papers else "preset"
 
     @cached_property
     def versions(self) -> list[dict[str, str]]:
@@ -452,8 +586,8 @@ class Study:
             if name != problem.name:
                 continue
             F = scored(run, scoring)
-            usable = np.isfinite(F[:, 0]) & (F[:, 1] > 0)
-            if scoring == "searched":
+            usable = np.isfinite(F[:, 0]) & (F[:, 1] > 0) & problem.meets_limits(run.arrays["F"])
+            if scoring == "searched" and BASELINES[method].tool:
                 usable &= run.arrays["paper"].astype(bool)
             if usable.any():
                 label = CLASSIC_NAMES[method]
@@ -494,3 +628,21 @@ def scored(run: StoredRun, scoring: str) -> FloatArray:
     if scoring == "searched":
         return F
     return np.column_stack([run.arrays["error_nearest"], F[:, 1]]) if len(F) else F.reshape(0, 2)
+
+
+def _start(sampling: Mapping[str, Any]) -> str:
+    """Return in words how a first population is drawn.
+
+    >>> _start({"class": "meshsimp_pymoo.RandomSubset", "size": 0.2}), _start({"class": "meshsimp_pymoo.RandomSubset"})
+    ('start at n = 0.2 N', 'start at all sizes')
+    >>> _start({"class": "meshsimp_pymoo.RandomSubset", "size": [150, 220]}), _start({"class": "pymoo.X.LHS"})
+    ('start at n = 150 to 220', 'start by LHS')
+    """
+    name = str(sampling.get("class", "")).rpartition(".")[2]
+    if name not in ("", "RandomSubset"):
+        return f"start by {name}"
+    size = sampling.get("size")
+    if size is None:
+        return "start at all sizes"
+    ends = size if isinstance(size, (list, tuple)) else [size]
+    return "start at n = " + " to ".join(f"{end:g} N" if isinstance(end, float) else f"{end}" for end in ends)

@@ -3,13 +3,15 @@
 ========== =====================================================================================
 table      content
 ========== =====================================================================================
+ranking    all methods by the mean rank of their HVR over the models, and which the ranks tell apart
 scores     every method against the pseudo-optimal front: HVR, epsilon, coverage, cardinality
 coverage   C between the runs of every two methods (the paper's Table 1)
 epsilon    multiplicative epsilon between the runs of every two methods (the paper's Table 2)
-wilcoxon   every two methods with chance: raw and corrected p, effect size, who is better
+wilcoxon   every two methods with chance, by rank sums: raw and corrected p, effect size, who is better; and
+           the p of the signed-rank test, by seeds
 selected   least error, fewest triangles, best trade-off (by the ranges, and by the paper's Eq. 11) and knees of
            every method
-meshlab    every mesh of MeshLab's methods, with the vertices that it leaves uncovered
+baselines  the meshes of the methods without chance, with the vertices that they leave uncovered
 runs       every run: solutions, generations, evaluations
 ========== =====================================================================================
 
@@ -29,17 +31,17 @@ from pathlib import Path
 import numpy as np
 
 from meshsimp_pymoo.comparison.analysis import PairTable, selected_solutions
-from meshsimp_pymoo.comparison.statistics import Summary, magnitude, summarise
-from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, SCORINGS, Case, Study
+from meshsimp_pymoo.comparison.statistics import Summary, friedman, magnitude, signed_rank, summarise
+from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, INDICATORS, SCORINGS, Case, Study
 from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = [
     "COMPARISONS",
-    "INDICATOR_NAMES",
     "Table",
+    "baselines",
     "coverage",
     "epsilon",
-    "meshlab",
+    "ranking",
     "runs",
     "scores",
     "selected",
@@ -57,15 +59,6 @@ AS_SEARCHED = {
     for name, measure in MEASURES.items()
     if measure.unit and name != "error"
 }
-
-INDICATOR_NAMES = {
-    "hvr": "HVR",
-    "cardinality": "cardinality",
-    "epsilon": "epsilon, run over run",
-    "coverage": "coverage, run over run",
-    "epsilon_optimal": "epsilon to the pseudo-optimal front",
-}
-"""What `Study.comparisons` can compare by."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +154,7 @@ def scores(study: Study, budget: str, scoring: str) -> Table:
     columns = (
         "model", "method", "runs", "hvr_mean", "hvr_sd", "epsilon_mean", "epsilon_sd", "coverage_mean",
         "coverage_sd", "cardinality_mean", "cardinality_sd", "merged_hvr", "merged_epsilon",
-        "merged_coverage", "merged_cardinality", "optimal_share", "evaluations_mean", "note",
+        "merged_coverage", "merged_cardinality", "optimal_share", "evaluations_mean", "measured_by", "note",
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
     shown: list[tuple[Cell, ...]] = []
@@ -175,22 +168,71 @@ def scores(study: Study, budget: str, scoring: str) -> Table:
                     case.problem.name, method, len(values.seeds), hvr.mean, hvr.std, eps.mean, eps.std,
                     cover.mean, cover.std, count.mean, count.std, values.merged_hvr, values.merged_epsilon,
                     values.merged_coverage, values.merged_cardinality, case.optimal.share(method),
-                    evaluations, eps.note if math.isinf(eps.mean) else "",
+                    evaluations, _measured_by(case, method), eps.note if math.isinf(eps.mean) else "",
                 )
             )  # fmt: skip
             shown.append(
                 (
                     case.problem.name, method, len(values.seeds), _spread(hvr), _spread(eps), _spread(cover),
                     _spread(count), values.merged_hvr, values.merged_cardinality,
-                    None if evaluations is None else round(evaluations),
+                    None if evaluations is None else round(evaluations), _measured_by(case, method),
                 )
             )  # fmt: skip
     title = f"Scores against the pseudo-optimal front ({_setting(budget, scoring)}; mean (sd) over runs)"
     headers = (
         "model", "method", "runs", "HVR", "epsilon", "coverage", "cardinality", "HVR merged",
-        "cardinality merged", "evaluations",
+        "cardinality merged", "evaluations", "measured by",
     )  # fmt: skip
     return Table("scores", title, columns, tuple(rows), Table("scores", title, headers, tuple(shown)))
+
+
+def _measured_by(case: Case, method: str) -> str:
+    """Return what a method's work is counted in; of a method without chance, nothing is."""
+    if method in case.classic:
+        return ""
+    return "moves" if case.moves(method) else "evaluations"
+
+
+def ranking(study: Study, budget: str, scoring: str) -> Table:
+    """Return the comparison of all methods in one table: the mean rank of their mean HVR over the models."""
+    cases = study.compared(budget, scoring)
+    means = [{method: float(scores.hvr.mean()) for method, scores in case.scores.items()} for case in cases]
+    everywhere = [method for method in means[0] if all(method in values for values in means)]
+    ranks: dict[str, float] = {}
+    alike: set[str] = set()
+    said = "no two methods on all models"
+    if len(everywhere) > 1:
+        found = friedman([[values[method] for method in everywhere] for values in means])
+        ranks = dict(zip(everywhere, map(float, found.mean_ranks), strict=True))
+        best = everywhere[int(np.argmin(found.mean_ranks))]
+        groups = [[everywhere[k] for k in group] for group in found.groups]
+        alike = {method for group in groups if best in group for method in group} | {best}
+        said = f"Friedman p = {found.p:.2g}, critical difference {found.critical_difference:.3g}"
+    columns = (
+        "method", "kind", "mean_rank", "hvr_mean", "best_on", "models", "evaluations_mean", "measured_by",
+        "not_told_apart_from_best",
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    for method in dict.fromkeys(method for case in cases for method in case.runs):
+        there = [(case, values) for case, values in zip(cases, means, strict=True) if method in values]
+        chance = [case for case, _ in there if method not in case.classic]
+        rows.append(
+            (
+                method, study.kind(method), ranks.get(method), float(np.mean([values[method] for _, values in there])),
+                sum(values[method] == max(values.values()) for _, values in there), len(there),
+                float(np.mean([case.evaluations(method).mean() for case in chance])) if chance else None,
+                _measured_by(there[0][0], method), "yes" if method in alike else "",
+            )
+        )  # fmt: skip
+    rows.sort(key=lambda row: (ranks.get(str(row[0]), math.inf), str(row[0])))
+    title = f"All methods, by the mean rank of their HVR over the models ({_setting(budget, scoring)}; {said})"
+    names = {
+        "method": "method", "kind": "kind", "mean_rank": "mean rank", "hvr_mean": "HVR", "best_on": "best on",
+        "models": "of models", "evaluations_mean": "evaluations a front", "measured_by": "measured by",
+        "not_told_apart_from_best": "not told apart from the best",
+    }  # fmt: skip
+    table = Table("ranking", title, columns, tuple(rows))
+    return replace(table, shown=table.part(names, [(*row[:6], _round_or_none(row[6]), *row[7:]) for row in rows]))
 
 
 def coverage(study: Study, budget: str, scoring: str) -> Table:
@@ -217,14 +259,15 @@ def wilcoxon(study: Study, budget: str, scoring: str) -> Table:
     """Return all rank-sum tests; each indicator is a family of its own for Holm's correction."""
     columns = (
         "model", "indicator", "a", "b", "mean_a", "mean_b", "p", "p_holm", "a12", "effect", "better",
-        "better_holm", "note",
+        "better_holm", "p_signed_rank", "note",
     )  # fmt: skip
     rows = [
         (
-            c.model, INDICATOR_NAMES[indicator], c.a, c.b, float(np.mean(c.sample_a)),
-            float(np.mean(c.sample_b)), c.p, c.p_holm, c.a12, magnitude(c.a12), c.winner, c.winner_holm, c.note,
+            c.model, INDICATORS[indicator], c.a, c.b, float(np.mean(c.sample_a)),
+            float(np.mean(c.sample_b)), c.p, c.p_holm, c.a12, magnitude(c.a12), c.winner, c.winner_holm,
+            signed_rank(c.sample_a, c.sample_b).p if len(c.sample_a) == len(c.sample_b) else None, c.note,
         )
-        for indicator in INDICATOR_NAMES
+        for indicator in INDICATORS
         for c in study.comparisons(budget, scoring, indicator)
     ]  # fmt: skip
     title = f"Wilcoxon rank-sum tests ({_setting(budget, scoring)}); samples so that larger is better"
@@ -266,12 +309,12 @@ def selected(study: Study, budget: str, scoring: str) -> Table:
     return replace(table, shown=table.part(shown_columns, [row for row in rows if row[2] != "knee"]))
 
 
-COMPARISONS: tuple[Callable[[Study, str, str], Table], ...] = (scores, coverage, epsilon, wilcoxon, selected)
+COMPARISONS: tuple[Callable[[Study, str, str], Table], ...] = (ranking, scores, coverage, epsilon, wilcoxon, selected)
 """The tables of one budget and scoring."""
 
 
-def meshlab(study: Study, budget: str) -> Table | None:
-    """Return every mesh of MeshLab's methods, and the least error of an evolutionary one no larger.
+def baselines(study: Study, budget: str) -> Table | None:
+    """Return the baselines' meshes of the sizes asked for, and the least error of an evolutionary one no larger.
 
     None if there is no such mesh. The last columns compare by the error of every vertex.
     """
@@ -287,6 +330,8 @@ def meshlab(study: Study, budget: str) -> Table | None:
             if name != problem.name:
                 continue
             for k, asked in enumerate(run.arrays["asked"].tolist()):
+                if not asked:  # of a whole front, between the sizes that all are asked for
+                    continue
                 a, (error, triangles) = run.arrays, run.arrays["F"][k]
                 label, note = CLASSIC_NAMES[method], run.record["notes"][k]
                 series = "paper" if a["paper"][k] else "down to the fronts"
@@ -304,13 +349,13 @@ def meshlab(study: Study, budget: str) -> Table | None:
                 )  # fmt: skip
     if not rows:
         return None
-    title = f"MeshLab's meshes, and the best evolutionary one of at most as many triangles ({budget})"
+    title = f"Meshes of the baselines, and the best evolutionary one of at most as many triangles ({budget})"
     shown_columns = {
         "model": "model", "method": "method", "asked": "asked", "triangles": "triangles",
         "error_as_searched": "error as searched", "error_every_vertex": "error, every vertex",
         "uncovered": "uncovered", "evolution_error_every_vertex": "evolution, every vertex", "evolution_method": "by",
     }  # fmt: skip
-    table = Table("meshlab", title, columns, tuple(rows))
+    table = Table("baselines", title, columns, tuple(rows))
     return replace(table, shown=table.part(shown_columns, rows))
 
 
@@ -380,6 +425,10 @@ def _best_up_to(case: Case | None, triangles: float) -> tuple[float | None, str 
             if len(errors) and (best[0] is None or errors.min() < best[0]):
                 best = float(errors.min()), method
     return best
+
+
+def _round_or_none(cell: Cell) -> Cell:
+    return round(cell) if isinstance(cell, float) else cell
 
 
 def _setting(budget: str, scoring: str) -> str:

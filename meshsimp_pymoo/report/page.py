@@ -49,7 +49,7 @@ LEVELS, UNCOVERED_LEVEL = 254, 255
 # The colours of the error end where this share of the knee's vertices are below: a few spikes do not pale all the rest.
 SCALE_QUANTILE = 0.98
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
-RECORDED = ("algorithm", "seed", "generations", "evaluations", "interrupted")
+RECORDED = ("algorithm", "seed", "generations", "evaluations", "moves", "interrupted")
 # A setting of more values than these (one weight a vertex) is counted on the page, not listed.
 MOST_LISTED = 100
 

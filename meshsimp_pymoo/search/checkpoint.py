@@ -1,8 +1,8 @@
 """The state of a running search in one file, so that a killed search goes on where it was.
 
 A checkpoint is taken between two ``algorithm.next()``. Restored into an algorithm that was made and set up in the same
-way, it makes the search go on to the very bytes that it would have found undisturbed, if its budget is in generations
-or evaluations; a budget in seconds goes on with what is left of it::
+way, it makes the search go on to the very bytes that it would have found undisturbed, if its budget is in generations,
+evaluations or moves; a budget in seconds goes on with what is left of it::
 
     algorithm.setup(problem, termination=("n_gen", 1000), seed=1)
     if path.exists():
@@ -20,7 +20,7 @@ the population it has.
 
 What is taken is found by walking through the algorithm, so that new state in an operator is not forgotten. State of a
 kind that this cannot carry (a generator in the middle of its work, an object of another package, a part that was made
-during the run) is refused with :class:`NotResumable`, never left out.
+during the run and holds a function) is refused with :class:`NotResumable`, never left out.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import hashlib
 import io
 import json
 import math
+import sys
 import time
 import types
 import zipfile
@@ -50,7 +51,7 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, read_npz
-from meshsimp_pymoo.search.time_limit import WholeGenerations
+from meshsimp_pymoo.search.budgets import Moves, WholeGenerations
 
 __all__ = ["CheckpointError", "Checkpoints", "NotResumable", "Stored", "difference", "read_checkpoint", "restore"]
 
@@ -63,12 +64,24 @@ PAUSE = 50.0
 # Packages whose objects are looked into.
 OWN_PACKAGES = ("pymoo", "meshsimp_pymoo")
 # Not part of an algorithm's state: what it is told anew, what it shows, and what the next generation replaces.
-LEFT_OUT = ("problem", "termination", "display", "output", "callback", "history", "off", "verbose")
+# AGEMOEA keeps a ``default_termination`` that it never asks.
+LEFT_OUT = (
+    "problem",
+    "termination",
+    "default_termination",
+    "display",
+    "output",
+    "callback",
+    "history",
+    "off",
+    "verbose",
+)
 # Terminations that remember nothing but how far they are; their limits are told anew.
 TERMINATIONS = (
     NoTermination,
     MaximumGenerationTermination,
     MaximumFunctionCallTermination,
+    Moves,
     TimeBasedTermination,
     WholeGenerations,
 )
@@ -166,6 +179,16 @@ class Checkpoints:
         """Seconds that the search has taken, those before this process included."""
         return self.before + time.perf_counter() - self._began
 
+    def check(self) -> None:
+        """Find out whether the algorithm's state can be saved as it is now; write nothing.
+
+        Raises
+        ------
+        NotResumable
+            If it holds what a checkpoint cannot carry.
+        """
+        _Writer(self._parts).state(self.algorithm)
+
     def due(self) -> bool:
         """Tell whether it is time for the next checkpoint."""
         return time.perf_counter() >= self._next
@@ -187,10 +210,8 @@ class Checkpoints:
         """
         begun = time.perf_counter()
         try:
-            writer = _Writer()
-            state, parts = writer.state(self.algorithm)
-            if made := sorted(parts - self._parts):
-                raise NotResumable(f"{made[0]} was made during the run, so a checkpoint cannot restore it")
+            writer = _Writer(self._parts)
+            state, _ = writer.state(self.algorithm)
             head = {"format": FORMAT, "what": self.what, "facts": facts, "seconds": self.seconds, "clock": time.time()}
             _write(self.path, head | state, writer.arrays)
             self.saved += 1
@@ -292,9 +313,16 @@ class _Writer:
     """Turns the state of an algorithm into JSON's types and arrays.
 
     Plain values stand for themselves; all others are lists that begin with their kind.
+
+    Parameters
+    ----------
+    parts : set of str, optional
+        The paths of the parts that the algorithm had before the run. Others are made anew when they are restored.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, parts: frozenset[str] | None = None) -> None:
+        self._parts = parts
+        self._new = ""  # the part that was made during the run, while it is looked into
         self.arrays: Arrays = {}
         self._individuals: list[Individual] = []
         self._place: dict[int, int] = {}
@@ -330,9 +358,18 @@ class _Writer:
         if kind is dict:
             return ["dict", [[self.value(k, path), self.value(v, f"{path}[{k!r}]")] for k, v in value.items()]]
         if kind is np.random.Generator:
+            if id(value) in self._seen:
+                return ["seen", self._seen[id(value)]]
+            self._seen[id(value)] = path
+            if self._is_new(path):
+                raise NotResumable(f"{path} was made during the run, so a checkpoint cannot restore it")
             bits = value.bit_generator
-            return ["generator", type(bits).__name__, self.value(bits.state, path)]
-        if isinstance(value, FIXED):
+            return ["generator", path, type(bits).__name__, self.value(bits.state, path)]
+        if isinstance(value, FIXED) or hasattr(value, "__code__"):  # functions, compiled ones too
+            if self._new:
+                raise NotResumable(
+                    f"{self._new} was made during the run and holds a function, which no checkpoint can restore"
+                )
             return ["fixed"]
         is_own = kind.__module__.partition(".")[0] in OWN_PACKAGES and kind.__dictoffset__
         if is_own and not isinstance(value, HOLDERS):
@@ -343,10 +380,15 @@ class _Writer:
         if id(value) in self._seen:
             return ["seen", self._seen[id(value)]]
         self._seen[id(value)] = path
-        attributes = {}
+        outside, attributes = self._new, {}
+        if not outside and self._is_new(path):
+            self._new = path
+        if self._new and _own_class(_name_of(value)) is not type(value):
+            raise NotResumable(f"{path} was made during the run, of a class that no checkpoint can find again")
         for name, part in vars(value).items():
             if not (isinstance(value, Algorithm) and name in LEFT_OUT):
                 attributes[name] = self.value(part, f"{path}.{name}")
+        self._new = outside
         code = ["object", _name_of(value), path, attributes]
         if isinstance(value, Algorithm):
             end = value.termination
@@ -354,6 +396,9 @@ class _Writer:
                 raise NotResumable(f"{path}.termination is a {_name_of(end)}, which a checkpoint cannot carry")
             code.append([bool(end.force_termination), float(end.perc)])
         return code
+
+    def _is_new(self, path: str) -> bool:
+        return self._parts is not None and path not in self._parts
 
     def _array(self, array: npt.NDArray[Any]) -> str:
         name = f"a{len(self.arrays)}"
@@ -437,6 +482,13 @@ def _name_of(value: Any) -> str:
     return f"{type(value).__module__}.{type(value).__qualname__}"
 
 
+def _own_class(name: str) -> type[Any] | None:
+    """Return a class of pymoo or of this package that is in memory, by its name; None if there is none."""
+    module, _, word = name.rpartition(".")
+    found = getattr(sys.modules.get(module), word, None) if module.partition(".")[0] in OWN_PACKAGES else None
+    return found if isinstance(found, type) else None
+
+
 # ------------------------------------------------------------------------------------------------------------- reading
 
 
@@ -489,11 +541,15 @@ class _Reader:
             keys = [self.value(key, None) for key, _ in rest[0]]
             return {key: self.value(part, before.get(key)) for key, (_, part) in zip(keys, rest[0], strict=True)}
         if kind == "generator":
-            if not isinstance(now, np.random.Generator) or type(now.bit_generator).__name__ != rest[0]:
-                raise TypeError(f"the random numbers come from {rest[0]}")
-            now.bit_generator.state = self.value(rest[1], None)
+            path, name, bits = rest
+            if not isinstance(now, np.random.Generator) or type(now.bit_generator).__name__ != name:
+                raise TypeError(f"the random numbers come from {name}")
+            self._objects[path] = now
+            now.bit_generator.state = self.value(bits, None)
             return now
         if kind == "fixed":
+            if now is None:
+                raise TypeError("a function is missing")
             return now
         if kind == "seen":
             return self._objects[rest[0]]
@@ -502,6 +558,8 @@ class _Reader:
         raise ValueError(f"{kind!r} is unknown")
 
     def _object(self, now: Any, name: str, path: str, attributes: dict[str, Any], *end: Any) -> Any:
+        if now is None and (made := _own_class(name)) is not None:
+            now = object.__new__(made)
         if _name_of(now) != name:
             raise TypeError(f"{path} is a {name}, not a {_name_of(now)}")
         self._objects[path] = now

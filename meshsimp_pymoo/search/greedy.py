@@ -22,7 +22,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray
+from meshsimp_pymoo.arrays import BoolArray, require_bool
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.moves import (
@@ -195,8 +195,8 @@ def _not_below_0(error: np.ndarray) -> np.ndarray:
 
 def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:
     n = surface.n_vertices
-    if pinned is not None and (pinned.dtype != np.bool_ or pinned.shape != (n,)):
-        raise ValueError(f"pinned is a bool array of shape ({n},), not {pinned.dtype} of shape {pinned.shape}")
+    if pinned is not None and require_bool(pinned, "pinned is a bool array", "give True where one is").shape != (n,):
+        raise ValueError(f"pinned has shape ({n},), not {pinned.shape}")
     return surface.pinned.copy() if pinned is None else surface.pinned | pinned
 
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from meshsimp_pymoo.arrays import BoolArray
+from meshsimp_pymoo.arrays import BoolArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import thin
-from meshsimp_pymoo.search.time_limit import stopping
 from meshsimp_pymoo.surface.moves import (
     exchange,
     is_site,
@@ -120,9 +120,13 @@ def anneal(
     shares: tuple,  # type: ignore[type-arg]
     state: np.ndarray,
     stop: np.ndarray,
+    made: np.ndarray,
     best_movable: np.ndarray,
 ) -> int:
-    """Walk among the subsets of at most ``most`` triangles; return the number of entries of ``best_movable``."""
+    """Walk among the subsets of at most ``most`` triangles; return the number of entries of ``best_movable``.
+
+    ``made[0]`` is lowered to the moves that were made where ``stop`` ended them.
+    """
     g = borrowed(ground)
     live = borrowed(books)
     movable = borrowed(movable)
@@ -141,6 +145,7 @@ def anneal(
         if step % 64 == 0:
             temperature = hot * cooling ** (step / moves)
             if stop[0]:
+                made[0] = step
                 break
         slack = most - n_triangles(g, live)
         kind = _unit(state)
@@ -259,6 +264,7 @@ def relocate(
     cooling: float = 0.03,
     shares: MoveShares = USUAL_MOVES,
     stop: BoolArray | None = None,
+    made: IntArray | None = None,
 ) -> BoolArray:
     """Return a subset of no more triangles with less error, or ``kept`` itself: annealed moves, the best state seen.
 
@@ -286,6 +292,8 @@ def relocate(
         How often each kind of move is tried.
     stop : (1,) bool array, optional
         The moves end soon after another thread has set it.
+    made : (1,) int64 array, optional
+        Takes the number of moves that were made: fewer than ``moves`` where they were stopped.
 
     Returns
     -------
@@ -302,6 +310,8 @@ def relocate(
     ground = movable_ground(surface, "thinning and relocation")
     n, pinned = surface.n_vertices, surface.pinned
     state = np.array([seed], np.uint64)
+    made = np.empty(1, np.int64) if made is None else made
+    made[0] = moves
     with surface.books(kept | pinned) as books:
         if size is not None:
             fit_size(ground, books, n, pinned, False, size, state)
@@ -331,6 +341,7 @@ def relocate(
                 tuple(map(float, shares)),
                 state,
                 np.zeros(1, np.bool_) if stop is None else stop,
+                made,
                 best,
             )
             result &= pinned
@@ -347,6 +358,7 @@ def relocate_all(
     sizes: NDArray[np.integer] | None = None,
     triangles: NDArray[np.integer] | None = None,
     seconds: float | None = None,
+    made: IntArray | None = None,
     **how: Any,
 ) -> BoolArray:
     """Apply :func:`relocate` to each row of X (P, N) on all cores; the result does not depend on their number.
@@ -363,6 +375,8 @@ def relocate_all(
         Source of randomness.
     seconds : float, optional
         The moves end after this time, wherever they are; the result then depends on the machine.
+    made : (P,) int64 array, optional
+        Takes the number of moves that were made for each row.
     **how
         Its other arguments, the same for all rows.
     """
@@ -379,6 +393,7 @@ def relocate_all(
             size=None if sizes is None else int(sizes[k]),
             triangles=None if triangles is None else int(triangles[k]),
             stop=stop,
+            made=None if made is None else made[k : k + 1],
             **how,
         )
 

@@ -4,8 +4,8 @@ The population is a ladder: every rung is a number of triangles and holds the be
 generation some rungs, far apart, get a child each, annealed at the rung's size: in the first generation their own
 mesh, in the following ones, one rung lower each, the mesh of the rung above, so that good places are handed down the
 ladder (Ho, Shu, Chen 2004 call the passing on of solutions between neighbouring sizes inheritance). When all rungs have
-had their turn, a sweep, the next sweep begins, with twice as many moves, or with as many as fit in the time that is
-left. One slow sweep gives better meshes than several quick ones.
+had their turn, a sweep, the next sweep begins, with twice as many moves, or with as many as a budget in moves or time
+has left. One slow sweep gives better meshes than several quick ones.
 
 The error on a rung never grows, so the front is never worse than the thinning it started from.
 """
@@ -21,15 +21,16 @@ from pymoo.algorithms.base.genetic import GeneticAlgorithm
 from pymoo.core.mating import Mating
 from pymoo.core.population import Population
 from pymoo.core.survival import Survival
+from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_time import TimeBasedTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 from pymoo.util.optimum import filter_optimum
 
+from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, spread
 from meshsimp_pymoo.search.greedy import NestedFront, thinned, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
-from meshsimp_pymoo.search.time_limit import compiling_left_out, spread
 from meshsimp_pymoo.surface.surface import Surface, movable_ground
 from meshsimp_pymoo.workers import thread_pool
 
@@ -43,7 +44,8 @@ AGAIN = (0.15, 0.1)
 # Moves a kept vertex in the first sweep unless told: as many as make this total, within the bounds.
 TOTAL_MOVES = 2e7
 MOVES_PER_VERTEX = (20.0, 1000.0)
-# With a time limit: the share of the first sweep, the most moves a kept vertex, and seconds a move before any is timed.
+# With a budget in moves or time: the share of the first sweep, the most moves a kept vertex, and seconds a move before
+# any is timed.
 FIRST_SHARE = 0.12
 SLOWEST = 4000.0
 SECONDS_A_MOVE = 2e-6
@@ -105,7 +107,7 @@ class DownTheLadder(Mating):
         The rungs.
     moves_per_vertex : float, optional
         Moves for each kept vertex in the first sweep; twice as many in each later one, up to 1000. By default as many
-        as take some tens of seconds. With a time limit as many as fit.
+        as take some tens of seconds. With a budget in moves or time as many as fit.
     n_chains : int
         Children in a generation, on rungs far apart.
     inherit : bool
@@ -136,7 +138,7 @@ class DownTheLadder(Mating):
         self.shares = shares
         self.sweep = 0
         self.step = 0
-        self.moves_done = 0.0
+        self.moves_done = 0
         self.seconds = 0.0
 
     def do(
@@ -163,9 +165,7 @@ class DownTheLadder(Mating):
         temperature, cooling = FRESH if fresh else AGAIN
         temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
         parents = rows[turn if fresh else turn + 1]
-        work = self._work(problem, pop, rows)
-        left = sum(work[chain[self.step :]].sum() for chain in chains)
-        moves = np.ceil(self._pace(algorithm, work.sum(), left) * work[turn]).astype(int)
+        moves = self._moves(algorithm, self._work(problem, pop, rows), turn, chains)
         limit = time_limit(algorithm)
         begun = time.perf_counter()
         children = relocate_all(
@@ -175,12 +175,13 @@ class DownTheLadder(Mating):
             random_state,
             triangles=rungs[turn].astype(int),
             seconds=None if limit is None else limit[1],
+            made=moves,
             temperature=temperature,
             cooling=cooling,
             shares=self.shares,
         )
         self.seconds += time.perf_counter() - begun
-        self.moves_done += float(moves.sum())
+        self.moves_done += int(moves.sum())
         self.step += 1
         if self.step >= max(len(chain) for chain in chains):
             self.step = 0
@@ -193,9 +194,26 @@ class DownTheLadder(Mating):
         kept = (pop.get("X") & ~problem.pinned).sum(axis=1)[np.maximum(rows, 0)]
         return np.minimum(np.maximum(kept, 1), FULL_SHARE * problem.n_var)
 
-    def _pace(self, algorithm: Any, whole: float, left: float) -> float:
-        """Return the moves for each kept vertex, given the work of a whole sweep and of what is left of it."""
+    def _moves(
+        self,
+        algorithm: Any,
+        work: NDArray[np.float64],
+        turn: NDArray[np.int64],
+        chains: list[NDArray[np.int64]],
+    ) -> NDArray[np.int64]:
+        """Return the moves of the rungs whose turn it is, given the work of all rungs."""
+        left = sum(work[chain[self.step :]].sum() for chain in chains)
+        within = part_of(getattr(algorithm, "termination", None), Moves)
         deadline = time_limit(algorithm)
+        if within is None or deadline is not None:
+            moves = np.ceil(self._pace(deadline, work.sum(), left) * work[turn])
+        if within is not None:
+            planned = self._share_of(within.n_max_moves, work[turn], left)
+            moves = planned if deadline is None else np.minimum(moves, planned)
+        return moves.astype(np.int64)
+
+    def _pace(self, deadline: tuple[float, float, float] | None, whole: float, left: float) -> float:
+        """Return the moves for each kept vertex, given the work of a whole sweep and of what is left of it."""
         if deadline is None:
             lowest, highest = MOVES_PER_VERTEX
             given = self.moves_per_vertex
@@ -207,16 +225,21 @@ class DownTheLadder(Mating):
             remaining -= (1.0 - FIRST_SHARE) * span
         return min(max(remaining / (a_move * left), 1.0), SLOWEST)
 
+    def _share_of(self, n_moves: int, work: NDArray[np.float64], left: float) -> NDArray[np.float64]:
+        """Return the moves of rungs of so much work out of a number for the whole search, which they never exceed."""
+        of_sweep = round(FIRST_SHARE * n_moves) if self.sweep == 0 else n_moves
+        whole = min(round((of_sweep - self.moves_done) * (work.sum() / left)), int(SLOWEST * work.sum()))
+        return np.diff(np.round(np.cumsum(work) / work.sum() * whole), prepend=0.0)
+
 
 def time_limit(algorithm: Any) -> tuple[float, float, float] | None:
     """Return the seconds a run has, those left for its sweeps, and those kept for its end; None: it has no limit."""
-    termination = getattr(algorithm, "termination", None)
-    for part in getattr(termination, "terminations", [termination]):
-        if isinstance(part, TimeBasedTermination):
-            whole = float(part.max_time)
-            last = min(max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6), MOST_SHARE * whole)
-            return whole, whole - last - (time.time() - algorithm.start_time), last
-    return None
+    limit = part_of(getattr(algorithm, "termination", None), TimeBasedTermination)
+    if limit is None:
+        return None
+    whole = float(limit.max_time)
+    last = min(max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6), MOST_SHARE * whole)
+    return whole, whole - last - (time.time() - algorithm.start_time), last
 
 
 class MemeticSearch(GeneticAlgorithm):
@@ -229,6 +252,11 @@ class MemeticSearch(GeneticAlgorithm):
         super().__init__(pop_size, **kwargs)
         self.triangles = triangles
         self.idle = 0
+
+    @property
+    def moves(self) -> int:
+        """Moves of the annealing that were made so far."""
+        return int(self.mating.moves_done)
 
     def _setup(self, problem: Any, **kwargs: Any) -> None:
         if problem.n_obj != 2:
@@ -279,6 +307,11 @@ class MemeticSearch(GeneticAlgorithm):
         """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
         pop = self.pop
         surface = self.problem.surface
+        evaluations = part_of(self.termination, MaximumFunctionCallTermination)
+        asked = None if evaluations is None else evaluations.n_max_evals
+        most = np.inf if asked is None else asked - self.evaluator.n_eval
+        if most < 1:
+            return
         limit = time_limit(self)
         seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
         X = between_the_rungs(
@@ -291,6 +324,8 @@ class MemeticSearch(GeneticAlgorithm):
         )
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
+            if len(extra) > most:  # some of all over the ladder
+                extra = extra[np.sort(spread(len(extra))[: int(most)])]
             self.evaluator.eval(self.problem, extra, algorithm=self)
             self.opt = filter_optimum(Population.merge(self.opt, extra), least_infeasible=True)
 
@@ -383,8 +418,9 @@ def memetic(
     """Return the seeded memetic algorithm: thinning, then annealing down a ladder of sizes.
 
     It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error"). By
-    default it ends after one sweep of the ladder, some tens of seconds for thousands of vertices; with a termination by
-    time it takes as many moves as fit.
+    default it ends after one sweep of the ladder, some tens of seconds for thousands of vertices; with
+    :class:`~meshsimp_pymoo.Moves` or a termination by time it takes as many moves as fit. Evaluations do not measure
+    it: each child of a generation is one, however many moves it took.
 
     Parameters
     ----------
@@ -394,7 +430,8 @@ def memetic(
         Smallest and largest number of triangles to look at; all by default.
     moves_per_vertex : float, optional
         Moves of the annealing for each kept vertex in the first sweep, twice as many in each later one, up to 1000. By
-        default as many as make twenty million in all, within 20 and 1000; with a termination by time, as many as fit.
+        default as many as make twenty million in all, within 20 and 1000; with a budget in moves or time as many as
+        fit.
     **kwargs
         Further arguments of pymoo's ``GeneticAlgorithm``; they replace those set here.
 

@@ -11,7 +11,7 @@ from pymoo.util.ref_dirs import get_reference_directions
 
 from meshsimp_pymoo.search.operators import OAX, PackedDuplicates, SubsetUniformCrossover
 from meshsimp_pymoo.search.paper import CROSSOVER_PROBABILITY, GENERATIONS, POP_SIZE, paper_operators
-from meshsimp_pymoo.search.selection import crowded_tournament
+from meshsimp_pymoo.search.selection import crowded_tournament, violation_tournament
 
 
 def nsga2_v1(pop_size: int = POP_SIZE, **kwargs: Any) -> NSGA2:
@@ -72,6 +72,7 @@ def nsga3(n_objectives: int = 3, *, n_partitions: int = 12, pop_size: int | None
     directions = get_reference_directions("das-dennis", n_objectives, n_partitions=n_partitions)
     defaults = paper_operators() | {
         "crossover": SubsetUniformCrossover(CROSSOVER_PROBABILITY),
+        "selection": TournamentSelection(func_comp=violation_tournament),
         "eliminate_duplicates": PackedDuplicates(),
     }
     algorithm = NSGA3(directions, pop_size, **(defaults | kwargs))

@@ -42,6 +42,8 @@ class Preset:
         Whether it is done after one sweep of the sizes; the others go on for as long as one lets them.
     evaluations : float
         About how many evaluations a generation makes for each individual.
+    measured_by : tuple of str
+        The kinds of budget that measure its work; seconds fit all.
     """
 
     home: str
@@ -51,6 +53,7 @@ class Preset:
     sums_only: bool = False
     sweeps: bool = False
     evaluations: float = 1.0
+    measured_by: tuple[str, ...] = ("generations", "evaluations")
 
     @property
     def function(self) -> Callable[..., Any]:
@@ -67,6 +70,7 @@ PRESETS: dict[str, Preset] = {
         is_the_papers=False,
         sums_only=True,
         sweeps=True,
+        measured_by=("moves",),
     ),
     "nsga2_v1": Preset(home="search.nsga:nsga2_v1", about="NSGA-II, uniform crossover"),
     "nsga2_v2": Preset(home="search.nsga:nsga2_v2", about="NSGA-II, crossover OAX over L4", evaluations=2.1),

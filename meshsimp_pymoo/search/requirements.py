@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshsimp_pymoo import arrays
 from meshsimp_pymoo.surface.surface import Surface
 
 
@@ -49,11 +50,11 @@ def require_bool(X: NDArray[Any], operator: object) -> None:
     TypeError
         If ``X`` has any other dtype.
     """
-    if X.dtype != np.bool_:
-        raise TypeError(
-            f"{type(operator).__name__} works on bool chromosomes (True: the vertex is kept), not {X.dtype}; "
-            "pass sampling=RandomSubset() to the algorithm, or start from a bool array"
-        )
+    arrays.require_bool(
+        X,
+        f"{type(operator).__name__} works on bool chromosomes (True: the vertex is kept)",
+        "pass sampling=RandomSubset() to the algorithm, or start from a bool array",
+    )
 
 
 def require_probability(name: str, value: float) -> float:

@@ -48,6 +48,32 @@ def crowded_tournament(
     )
 
 
+def violation_tournament(
+    pop: Any, P: NDArray[np.integer], *, random_state: np.random.Generator, **kwargs: Any
+) -> NDArray[np.integer]:
+    """NSGA-III's binary tournament: by constraint violation if either has one, else by chance.
+
+    The rule and the draws of pymoo's ``comp_by_cv_then_random``, so the same winners, except where both violate alike:
+    pymoo then draws from a generator that no seed reaches. pymoo's own cannot be pickled, and so no result of it.
+
+    Parameters
+    ----------
+    pop : (n,) Population
+        Evaluated individuals.
+    P : (k, 2) int array
+        Indices of the two sides.
+    random_state : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    (k, 1) int array
+        Indices of the winners.
+    """
+    violation = violations(pop)
+    return _winners(P, [violation[P[:, 0]] - violation[P[:, 1]]], random_state)
+
+
 class Scoring(Protocol):
     """An algorithm that minimises one number: `WeightedGA`."""
 

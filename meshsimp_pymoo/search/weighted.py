@@ -82,9 +82,9 @@ class WeightedSum(Problem):
 
     For single-objective algorithms other than `WeightedGA` (which does not need it). F is w * error + (1 - w)
     * triangles, raw as in the paper: the error counts in file units, in the measure that the problem minimises.
-    Constraints and all further numbers of the problem are passed on; the error (the sum) and the triangles are kept
-    with each solution: ``result.opt.get("error", "triangles")``. Can be pickled, unlike pymoo's
-    ``MultiToSingleObjective``.
+    Constraints, all further numbers and all attributes (``surface``, ``mesh``, ...) of the problem are passed on; the
+    error (the sum) and the triangles are kept with each solution: ``result.opt.get("error", "triangles")``. Can be
+    pickled, unlike pymoo's ``MultiToSingleObjective``.
 
     Parameters
     ----------
@@ -123,20 +123,12 @@ class WeightedSum(Problem):
             vtype=problem.vtype,
         )
 
-    @property
-    def pinned(self) -> NDArray[np.bool_]:
-        """The vertices that the inner problem pins, (N,) bool."""
-        return self.problem.pinned
-
-    @property
-    def surface(self) -> Any:
-        """What a chromosome means to the inner problem."""
-        return self.problem.surface
-
-    @property
-    def model(self) -> Any:
-        """The inner problem's model."""
-        return self.problem.model
+    def __getattr__(self, name: str) -> Any:
+        # All else – pinned, surface, regions, mesh(), whatever an operator reads – is the inner problem's. Not before
+        # there is one (pickle asks an empty object), and nothing private or special, which speaks of one object alone.
+        if name.startswith("_") or "problem" not in vars(self):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(self.problem, name)
 
     def _evaluate(self, X: NDArray[np.bool_], out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
         out |= self.problem.evaluate(X, return_as_dictionary=True)

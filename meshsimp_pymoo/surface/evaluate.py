@@ -20,7 +20,7 @@ import itertools
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.emission import emit, outline
 from meshsimp_pymoo.plane.faces import canonical_faces
@@ -349,8 +349,7 @@ def evaluate_subsets(
     """
     n = len(ground.z)
     rows = np.ascontiguousarray(np.atleast_2d(kept))
-    if rows.dtype != np.bool_:
-        raise TypeError(f"subsets are bool arrays, one entry a vertex, not {rows.dtype}")
+    require_bool(rows, "subsets are bool arrays, one entry a vertex")
     if rows.shape[1] != n:
         raise ValueError(f"a subset of {n} vertices has as many entries, not {rows.shape[1]}")
     if not rows.flags.writeable:

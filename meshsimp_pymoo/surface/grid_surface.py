@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, Rows
+from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, Rows, require_bool
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.heights import MESH_SAMPLE_BYTES, grid_mesh
 from meshsimp_pymoo.memory import check_free
@@ -195,9 +195,9 @@ class GridSurface:
         raise ModelError(f"{self.model.name}: a grid read by windows has no moves; open it in one piece")
 
     def _checked(self, kept: BoolArray) -> BoolArray:
-        if kept.dtype != np.bool_ or kept.shape != (self.n_vertices,):
+        require_bool(kept, f"a subset of {self.model.name} is a bool array, one entry a sample")
+        if kept.shape != (self.n_vertices,):
             raise ValueError(
-                f"a subset of {self.model.name} is a bool array of shape ({self.n_vertices},), one entry a sample, not "
-                f"{kept.dtype} of {kept.shape}"
+                f"a subset of {self.model.name} has shape ({self.n_vertices},), one entry a sample, not {kept.shape}"
             )
         return kept

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.ground import Ground, make_ground
 from meshsimp_pymoo.surface.live import Live, build, make_live
@@ -217,9 +217,7 @@ class HeightSurface:
         return Refitted(mesh.faces, rows, raised, error, before, min(bound, error))
 
     def _checked(self, kept: Any) -> BoolArray:
-        row = np.array(kept, order="C")
-        if row.dtype != np.bool_:
-            raise TypeError(f"a subset is a bool array, one entry a vertex, not {row.dtype}")
+        row = np.array(require_bool(kept, "a subset is a bool array, one entry a vertex"), order="C")
         if row.shape != (self.n_vertices,):
             raise ValueError(
                 f"a subset of {self.model.name} has shape ({self.n_vertices},), one entry a vertex, not {row.shape}"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, IntArray, require_bool
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.triangulation import RECORD
 from meshsimp_pymoo.surface.ground import Ground
@@ -56,12 +56,9 @@ class LiveTriangulation:
         self.ground: Ground = movable_ground(surface, "live triangulations")
         self.surface = surface
         self.model = model = surface.model
-        kept = np.asarray(kept)
-        if kept.shape != (model.n_vertices,) or kept.dtype != np.bool_:
-            raise ValueError(
-                f"a subset of {model.name} is a bool array of shape ({model.n_vertices},), "
-                f"not {kept.dtype} of shape {kept.shape}"
-            )
+        kept = require_bool(kept, f"a subset of {model.name} is a bool array")
+        if kept.shape != (model.n_vertices,):
+            raise ValueError(f"a subset of {model.name} has shape ({model.n_vertices},), not {kept.shape}")
         self.live = make_live(model.n_vertices)
         self._kept = kept.copy()
         # Of several vertices at one position the first kept one is the site; `_group` numbers the positions.

@@ -2,8 +2,8 @@
 
 ``python tests/benchmarks/quality.py`` does all of it, in some two hours; ``--models jacksboro:11 face:1000`` or
 ``--classes small`` some, ``--budgets 2 5`` with less time for the search, ``-o FILE.csv -o FILE.md`` writes files too.
-Tools that are not part of the package are compared where they are installed: ``pip install pydelatin pyfqmr
-fast-simplification``.
+Tools that are not part of the package are compared where they are installed: ``pip install '.[baselines,meshlab]'``,
+``pip install --pre meshoptimizer``.
 
 * The sizes compared are the numbers of triangles of thinning at the given shares of the vertices.
 * A front's value at a size is the least error among its meshes of at most so many triangles.
@@ -23,7 +23,6 @@ import argparse
 import csv
 import dataclasses
 import fnmatch
-import importlib
 import importlib.metadata
 import os
 import platform
@@ -53,14 +52,13 @@ from meshsimp_pymoo import (
     RegionCrossover,
     Relocation,
     SizeStep,
-    greedy_insertion,
     memetic,
     moead,
     nsga2_v1,
     thinning,
 )
-from meshsimp_pymoo.comparison.meshlab import MeshLabUnavailable, meshlab_available, quadric_collapse
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.comparison.baselines import BASELINES, largest_at_most
+from meshsimp_pymoo.errors import ModelError, ToolUnavailable
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import DownTheLadder, SizeLadder
@@ -149,19 +147,10 @@ ABLATION_MODELS = ("jacksboro:11", "face:1000", "jacksboro:4")
 ABLATION_SECONDS = 10.0
 ABLATION_SEEDS = (1, 2, 3)
 
-# A tool's mesh this close to the wanted size is not searched further: triangles, or this share of them.
-NEAR, NEAR_SHARE = 2, 0.002
-# Meshes that a tool makes at most for one size.
-TRIES = 16
-
 # Models that --enumerable looks at.
 ENUMERABLE = 100
 
 CONSOLE = Console(width=140 if not sys.stdout.isatty() else None)
-
-
-class Absent(Exception):
-    """A method or a model that cannot be used here; the message says why."""
 
 
 # ------------------------------------------------------------------------------------------------- what is compared
@@ -293,153 +282,16 @@ def search_curve(model, algorithm, termination, seed, regions=0):
     return Curve(result.F[:, 0], result.F[:, 1], lambda k: problem.quality(result.X[k]), seconds, generations)
 
 
-# ---------------------------------------------------------------------------------------------------- tools' meshes
-
-
-def needed(module):
-    """Import a tool, or say that it is not there."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as problem:
-        raise Absent(f"not installed ({problem})") from None
-
-
-def centred(model):
-    """Return the model's vertices scaled to a diagonal of 1 to 2, which thresholds of quadric tools suppose."""
-    points = model.file_points
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
-    scale = 2.0 ** -np.floor(np.log2(np.linalg.norm(np.ptp(points, axis=0))))
-    return (points - centre) * scale, lambda vertices: np.asarray(vertices, float) / scale + centre
-
-
-def by_pydelatin(model):
-    """Greedy insertion by the worst point on the pixels of a grid; its vertices get their true places and heights."""
-    delatin = needed("pydelatin").Delatin
-    rows = as_grid(model)
-    heights = model.points[rows, 2]
-
-    def make(size):
-        mesh = delatin(heights, max_error=0.0, max_triangles=size)
-        column, up = np.round(mesh.vertices[:, :2]).astype(int).T
-        places = rows[len(rows) - 1 - up, column]
-        if not np.allclose(model.points[places, 2], mesh.vertices[:, 2], rtol=1e-4, atol=1e-4 * np.ptp(heights)):
-            raise RuntimeError("pydelatin's vertices are not where its heights are")
-        return model.file_points[places], mesh.triangles.astype(np.int64)
-
-    return {"pydelatin": make}
-
-
-def as_grid(model):
-    """Return the rows of the model's vertices as an array over a regular grid, or raise Absent."""
-    x, column = np.unique(model.points[:, 0], return_inverse=True)
-    y, row = np.unique(model.points[:, 1], return_inverse=True)
-    regular = all(len(s) > 1 and np.ptp(np.diff(s)) <= 1e-3 * np.diff(s).mean() for s in (x, y))
-    if len(x) * len(y) != model.n_vertices or not regular:
-        raise Absent("the model is no full regular grid")
-    places = np.full((len(y), len(x)), -1)
-    places[row, column] = np.arange(model.n_vertices)
-    if (places < 0).any():
-        raise Absent("the model is no full regular grid")
-    return places
-
-
-def by_pyfqmr(model):
-    """Fast quadric collapse, with and without a preserved border."""
-    simplifier = needed("pyfqmr").Simplify
-    points, back = centred(model)
-
-    def make(size, preserve_border):
-        tool = simplifier()
-        tool.setMesh(points, model.faces.astype(np.int32))
-        tool.simplify_mesh(target_count=size, preserve_border=preserve_border, verbose=False)
-        vertices, faces, _ = tool.getMesh()
-        return back(vertices), np.asarray(faces, np.int64)
-
-    return {"border": lambda size: make(size, True), "free": lambda size: make(size, False)}
-
-
-def by_fast_simplification(model):
-    """The same by another wrapper, with and without a preserved border where its version has that choice."""
-    simplify = needed("fast_simplification").simplify
-    points, back = centred(model)
-
-    def make(size, **options):
-        vertices, faces = simplify(points, model.faces.astype(np.int32), target_count=size, **options)
-        return back(vertices), np.asarray(faces, np.int64)
-
-    try:
-        make(len(model.faces), preserve_border=True)
-    except TypeError:
-        return {"free": make}
-    return {"border": lambda size: make(size, preserve_border=True), "free": make}
-
-
-def by_meshlab(model):
-    """MeshLab's quadric edge collapse with a preserved border."""
-    if not meshlab_available():
-        raise Absent("pymeshlab does not load")
-
-    def make(size):
-        return quadric_collapse(model.file_points, model.faces, size, preserve_boundary=True, unit_diagonal=True)
-
-    return {"quadric": make}
-
-
-def largest_at_most(make, size, most):
-    """Return (mesh, seconds, fits): of the meshes that ``make`` gives for some parameter the largest that fits.
-
-    Parameters
-    ----------
-    make : callable
-        From a number of triangles, about so many of which come out, to (vertices, faces) in the
-        frame of the file.
-    size : int
-        Triangles that the mesh may have; if all have more, the smallest mesh found is returned and ``fits`` is False.
-    most : int
-        Largest parameter.
-    """
-    fitting = smallest = None
-    low, high = 0, most + 1  # a parameter that gives too few triangles, and one that gives too many
-    target = min(size, most)
-    for attempt in range(TRIES):
-        start = time.perf_counter()
-        mesh = make(target)
-        seconds = time.perf_counter() - start
-        count = len(mesh[1])
-        if 0 < count <= size and (fitting is None or count > len(fitting[0][1])):
-            fitting = mesh, seconds
-        if count > 0 and (smallest is None or count < len(smallest[0][1])):
-            smallest = mesh, seconds
-        if 0 <= size - count <= max(NEAR, NEAR_SHARE * size):
-            break
-        if count > size:
-            high = target
-        else:
-            low = target
-        if high - low <= 1:
-            break
-        middle = (low + high) // 2
-        # First what the miss suggests, then whether any mesh is small enough at all, then halves.
-        if attempt == 0:
-            target = min(max(target + size - count, low + 1), high - 1)
-        else:
-            target = low + 1 if attempt == 1 and low == 0 else middle
-    if smallest is None:
-        raise Absent("gives no triangle")
-    return (*fitting, True) if fitting is not None else (*smallest, False)
-
-
 # ------------------------------------------------------------------------------------------------------ the methods
 
-PASSES = {
-    "worst point": greedy_insertion,
-    "worst triangle": lambda surface: greedy_insertion(surface, choose="triangle"),
-}
+# The baselines of the package: of the variants of a tool the one that does best.
+PASSES = {"worst point": "insertion_by_point", "worst triangle": "insertion_by_triangle"}
 TOOLS = {
-    "pydelatin": by_pydelatin,
-    "pyfqmr": by_pyfqmr,
-    "fast-simplification": by_fast_simplification,
-    "MeshLab, border kept": by_meshlab,
+    "pydelatin": ("pydelatin",),
+    "pyfqmr": ("pyfqmr_border", "pyfqmr_free"),
+    "fast-simplification": ("fast_simplification_border", "fast_simplification_free"),
+    "meshoptimizer": ("meshoptimizer_border", "meshoptimizer_free"),
+    "MeshLab, border kept": ("quadric_collapse_boundary",),
 }
 SEARCHES = ("NSGA-II v1", "memetic")
 METHODS = (*TOOLS, *PASSES, *SEARCHES)
@@ -473,14 +325,14 @@ def add_tool(comparison, method):
     """Score a tool's mesh at every size: of its variants the one that does best beside thinning."""
     model = comparison.model
     surface = HeightSurface(model)
-    variants = TOOLS[method](model)
+    variants = [BASELINES[name].tool(model) for name in TOOLS[method]]
     for share, size in comparison.sizes.items():
         found = []
-        for make in variants.values():
-            (vertices, faces), seconds, fits = largest_at_most(make, size, len(model.faces))
+        for simplify in variants:
+            (vertices, faces), seconds = largest_at_most(simplify, size, len(model.faces))
             quality = surface.score(vertices, faces).quality
             ratio = _ratio(quality.error, comparison.reference.value(quality.triangles))
-            found.append((not fits, ratio, seconds, quality))
+            found.append((quality.triangles > size, ratio, seconds, quality))
         _, _, seconds, quality = min(found, key=lambda row: row[:2])
         comparison.add(method, None, seconds, share, quality, False)
 
@@ -507,7 +359,7 @@ def compare(model, methods, shares, budgets, seeds, say):
             if method in TOOLS:
                 add_tool(comparison, method)
             elif method in PASSES:
-                add_curve(comparison, method, None, nested_curve(model, PASSES[method]))
+                add_curve(comparison, method, None, nested_curve(model, BASELINES[PASSES[method]].front))
             elif method == "NSGA-II v1":
                 for seed in seeds:
                     add_curve(comparison, method, seed, search_curve(model, nsga2_v1(), ("n_gen", 50), seed))
@@ -517,7 +369,7 @@ def compare(model, methods, shares, budgets, seeds, say):
                         say(f"{model.name}: {memetic_name(seconds)}, seed {seed}")
                         curve = search_curve(model, memetic(), ("time", seconds), seed)
                         add_curve(comparison, memetic_name(seconds), seed, curve)
-        except (Absent, MeshLabUnavailable) as reason:
+        except (ToolUnavailable, ValueError) as reason:  # the latter where a tool leaves no triangle
             comparison.absent[method] = str(reason)
     return comparison
 
@@ -722,7 +574,7 @@ def command():
 def versions():
     """Return the packages whose versions matter, as far as they are installed."""
     found = []
-    for name in ("numba", "pymoo", "pymeshlab", "pydelatin", "pyfqmr", "fast-simplification"):
+    for name in ("numba", "pymoo", *sorted({baseline.package for baseline in BASELINES.values()} - {""})):
         try:
             found.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from meshsimp_pymoo.surface.rules import Rules
 
 PRESETS = {
     "N1": "nsga2_v1", "N2": "nsga2_v2", "MD": "moead", "MD normalised": "moead", "G1": "weighted_ga_v1",
-    "G2": "weighted_ga_v2",
+    "G2": "weighted_ga_v2", "N1 common": "nsga2_v1", "G1 common": "weighted_ga_v1",
 }  # fmt: skip
 BUDGET = "9 generations"
 Front = list[tuple[float, float]]
@@ -30,12 +30,13 @@ def store(
     nearest: float = 1.0,
     seconds: Mapping[str, float] | None = None,
     title: str = "by hand",
+    merged: Collection[str] = (),
 ) -> Path:
     """Store an experiment.
 
     ``fronts[problem][method][seed]`` are rows (error, triangles), ``classic[problem][method]`` rows (error,
     triangles, of the paper's series); with ``nearest``, every error is so many times larger when uncovered
-    vertices cost.
+    vertices cost. Each front of the methods ``merged`` comes from two searches that found the same.
     """
     out = claim_experiment(folder)
     model = MeshProblem("roof:3").model
@@ -52,21 +53,23 @@ def store(
         for method, seeds in methods.items():
             for seed, front in seeds.items():
                 F = np.array(front, dtype=float)
-                description = {
-                    "problem": problem, "algorithm": {"name": method}, "seed": seed, "budget": {"generations": 9},
-                }  # fmt: skip
-                facts = {
-                    "problem": problem, "algorithm": method, "seed": seed, "budget": BUDGET, "generations": 9,
-                    "evaluations": 900, "seconds": (seconds or {}).get(method, 1.0) + 0.01 * seed, "versions": {},
-                }  # fmt: skip
-                path = write_run(out / "runs", f"{problem} {method} {seed}", description, arrays(F, nearest), facts)
-                key = path.stem.rpartition(".")[2]
-                runs.append(
-                    {
-                        "key": key, "problem": problem, "algorithm": method, "merged_value": None, "seed": seed,
-                        "budget": BUDGET,
-                    }
-                )  # fmt: skip
+                for value in (0, 1) if method in merged else (None,):
+                    description = {
+                        "problem": problem, "algorithm": {"name": method, "merged": {"w": value}}, "seed": seed,
+                        "budget": {"generations": 9},
+                    }  # fmt: skip
+                    facts = {
+                        "problem": problem, "algorithm": method, "seed": seed, "budget": BUDGET, "generations": 9,
+                        "evaluations": 900, "seconds": (seconds or {}).get(method, 1.0) + 0.01 * seed, "versions": {},
+                    }  # fmt: skip
+                    label = f"{problem} {method} {seed} {value}"
+                    path = write_run(out / "runs", label, description, arrays(F, nearest), facts)
+                    runs.append(
+                        {
+                            "key": path.stem.rpartition(".")[2], "problem": problem, "algorithm": method,
+                            "merged_value": value, "seed": seed, "budget": BUDGET,
+                        }
+                    )  # fmt: skip
     for problem, methods in (classic or {}).items():
         for method, meshes in methods.items():
             F = np.array([mesh[:2] for mesh in meshes], dtype=float)
@@ -76,7 +79,7 @@ def store(
                 "vertex_start": np.zeros(len(F) + 1, int), "face_start": np.zeros(len(F) + 1, int),
             }  # fmt: skip
             facts = {"seconds": 0.5, "notes": [""] * len(F), "versions": {}}
-            description = {"meshlab": method, "model": problem}
+            description = {"baseline": method, "model": problem}
             path = write_run(out / "runs", f"{problem} {method}", description, arrays(F, nearest) | extra, facts)
             rows.append({"key": path.stem.rpartition(".")[2], "problem": problem, "method": method})
     names = list(dict.fromkeys(method for methods in fronts.values() for method in methods))
@@ -89,14 +92,19 @@ def store(
             "algorithms": [
                 {
                     "name": name, "preset": PRESETS.get(name, ""), "class": "", "merged_parameter": "",
-                    "merged_values": [None],
-                    "description": {"parameters": {"normalised": True} if "normalised" in name else {}},
+                    "merged_values": [0, 1] if name in merged else [None],
+                    "description": {
+                        "parameters": {"normalised": True} if "normalised" in name else {},
+                        "settings": {
+                            "sampling": {"class": "X.RandomSubset", "size": 0.2 if "common" in name else None},
+                        },
+                    },
                 }
                 for name in names
             ],
             "seeds": seeds,
             "budgets": [{"name": BUDGET, "generations": 9}],
-            "meshlab": None,
+            "baselines": None,
             "runs": runs,
             "classic": rows,
             "skipped": [],

@@ -10,6 +10,7 @@ from PIL import Image
 
 from meshsimp_pymoo.comparison import report as experiment
 from meshsimp_pymoo.comparison.findings import CLAIMS, findings
+from meshsimp_pymoo.comparison.findings_page import shown_claims
 from meshsimp_pymoo.comparison.page import experiment_page
 from meshsimp_pymoo.comparison.study import Study
 
@@ -50,8 +51,34 @@ def visit(browser, page, tmp_path_factory):
 
 def test_every_verdict_stands_in_the_table_of_findings(visit, study):
     found = findings(study, BUDGET, study.scorings[0])
+    shown = shown_claims(CLAIMS, found)
+    assert [claim.key for claim in shown] == [
+        "multi_over_single",
+        "multi_over_classic",
+        "single_over_classic",
+        "extent",
+        "selected",
+    ]
     cells = visit.page.locator("#findings td.verdict").all_inner_texts()
-    assert cells == [f.verdict for claim in CLAIMS for f in found if f.claim.key == claim.key]
+    assert cells == [f.verdict for f in found if f.claim in shown]
+
+
+def test_the_readers_own_comparison_comes_first(visit, study, tmp_path, browser):
+    sections = visit.page.evaluate("[...document.querySelectorAll('section')].map((section) => section.id)")
+    assert sections[0] == "methods"
+    assert sections.index("findings") > sections.index("methods") + 2
+    rows = visit.page.locator("#methods tbody tr").all_inner_texts()
+    assert [row.split()[0] for row in rows] == ["N1", "G1", "MeshLab"]
+    own = Study(store(tmp_path / "own", {"M1": {"N1": GOOD, "G1": POOR, "Mine": POOR}}))
+    path = tmp_path / "own.html"
+    path.write_text(experiment_page(own, findings(own, BUDGET, "nearest")), encoding="utf-8")
+    folded = Visit(browser, path, viewport={"width": 1100, "height": 900})
+    assert folded.page.locator("#findings details").get_attribute("open") is None
+    assert visit.page.locator("#findings details").get_attribute("open") == ""
+    folded.check()
+    folded.close()
+    alone = Study(store(tmp_path / "alone", {"M1": {"Mine": POOR, "Other": GOOD}}))
+    assert 'id="findings"' not in experiment_page(alone, findings(alone, BUDGET, "nearest"))
 
 
 def test_fronts_are_drawn_and_methods_can_be_left_out(visit):

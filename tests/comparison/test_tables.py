@@ -17,6 +17,7 @@ from meshsimp_pymoo.comparison.figures import box_figure, fronts_figure, selecte
 from meshsimp_pymoo.comparison.report import write_tables
 from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, Study
+from meshsimp_pymoo.comparison.study import INDICATORS as NAMES
 from meshsimp_pymoo.comparison.tables import Table
 from meshsimp_pymoo.report.document import slug
 
@@ -78,12 +79,13 @@ def test_the_tests_are_the_analysis_own(study):
     case = study.cases["M_1 & co", BUDGET, NEAREST]
     for indicator in INDICATORS:
         expected = compared(case.runs, "N1", "MD", indicator, case.optimal)
-        (row,) = [r for r in rows if r["indicator"] == tables.INDICATOR_NAMES[indicator]]
+        (row,) = [r for r in rows if r["indicator"] == NAMES[indicator]]
         assert (row["a"], row["b"]) == ("N1", "MD")
         assert float(row["p"]) == expected.p
         assert float(row["a12"]) == expected.a12
         assert float(row["mean_a"]) == pytest.approx(expected.sample_a.mean())
-    assert len(rows) == 5
+    assert len(rows) == len(NAMES) == 9
+    assert {row["p_signed_rank"] for row in rows if row["indicator"] == "HVR"} == {"0.5"}  # two pairs: 2 / 2 ** 2
     (row,) = [r for r in rows if r["indicator"] == "epsilon to the pseudo-optimal front"]
     assert float(row["mean_a"]) > float(row["mean_b"])  # negated: larger is better
 
@@ -128,12 +130,12 @@ def test_uncovered_vertices_cost_under_one_scoring_and_not_under_the_other(tmp_p
     # the mesh of 2 triangles, which abandons the model, is compared only where that costs
     assert searched.runs["MeshLab quadric"][0].tolist() == [[1.0, 50.0]]
     assert nearest.runs["MeshLab quadric"][0].tolist() == [[1.5, 2.0]]
-    row = read(tables.meshlab(study, BUDGET))[0]
+    row = read(tables.baselines(study, BUDGET))[0]
     assert (row["asked"], row["triangles"], row["series"], row["uncovered"]) == ("50", "50", "paper", "3")
     assert (row["error_as_searched"], row["error_every_vertex"]) == ("1.0", "3.0")
     assert float(row["uncovered_share"]) == pytest.approx(3 / 9)
     assert (row["evolution_error_every_vertex"], row["evolution_method"]) == ("15.0", "N1")
-    assert read(tables.meshlab(study, BUDGET))[1]["evolution_method"] == ""
+    assert read(tables.baselines(study, BUDGET))[1]["evolution_method"] == ""
 
 
 def test_every_method_keeps_its_row_in_every_table(tmp_path):
@@ -187,7 +189,7 @@ def test_one_run_of_one_method_is_report_enough(tmp_path):
     assert not list(out.glob(".tables.*"))
     scores = (out / "tables" / slug(BUDGET) / NEAREST / "scores.csv").read_text()
     assert scores.splitlines()[1].startswith("A,X,1,1.0,,1.0,,1.0,,1.0,,1.0,")
-    assert "not decided here" in (out / "findings.md").read_text()
+    assert "| X | own |" in (out / "findings.md").read_text()
 
 
 def test_figures_show_every_method_and_every_model(tmp_path):

@@ -64,7 +64,7 @@ seeds: &s [1]
 budgets:
   - {name: short, evaluations: 8}
   - seconds: 0.01
-baselines: {meshlab: {methods: [quadric_collapse], steps: 3, down_to_fronts: no}}
+baselines: {methods: [quadric_collapse, thinning], steps: 3, down_to_fronts: no}
 """,
     """\
 folder: scans

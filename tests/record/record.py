@@ -257,7 +257,7 @@ def presets() -> str:
 @row
 def meshlab() -> str:
     text = EXPERIMENT.split("algorithms:")[0] + "algorithms: [nsga2_v1]\nseeds: [1]\nbudgets: [{generations: 3}]\n"
-    Path("record.yaml").write_text(text + "baselines: {meshlab: {steps: 4}}\n", encoding="utf-8")
+    Path("record.yaml").write_text(text + "baselines: {methods: meshlab, steps: 4}\n", encoding="utf-8")
     meshsimp("run", "record.yaml", "-o", "out", "--jobs", 1, "-q")
     return folder_hash("out", only=("tables/",))
 

@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from pymoo.algorithms.moo.moead import MOEAD
+from pymoo.algorithms.moo.nsga3 import HyperplaneNormalization
 from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.util.archive import MultiObjectiveArchive
 
-from meshsimp_pymoo import MeshProblem, nsga2_v1, nsga3
+from meshsimp_pymoo import MeshProblem, Moves, nsga2_v1, nsga3
 from meshsimp_pymoo.search import checkpoint as module
 from meshsimp_pymoo.search.checkpoint import (
     CheckpointError,
@@ -31,6 +32,7 @@ from meshsimp_pymoo.search.checkpoint import (
     restore,
 )
 from meshsimp_pymoo.search.operators import OAX
+from meshsimp_pymoo.search.operators.oax import first_objective
 from meshsimp_pymoo.search.presets import PRESETS
 
 WHAT = {"model": "roof"}
@@ -104,6 +106,17 @@ def test_every_preset_goes_on_to_the_same_end(problems, tmp_path, name, kind, at
     assert second.has_next()
     finish(second)
     assert state(second) == state(whole)
+
+
+def test_a_search_with_a_budget_in_moves_goes_on_with_what_is_left_of_them(problems, tmp_path):
+    whole, first, second = (set_up("memetic", problems["usual"], Moves(3_001)) for _ in range(3))
+    finish(whole)
+    steps(first, 2)
+    assert 0 < first.moves < 3_001
+    restore(saved(first, tmp_path / "c.npz"), second)
+    finish(second)
+    assert state(second) == state(whole)
+    assert second.moves == whole.moves == 3_001
 
 
 def test_a_search_that_is_at_its_end_is_restored_at_its_end(problems, tmp_path):
@@ -239,11 +252,22 @@ class Other:
     pass
 
 
+def local_class():
+    class Local:
+        pass
+
+    Local.__module__ = "meshsimp_pymoo.nowhere"
+    return Local
+
+
 UNKNOWN = {
     "a foreign object": lambda algorithm: setattr(algorithm, "extra", Other()),
     "a generator": lambda algorithm: setattr(algorithm.mating, "extra", iter([1])),
     "an array of objects": lambda algorithm: setattr(algorithm, "extra", np.array([Other()])),
-    "a new part": lambda algorithm: setattr(algorithm, "extra", OAX()),
+    "a new part with a function": lambda algorithm: setattr(algorithm, "extra", OAX(score=first_objective)),
+    "a new part inside a new part": lambda algorithm: setattr(algorithm, "extra", OAX(evaluator=iter([1]))),
+    "a new generator": lambda algorithm: setattr(algorithm, "extra", np.random.default_rng(1)),
+    "a new part of a local class": lambda algorithm: setattr(algorithm, "extra", local_class()()),
     "an archive": lambda algorithm: setattr(algorithm, "archive", MultiObjectiveArchive()),
     "people in people": lambda algorithm: algorithm.pop[0].data.update(parent=Individual(X=np.ones(90, bool))),
 }
@@ -255,9 +279,27 @@ def test_state_that_cannot_be_carried_is_refused_and_nothing_is_written(problems
     first.next()
     keeper = Checkpoints(tmp_path / "c.npz", first, WHAT)
     UNKNOWN[kind](first)
-    with pytest.raises(NotResumable, match="checkpoint can"):
-        keeper.save()
+    for save in (keeper.check, keeper.save):
+        with pytest.raises(NotResumable, match="checkpoint can"):
+            save()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_parts_made_during_the_run_are_made_again_and_shared_generators_stay_shared(problems, tmp_path):
+    first, second = (set_up("nsga2_v1", problems["usual"]) for _ in range(2))
+    keeper = Checkpoints(tmp_path / "c.npz", first, WHAT)
+    steps(first, 2)
+    first.survival.norm = HyperplaneNormalization(2)  # as in SPEA2
+    first.survival.norm.update(first.pop.get("F"))
+    first.survival.again = first.survival.norm
+    first.survival.random_state = first.random_state  # as in CTAEA
+    keeper.save()
+    restore(read_checkpoint(tmp_path / "c.npz"), second)
+    assert type(second.survival.norm) is HyperplaneNormalization
+    np.testing.assert_array_equal(second.survival.norm.nadir_point, first.survival.norm.nadir_point)
+    assert second.survival.again is second.survival.norm
+    assert second.survival.random_state is second.random_state
+    assert state(second) == state(first)
 
 
 def test_an_algorithm_in_the_middle_of_a_python_generator_is_refused(problems, tmp_path):

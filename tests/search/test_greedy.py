@@ -116,8 +116,10 @@ def test_insertion_leaves_out_vertices_whose_position_is_taken():
 
 def test_pins_and_counts_that_are_none_are_refused():
     model = open_model("face:150")
-    with pytest.raises(ValueError, match=r"pinned is a bool array of shape \(150,\)"):
-        thinning(surface(model), np.arange(4))
+    with pytest.raises(ValueError, match=r"pinned has shape \(150,\), not \(4,\)"):
+        thinning(surface(model), np.ones(4, bool))
+    with pytest.raises(TypeError, match="pinned is a bool array, not int64; give True where one is"):
+        thinning(surface(model), np.arange(150))
     with pytest.raises(ValueError, match="most=-1"):
         greedy_insertion(surface(model), most=-1)
 

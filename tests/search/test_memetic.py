@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from enumerable_models import GENERATIONS, MOST_FREE, nondominated, random_problem, same_front, true_front
 from pymoo.core.population import Population
 from pymoo.optimize import minimize
+from pymoo.termination.collection import TerminationCollection
+from pymoo.termination.max_gen import MaximumGenerationTermination
 
-from meshsimp_pymoo import MeshProblem, NestedSubsets, PackedDuplicates, memetic, thinning
+from meshsimp_pymoo import MeshProblem, Moves, NestedSubsets, PackedDuplicates, memetic, nsga2_v1, thinning
+from meshsimp_pymoo.search import local_search
 from meshsimp_pymoo.search import memetic as module
 from meshsimp_pymoo.search.local_search import MoveShares
 from meshsimp_pymoo.search.memetic import IDLE, DownTheLadder, SizeLadder
@@ -157,6 +161,97 @@ def test_the_memetic_search_repeats_and_stays_in_its_range():
     assert runs[0].X.tobytes() == runs[1].X.tobytes()
     assert runs[0].F[:, 1].max() <= 90
     np.testing.assert_allclose(runs[0].F[:, 0], problem.surface.evaluate(runs[0].X)[:, 0])
+
+
+@pytest.mark.parametrize("moves", [1, 7, 100, 5_000, 123_457])
+@pytest.mark.parametrize("model", ["face:200", "horseshoe:150"])
+def test_a_budget_in_moves_is_used_up_and_never_exceeded(model, moves, monkeypatch):
+    made, relocate = [], local_search.relocate
+
+    def noted(*given, **options):
+        found = relocate(*given, **options)
+        made.append(int(options["made"][0]))
+        return found
+
+    monkeypatch.setattr(local_search, "relocate", noted)
+    algorithm = minimize(MeshProblem(model), memetic(20), Moves(moves), seed=2).algorithm
+    assert sum(made) == algorithm.moves == moves
+    assert algorithm.mating.sweep <= 2
+
+
+def test_a_budget_in_moves_makes_a_quick_sweep_and_a_slow_one(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(int(moves.sum())), X.copy())[1]
+    )
+    algorithm = minimize(MeshProblem("face:200"), memetic(40), Moves(10_000), seed=1).algorithm
+    per_sweep = [sum(asked[:3]), sum(asked[3:])]  # 40 rungs in 16 chains: three generations
+    assert len(asked) == 6
+    assert per_sweep == [1_200, 8_800]
+    # beyond the most moves a kept vertex they go on in further sweeps
+    asked.clear()
+    monkeypatch.setattr(module, "SLOWEST", 1.0)
+    monkeypatch.setattr(module, "IDLE", 100)
+    again = minimize(MeshProblem("face:200"), memetic(40), Moves(10_000), seed=1).algorithm
+    assert again.mating.sweep > 3
+    assert again.moves == sum(asked) == 10_000
+    assert algorithm.mating.sweep == 2
+
+
+@pytest.mark.parametrize(
+    "termination", [Moves(20_000), TerminationCollection(MaximumGenerationTermination(50), Moves(20_000))]
+)
+def test_a_budget_in_moves_gives_the_same_bytes_on_any_number_of_threads(monkeypatch, termination):
+    found = []
+    for n_threads in (1, 3):
+        with ThreadPoolExecutor(n_threads) as pool:
+            monkeypatch.setattr(local_search, "thread_pool", lambda pool=pool: pool)
+            monkeypatch.setattr(module, "thread_pool", lambda pool=pool: pool)
+            result = minimize(MeshProblem("face:200", n_threads=n_threads), memetic(20), termination, seed=3)
+        found.append((result.X.tobytes(), result.F.tobytes(), result.algorithm.moves))
+    assert found[0] == found[1]
+    assert found[0][2] == 20_000
+
+
+def test_moves_that_time_has_stopped_are_not_counted():
+    problem = MeshProblem("face:200")
+    made = np.zeros(3, np.int64)
+    X = np.array([thinning(problem.surface).kept(60)] * 3)
+    local_search.relocate_all(
+        problem.surface, X, np.array([5, 10**10, 10**10]), np.random.default_rng(1), seconds=0.05, made=made
+    )
+    assert made[0] == 5
+    assert (made[1:] % 64 == 0).all()
+    assert (made[1:] < 10**8).all()
+
+
+@pytest.mark.parametrize(("asked", "most"), [(80, 96), (200, 216), (300, 316)])
+def test_a_budget_of_evaluations_holds_with_what_is_filled_in(asked, most):
+    """Of the last generation only is more evaluated."""
+    algorithm = minimize(MeshProblem("face:200"), memetic(60, moves_per_vertex=1), ("n_eval", asked), seed=1).algorithm
+    assert asked <= algorithm.evaluator.n_eval < most
+
+
+def test_the_filling_of_a_search_that_ends_before_takes_no_more_evaluations_than_are_left(monkeypatch):
+    monkeypatch.setattr(module, "IDLE", 0)
+    monkeypatch.setattr(module, "relocate_all", lambda _, X, *__, **___: X.copy())
+    counts = [
+        minimize(MeshProblem("face:200"), memetic(20), ("n_eval", n), seed=1).algorithm.evaluator.n_eval
+        for n in (25, 50, 10**9)
+    ]
+    assert counts[:2] == [25, 50]
+    assert counts[2] > 100
+
+
+@pytest.mark.parametrize("wrong", [0, -1, 2.5, True, "many", None])
+def test_a_number_of_moves_that_is_none_is_refused(wrong):
+    with pytest.raises(ValueError, match=r"Moves\(.*: expected a whole number of at least 1"):
+        Moves(wrong)
+
+
+def test_moves_for_an_algorithm_that_makes_none_are_refused():
+    with pytest.raises(TypeError, match=r"Moves\(5\) is for memetic\(\), and NSGA2 makes no moves; give it"):
+        minimize(MeshProblem("roof:5"), nsga2_v1(10), Moves(5), seed=1)
 
 
 def test_the_memetic_search_finds_the_true_front_of_a_roof():

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from pymoo.algorithms.moo.nsga2 import binary_tournament
+from pymoo.algorithms.moo.nsga3 import comp_by_cv_then_random
 from pymoo.core.population import Population
+from pymoo.operators.selection.tournament import TournamentSelection
+from pymoo.optimize import minimize
 from stand_in_problem import GridProblem
 
-from meshsimp_pymoo import nsga2_v1
-from meshsimp_pymoo.search.selection import crowded_tournament
+from meshsimp_pymoo import MeshProblem, nsga2_v1, nsga3
+from meshsimp_pymoo.search.selection import crowded_tournament, violation_tournament
 
 
 @pytest.mark.parametrize("max_triangles", [None, 60])
@@ -43,3 +48,27 @@ def test_solutions_that_violate_equally_are_drawn_by_lot_whatever_their_objectiv
     P = np.repeat([[0, 1]], 2000, axis=0)
     winners = crowded_tournament(pop, P, random_state=np.random.default_rng(1))
     assert abs(winners.mean() - 0.5) < 4 * 0.5 / np.sqrt(2000)
+
+
+@pytest.mark.parametrize("violation", [[0.0] * 6, [3.0, 0.0, 0.0, 1.0, 2.0, 0.0]])
+def test_nsga3s_tournament_has_pymoos_winners_and_draws_the_same_numbers(violation: list[float]) -> None:
+    pop = Population.new("X", np.ones((6, 4), dtype=bool), "CV", np.array(violation)[:, None])
+    P = np.random.default_rng(1).permuted(np.tile(np.arange(6), (300, 1)), axis=1)[:, :2]
+    ours, theirs = (np.random.default_rng(2) for _ in range(2))
+    winners = comp_by_cv_then_random(pop, P, random_state=theirs)
+    assert_array_equal(violation_tournament(pop, P, random_state=ours), winners)
+    assert ours.bit_generator.state == theirs.bit_generator.state
+
+
+def test_nsga3_finds_what_it_found_with_pymoos_tournament_and_its_result_can_be_pickled() -> None:
+    problem = MeshProblem("roof:5", n_threads=1)
+    theirs = TournamentSelection(func_comp=comp_by_cv_then_random)
+    ours, before = (
+        minimize(problem, nsga3(2, n_partitions=9, **selection), ("n_gen", 6), seed=4)
+        for selection in ({}, {"selection": theirs})
+    )
+    assert_array_equal(ours.X, before.X)
+    assert_array_equal(ours.F, before.F)
+    again = pickle.loads(pickle.dumps(ours))
+    assert_array_equal(again.X, ours.X)
+    assert again.algorithm.random_state.bit_generator.state == before.algorithm.random_state.bit_generator.state

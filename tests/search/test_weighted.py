@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ from pymoo.core.callback import Callback
 from pymoo.optimize import minimize
 from stand_in_problem import GridProblem, front_of
 
-from meshsimp_pymoo import weighted_ga_v1, weighted_ga_v2
-from meshsimp_pymoo.search.operators import OAX, PackedDuplicates
+from meshsimp_pymoo import MeshProblem, weighted_ga_v1, weighted_ga_v2
+from meshsimp_pymoo.search.operators import OAX, OPERATORS, PackedDuplicates, SubsetUniformCrossover
 from meshsimp_pymoo.search.paper import paper_operators
 from meshsimp_pymoo.search.weighted import WeightedSum, weighted_sum
 
@@ -113,6 +114,34 @@ class TestWeightedSum:
         result = minimize(WeightedSum(problem, 0.004), algorithm, ("n_gen", 40), seed=1)
         assert result.algorithm.evaluator.n_eval == problem.calls
         assert_allclose(result.F, [weighted_sum(front_of(problem), 0.004).min()])
+
+    @pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind, names in OPERATORS.items() for name in names])
+    def test_every_operator_works_in_a_ga_on_it_as_on_the_problem(self, kind: str, name: str) -> None:
+        problem = MeshProblem("face:60", regions=4, n_threads=1)
+        argument = {"duplicates": "eliminate_duplicates"}.get(kind, kind)
+        usual = {"crossover": SubsetUniformCrossover(), "eliminate_duplicates": PackedDuplicates()} | paper_operators()
+        found = [
+            minimize(searched, make(8, **(usual | {argument: OPERATORS[kind][name]()})), ("n_gen", 3), seed=1)
+            for searched, make in [(WeightedSum(problem, 0.01), GA), (problem, partial(weighted_ga_v1, 0.01))]
+        ]
+        assert found[0].X.dtype == bool
+        for result in found:
+            assert result.algorithm.evaluator.n_eval >= 16
+        assert_allclose(found[0].F, weighted_sum(problem.evaluate(found[0].X[None]), 0.01))
+
+    def test_all_attributes_of_the_inner_problem_are_its_own(self) -> None:
+        problem = MeshProblem("roof:5", regions=3, n_threads=1)
+        wrapped = WeightedSum(problem, 0.5)
+        for copied in (wrapped, copy.deepcopy(wrapped), pickle.loads(pickle.dumps(wrapped))):
+            assert (copied.n_obj, copied.regions, copied.objectives) == (1, 3, ("error", "triangles"))
+            assert_array_equal(copied.pinned, problem.pinned)
+            assert copied.mesh(copied.pinned).faces.shape == (2, 3)
+        assert wrapped.surface is problem.surface
+        assert wrapped.model is problem.model
+        for name in ("no_such_thing", "_memo", "__len__"):
+            with pytest.raises(AttributeError, match=f"object has no attribute '{name}'"):
+                getattr(wrapped, name)
+        assert not hasattr(WeightedSum.__new__(WeightedSum), "surface")
 
     def test_only_two_objectives_can_be_weighed(self) -> None:
         with pytest.raises(ValueError, match="two objectives, the problem has 1"):

@@ -71,7 +71,7 @@ def test_what_a_grid_read_by_windows_does_not_know_is_refused(pair):
         pass
     with pytest.raises(ValueError, match="leave regions out"):
         surface.evaluate(surface.pinned[None], regions=3)
-    with pytest.raises(ValueError, match=r"a bool array of shape \(117,\)"):
+    with pytest.raises(ValueError, match=r"has shape \(117,\), one entry a sample, not \(5,\)"):
         surface.triangles(np.ones(5, bool))
 
 

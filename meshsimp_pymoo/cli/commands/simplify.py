@@ -69,6 +69,14 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     budget.add_argument("--evaluations", type=whole(1), metavar="N", help="stop after the generation that reaches N")
     budget.add_argument("--generations", type=whole(1), metavar="N")
+    sweeping = " or ".join(name for name, preset in PRESETS.items() if "moves" in preset.measured_by)
+    budget.add_argument(
+        "--moves",
+        type=whole(1),
+        metavar="N",
+        help=f"of the annealing of {sweeping}: a million take about a second of one core, and unlike with a time the "
+        "results are the same every time",
+    )
 
     search = parser.add_argument_group("how to search")
     offered = {name: preset.about for name, preset in PRESETS.items() if preset.whole_front}

@@ -101,7 +101,7 @@ def test_a_problem_without_a_mesh_is_refused_by_name(kind: str, name: str) -> No
 
 @pytest.mark.parametrize(("kind", "name"), [(k, n) for k, n in ALL if k not in ("duplicates", "sampling")])
 def test_float_chromosomes_are_refused_with_the_way_out(kind: str, name: str) -> None:
-    pop = Population.new("X", genomes(0, 4).astype(float))
+    pop = Population.new("X", 0.5 * genomes(0, 4))
     with pytest.raises(TypeError, match=r"not float64; pass sampling=RandomSubset\(\)"):
         OPERATORS[kind][name]()(PROBLEM, pop.reshape(2, 2) if kind == "crossover" else pop, random_state=rng(1))
 
