@@ -12,7 +12,7 @@ The order of a study:
 3. `dominance_rates`, to which the paper's Wilcoxon procedure comes down for a binary indicator; `corrected` for
    many comparisons; the tests themselves are in `meshsimp_pymoo.comparison.statistics`;
 4. `selected_solutions`: the paper's three solutions per method, and the knees;
-5. `attainment_surfaces`: where a share of a method's runs gets.
+5. `attainment_surfaces`: where a share of a method's runs gets; `anytime`: how far they are at each moment.
 
 Where the paper's text leaves something open, what was read into it is marked as a reading.
 
@@ -54,6 +54,7 @@ __all__ = [
     "PairTable",
     "Scores",
     "Solution",
+    "anytime",
     "attainment_surfaces",
     "corrected",
     "coverage_table",
@@ -620,6 +621,41 @@ def attainment_surfaces(
         surface = moocore.eaf(points, sets, percentiles=[100 * n_runs / len(fronts)])[:, :2]
         surfaces[level] = non_dominated(surface)
     return surfaces
+
+
+def anytime(curves: Sequence[tuple[ArrayLike, ArrayLike]], moments: ArrayLike) -> FloatArray:
+    """Return the quartiles over runs of what each had reached at given moments.
+
+    What a run has is what it had at its last known moment: nothing before the first, nothing is guessed in between,
+    and what an ended run has, it keeps.
+
+    Parameters
+    ----------
+    curves : sequence of (x, y)
+        For each run its moments (K,), in order, and what it had then (K,), such as of `Case.progress`.
+    moments : (t,) array-like
+        When to look.
+
+    Returns
+    -------
+    (3, t) float array
+        Lower quartile, median and upper quartile.
+
+    Examples
+    --------
+    >>> anytime([([1, 10], [0.2, 0.6]), ([2, 20], [0.4, 0.8])], [1, 2, 10, 100])
+    array([[0.05, 0.25, 0.45, 0.65],
+           [0.1 , 0.3 , 0.5 , 0.7 ],
+           [0.15, 0.35, 0.55, 0.75]])
+    """
+    if not curves:
+        raise ValueError("there are no curves; was anything traced?")
+    when = np.asarray(moments, dtype=float)
+    reached = []
+    for x, y in curves:
+        last = np.searchsorted(np.asarray(x, dtype=float), when, side="right") - 1
+        reached.append(np.where(last < 0, 0.0, np.asarray(y, dtype=float)[last]))
+    return np.asarray(np.quantile(reached, [0.25, 0.5, 0.75], axis=0), dtype=float)
 
 
 def _fronts(runs: Runs) -> dict[str, dict[int, FloatArray]]:

@@ -33,7 +33,6 @@ VERDICT_CLASSES = {HOLDS: "holds", DOES_NOT_HOLD: "fails", UNDECIDED: "open"}
 MARKS = {
     "o": "circle", "s": "square", "^": "up", "D": "diamond", "v": "down", "P": "plus", "X": "cross", "<": "left",
     "+": "plus", "x": "cross", "1": "down", "2": "up", "3": "left", "4": "diamond", "*": "star",
-    ".": "circle",
 }  # fmt: skip
 # Parts of experiment.json that the page shows as the configuration.
 CONFIGURATION = ("title", "problems", "algorithms", "seeds", "budgets", "baselines")
@@ -135,6 +134,10 @@ def _section(
         "hvr": "hypervolume ratio of every run",
         "cardinality": "cardinality of every run",
         "selected": "fewest triangles, best trade-off and least error of every method",
+        "convergence_evaluations": "hypervolume ratio over evaluations",
+        "convergence_seconds": "hypervolume ratio over seconds",
+        "critical_difference": "mean ranks of every method over the models",
+        "profile": "performance profiles of every method by epsilon",
     }
     pictures = [_picture(figures / f"{name}.png", f"{alt} ({_setting(budget, scoring)})") for name, alt in alts.items()]
     shown = {claim.key for claim in findings_page.shown_claims(CLAIMS, found)}

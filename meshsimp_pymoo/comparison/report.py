@@ -5,7 +5,8 @@
     OUT/findings.md                              all methods compared, and the paper's claims with verdicts and numbers
     OUT/tables/BUDGET/SCORING/NAME.csv|md|tex    see `meshsimp_pymoo.comparison.tables`
     OUT/tables/runs.csv, findings.csv            all runs, all verdicts
-    OUT/figures/BUDGET/SCORING/*.png             fronts_MODEL, hvr, cardinality, selected, meshes_MODEL
+    OUT/figures/BUDGET/SCORING/*.png             fronts_MODEL, hvr, cardinality, selected, meshes_MODEL, profile,
+                                                 critical_difference, convergence_evaluations, convergence_seconds
     OUT/times.csv, times.md                      measured seconds, kept apart: never the same twice
     OUT/report.html                              all of it on one page that needs no other file
 
@@ -121,6 +122,16 @@ def _write_figures(study: Study, progress: Callable[[float, float, str], None] |
             for indicator in ("hvr", "cardinality"):
                 drawings.append((f"{where}/{indicator}.png", partial(figures.box_figure, study, cases, indicator)))
             drawings.append((f"{where}/selected.png", partial(figures.selected_figure, study, cases)))
+            for over in ("evaluations", "seconds"):
+                if any(case.progress(method, over) for case in cases for method in case.evolutionary):
+                    name = f"{where}/convergence_{over}.png"
+                    drawings.append((name, partial(figures.convergence_figure, study, cases, over)))
+            methods, values = figures.profiled(cases)
+            if len(methods) > 1 and len(cases) > 1:
+                name = f"{where}/critical_difference.png"
+                drawings.append((name, partial(figures.critical_difference_figure, study, cases)))
+            if len(methods) > 1 and len(values):
+                drawings.append((f"{where}/profile.png", partial(figures.profile_figure, study, cases)))
     put_back(study.out / "figures")
     with new_folder(study.out / "figures", replace=True, flush=False) as folder:
         for done, (path, draw) in enumerate(drawings):

@@ -379,7 +379,7 @@ def friedman(values: ArrayLike, *, alpha: float = ALPHA) -> Friedman:
     chi2, f, p, note = _friedman_test(ranks)
     order = [int(column) for column in np.argsort(mean_ranks, kind="stable")]
     if not p < alpha:
-        note = note or f"Friedman's test finds no difference (p = {p:.2g})"
+        note = note or "Friedman's test finds no difference"
         return Friedman(mean_ranks, chi2, f, p, difference, (tuple(order),), note)
     # from each method down to the last one that is too near to differ; what a longer group holds is none of its own
     groups: list[tuple[int, ...]] = []

@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -60,10 +60,10 @@ from meshsimp_pymoo.comparison.analysis import (
     unary_scores,
 )
 from meshsimp_pymoo.comparison.baselines import BASELINES
-from meshsimp_pymoo.comparison.statistics import rank_sum
+from meshsimp_pymoo.comparison.statistics import Friedman, friedman, rank_sum
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
-from meshsimp_pymoo.indicators import merged_front, non_dominated
+from meshsimp_pymoo.indicators import hypervolume_ratio, merged_front, non_dominated
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -82,6 +82,7 @@ __all__ = [
     "Problem",
     "Start",
     "Study",
+    "ranked",
 ]
 
 
@@ -316,6 +317,51 @@ class Case:
         """Return the seconds that every single search of a method took."""
         return np.array([run.record["seconds"] for runs in self.sources[method].values() for run in runs])
 
+    def progress(self, method: str, over: str) -> list[tuple[FloatArray, FloatArray]]:
+        """Return how the hypervolume ratio of each run of a method grew, from the fronts that it kept on its way.
+
+        The ratio is against the pseudo-optimal front of all runs. Runs that are merged to one front are taken as if
+        they had advanced together: at each moment their fronts at the same share of their way are merged, and what
+        they had spent by then is summed.
+
+        Parameters
+        ----------
+        method : str
+            The method.
+        over : {"evaluations", "seconds"}
+            What is counted.
+
+        Returns
+        -------
+        list of (x, hvr)
+            For each seed the moments (K,) and the ratio at each, 0 before anything was found. Seeds with a run
+            that kept no fronts are left out; so are all if this scoring is not the one that was searched by.
+        """
+        if self.scoring != "searched" and self.problem.rules.outside != "nearest":
+            return []
+        kept = [runs for runs in self.sources[method].values() if all("trace_F" in run.arrays for run in runs)]
+        return [self._progress(runs, over) for runs in kept]
+
+    def _progress(self, runs: list[StoredRun], over: str) -> tuple[FloatArray, FloatArray]:
+        """Return the progress of one seed."""
+        spent = [
+            np.asarray(run.arrays["trace_evaluations"] if over == "evaluations" else run.record["trace_seconds"], float)
+            for run in runs
+        ]
+        shares = [moments / (moments[-1] or 1.0) for moments in spent]
+        # the moments of the run that begins last: by then all others have a front
+        last = int(np.argmax([share[0] for share in shares]))
+        hvr = []
+        for share in shares[last]:
+            fronts = []
+            for run, own in zip(runs, shares, strict=True):
+                k = np.searchsorted(own, share, side="right") - 1
+                start, end = run.arrays["trace_start"][k : k + 2]
+                fronts.append(run.arrays["trace_F"][start:end])
+            F = np.concatenate(fronts)
+            hvr.append(hypervolume_ratio(F, self.optimal.front) if len(F) else 0.0)
+        return spent[last] * (sum(moments[-1] for moments in spent) / (spent[last][-1] or 1.0)), np.array(hvr)
+
     def find(self, method: str, error: float, triangles: float) -> Picked:
         """Return where a solution of a method's front comes from."""
         for seed, runs in self.sources[method].items():
@@ -549,6 +595,31 @@ class Study:
                 runs[label] = {NO_SEED: non_dominated(F[usable])}
                 sources[label] = {NO_SEED: [run]}
         return Case(problem, budget, scoring, runs, sources, tuple(classic))
+
+
+def ranked(cases: Sequence[Case]) -> tuple[list[str], Friedman]:
+    """Rank methods on every model by the median hypervolume ratio of their runs; Friedman's test over the models.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        The models at one budget and scoring.
+
+    Returns
+    -------
+    methods : list of str
+        Those that have runs on all models; the others cannot be ranked.
+    found : Friedman
+        Their ranks, in the same order.
+
+    Raises
+    ------
+    ValueError
+        If they are fewer than two.
+    """
+    methods = [method for method in cases[0].runs if all(method in case.runs for case in cases)]
+    medians = np.array([[np.median(case.scores[method].hvr) for method in methods] for case in cases])
+    return methods, friedman(medians)
 
 
 def scored(run: StoredRun, scoring: str) -> FloatArray:

@@ -35,6 +35,7 @@ __all__ = [
     "front_figure",
     "hillshade",
     "panel_rows",
+    "plain_numbers",
     "plot_error",
     "plot_front",
     "plot_mesh",
@@ -180,7 +181,7 @@ def front_axes(ax: Axes, F: npt.ArrayLike, *, label: str = f"error [{LENGTH}]") 
         else:
             ax.set_yscale("log")
             ax.set_ylim(lowest / 1.4, 1.5 * top)
-    _plain_numbers(ax)
+    plain_numbers(ax)
     ax.set_xlabel("triangles, log scale")
     ax.set_ylabel(label + scale)
     ax.grid(which="both", color="0.92", linewidth=0.6)
@@ -570,8 +571,8 @@ def _frame(ax: Axes, points: FloatArray) -> None:
     ax.axis("off")
 
 
-def _plain_numbers(ax: Axes) -> None:
-    """Write 2000, not 2 x 10^3, where the numbers are of readable size."""
+def plain_numbers(ax: Axes) -> None:
+    """Write 2000, not 2 x 10^3, on logarithmic axes where the numbers are of readable size."""
     from matplotlib.ticker import FuncFormatter, LogFormatter, NullFormatter
 
     for axis, low, high in ((ax.xaxis, *ax.get_xlim()), (ax.yaxis, *ax.get_ylim())):

@@ -295,7 +295,8 @@ class TestFriedman:
         assert_array_equal(equal.mean_ranks, [2, 2, 2])
         undecided = friedman([[1, 2, 3], [3, 2, 1], [2, 3, 1]])
         assert undecided.groups == ((1, 0, 2),)
-        assert undecided.note.startswith("Friedman's test finds no difference (p = 0.")
+        assert undecided.note == "Friedman's test finds no difference"
+        assert 0.05 < undecided.p < 1
 
     def test_refusals(self):
         for wrong in ([], [1, 2], [[1], [2]], np.zeros((0, 3))):
