@@ -127,7 +127,7 @@ class TestEveryPreset:
         problem = problem_for(name)
         algorithm = preset(name)
         algorithm.setup(problem, termination=("n_gen", 5), seed=1)
-        for steps in (1, 1, 3):  # MOEA/D: in the middle of a generation
+        for steps in (1, 1, 3):
             for _ in range(steps):
                 if algorithm.has_next():
                     algorithm.next()
