@@ -144,6 +144,21 @@ def test_a_size_that_a_problem_has_not_is_refused_before_anything_runs(tmp_path)
     assert "size=400 asks for 400 of" in said
 
 
+def test_the_forerunners_make_a_front_of_several_sizes_and_the_text_of_oax_can_be_had(tmp_path):
+    lines = (
+        "[{preset: fujiwara_sawai, merged_over: {size: [0.3, 0.5]}}, "
+        "{preset: huang_ho, merged_over: {size: [9, 0.5]}}, "
+        "{preset: weighted_ga_v2, parameters: {effects: error}, merged_over: {w: [0.0, 1.0]}}, "
+        "{preset: nsga2_v2, operators: {crossover: {name: oax, copies: true}}}]"
+    )
+    first, second, third, fourth = read_experiment_file(changed(tmp_path, algorithms=lines)).algorithms
+    assert first.description(0.3)["settings"]["sampling"]["size"] == 0.3
+    assert first.description(0.3)["settings"]["crossover"]["keep_size"] is True
+    assert second.description(9)["settings"]["sampling"]["size"] == 9
+    assert third.description(0.0)["parameters"] == {"effects": "error"}
+    assert fourth.description()["settings"]["crossover"]["copies"] is True
+
+
 def test_reference_directions_are_given_as_a_number(tmp_path):
     spelled = "[{name: N3, class: pymoo.algorithms.moo.nsga3.NSGA3, parameters: {ref_dirs: 5}}]"
     (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
