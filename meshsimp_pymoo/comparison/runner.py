@@ -72,7 +72,7 @@ from meshsimp_pymoo.search.checkpoint import (
 )
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
-from meshsimp_pymoo.storage import package_versions
+from meshsimp_pymoo.storage import machine, now, package_versions
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured, quality_of
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
@@ -292,6 +292,7 @@ def perform(
     *,
     checkpoint: Path | None = None,
     interval: float = INTERVAL,
+    jobs: int = 1,
 ) -> Iterator[tuple[int, dict[str, npt.NDArray[Any]], dict[str, Any]]]:
     """Search, and yield each run of a task when its budget is reached.
 
@@ -305,6 +306,8 @@ def perform(
         File for the state of the search. If there is one, the search goes on from there; it is removed at the end.
     interval : float
         Seconds between two savings.
+    jobs : int
+        How many searches go on at once, for the record.
 
     Yields
     ------
@@ -329,7 +332,7 @@ def perform(
             termination = terminations[budget.kind](budget.amount)
         return task.algorithm.build(task.merged_value).setup(problem, termination=termination, seed=task.seed)
 
-    start = time.perf_counter()
+    start, begun, cpu_seconds = time.perf_counter(), now(), 0.0
     algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
     trace = Trace()
     if stored is not None:
@@ -337,6 +340,7 @@ def perform(
             restore(stored, algorithm)
             start -= float(stored.facts["seconds"])
             trace = Trace.from_plain(stored.facts["trace"])
+            begun, cpu_seconds = stored.facts["begun"], stored.facts["cpu_seconds"]
         except CheckpointError as damage:
             warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=2)
             algorithm = set_up()
@@ -349,8 +353,9 @@ def perform(
     while left:
         ended = not algorithm.has_next()
         if not ended:
-            before = algorithm.n_iter
+            before, cpu_before = algorithm.n_iter, time.process_time()
             algorithm.next()
+            cpu_seconds += time.process_time() - cpu_before
             if algorithm.n_iter == before:  # in the middle of a generation
                 continue
             ended = not algorithm.has_next()
@@ -371,14 +376,17 @@ def perform(
                     "evaluations": evaluations,
                     "moves": moves,
                     "seconds": round(seconds, 4),
+                    "cpu_seconds": round(cpu_seconds, 4),
                     "trace_seconds": until_now.seconds,
+                    "begun": begun,
                     "versions": package_versions(),
+                    "environment": machine() | {"jobs": jobs},
                 }
                 yield k, _front_arrays(problem, algorithm.opt) | until_now.arrays, facts
                 left.remove(k)
         if left and keeper is not None and keeper.due():
             try:
-                keeper.save(**reached, trace=trace.plain)
+                keeper.save(**reached, begun=begun, cpu_seconds=cpu_seconds, trace=trace.plain)
             except (CheckpointError, NotResumable) as trouble:
                 warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
                 keeper = None
@@ -606,6 +614,7 @@ class _Shared:
     problems: Mapping[str, ProblemConfig]
     folder: Path | None
     checkpoint: float | None
+    jobs: int
 
 
 def _perform_all(
@@ -617,7 +626,7 @@ def _perform_all(
     checkpoint: float | None,
 ) -> None:
     problems = {problem.name: problem for problem in experiment.problems}
-    shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint)
+    shared = _Shared(problems, store.folder if engine.shares_files else None, checkpoint, engine.jobs)
     if shared.folder is not None and checkpoint is not None:
         for task in tasks:  # damage is named here, not by the processes
             _usable_checkpoint(task, _checkpoint_of(task, store.folder.parent))
@@ -642,17 +651,17 @@ def _work_on(task: Task, shared: _Shared) -> list[Any]:
         return list(_perform_and_write(task, shared, shared.folder))
     return [
         (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
-        for k, arrays, facts in perform(task, shared.problems[task.problem].build())
+        for k, arrays, facts in perform(task, shared.problems[task.problem].build(), jobs=shared.jobs)
     ]
 
 
 def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
     problem = shared.problems[task.problem].build()
-    saved: dict[str, Any] = {}
+    how: dict[str, Any] = {"jobs": shared.jobs}
     if shared.checkpoint is not None:
-        saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
+        how |= {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
     paths = []
-    for k, arrays, facts in perform(task, problem, **saved):
+    for k, arrays, facts in perform(task, problem, **how):
         label = f"{task.label} / {task.budgets[k].name}"
         paths.append(write_run(folder, label, task.descriptions[k], arrays, facts))
     return paths
@@ -749,7 +758,7 @@ def _write_classic(
     quality, nearest, notes = [], [], []
     vertices: list[FloatArray] = []
     faces: list[IntArray] = []
-    start = time.perf_counter()
+    start, begun = time.perf_counter(), now()
     for number in asked:
         try:
             (mesh,) = meshlab_front(surface, [number], methods=[method])
@@ -787,6 +796,8 @@ def _write_classic(
         "algorithm": method,
         "seconds": round(seconds, 4),
         "notes": notes,
+        "begun": begun,
         "versions": package_versions("pymeshlab"),
+        "environment": machine() | {"jobs": 1},
     }
     return write_run(folder, label, description, arrays, facts)
