@@ -37,6 +37,8 @@ from meshsimp_pymoo.search.operators import Relocation as Relocation
 from meshsimp_pymoo.search.operators import SizeStep as SizeStep
 from meshsimp_pymoo.search.operators import SubsetUniformCrossover as SubsetUniformCrossover
 from meshsimp_pymoo.search.weighted import WeightedSum as WeightedSum
+from meshsimp_pymoo.search.weighted import fujiwara_sawai as fujiwara_sawai
+from meshsimp_pymoo.search.weighted import huang_ho as huang_ho
 from meshsimp_pymoo.search.weighted import weighted_ga_v1 as weighted_ga_v1
 from meshsimp_pymoo.search.weighted import weighted_ga_v2 as weighted_ga_v2
 from meshsimp_pymoo.storage import read_front as read_front

@@ -71,8 +71,8 @@ NEAR, NEAR_SHARE = 2, 0.002
 TRIES = 16
 
 # Of a whole front so many meshes are stored at most, and the sizes that were asked for. From each to the next the
-# triangles grow by the same share, by which an epsilon can be too large: 2 % where the largest mesh has 20 000 times the
-# triangles of the smallest.
+# triangles grow by the same share, by which an epsilon can be too large: 2 % where the largest mesh has 20 000 times
+# the triangles of the smallest.
 MOST_ROWS = 500
 
 

@@ -519,7 +519,7 @@ def _baselines(given: Any) -> tuple[str, ...]:
         with _blaming(*[place] * isinstance(given, list)):
             members = named[Choice(tuple(named)).from_plain(name)]
             if twice := sorted(chosen.intersection(members)):
-                raise ValueError(f"{twice[0]} is there twice")
+                raise ValueError(f"{twice[0]!r} is there twice")
             chosen.update(members)
     return tuple(name for name in BASELINES if name in chosen)
 

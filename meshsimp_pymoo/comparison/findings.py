@@ -31,6 +31,7 @@ from meshsimp_pymoo.arrays import FloatArray
 from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.statistics import ALPHA, holm, rank_sum, signed_rank
 from meshsimp_pymoo.comparison.study import BINARY, CLASSIC_NAMES, SMALLER_IS_BETTER, Case, Start, Study
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.search.presets import PRESETS
 
 __all__ = [
@@ -606,12 +607,3 @@ def _uncovered(cases: Sequence[Case]) -> Iterator[str]:
 def _mean(values: Iterable[float]) -> str:
     array = np.array(list(values), dtype=float)
     return f"{array.mean():.4g}" if np.isfinite(array).all() else "infinity"
-
-
-def listed(words: Sequence[str]) -> str:
-    """Return words as a list in a sentence.
-
-    >>> listed(["a", "b", "c"])
-    'a, b and c'
-    """
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence, Sized
 from typing import Any
 
-from meshsimp_pymoo.comparison.findings import CLAIMS, TIME_CLAIMS, Claim, Finding, listed, times
+from meshsimp_pymoo.comparison.findings import CLAIMS, TIME_CLAIMS, Claim, Finding, times
 from meshsimp_pymoo.comparison.study import INDICATORS, PROCEDURES, SCORINGS, Study
 from meshsimp_pymoo.comparison.tables import Table, markdown_text, ranking
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = ["findings_page", "reservations", "shown_claims", "table", "times_page", "what_was_run"]

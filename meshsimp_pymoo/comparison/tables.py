@@ -31,8 +31,8 @@ from pathlib import Path
 import numpy as np
 
 from meshsimp_pymoo.comparison.analysis import PairTable, selected_solutions
-from meshsimp_pymoo.comparison.statistics import Summary, friedman, magnitude, signed_rank, summarise
-from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, INDICATORS, SCORINGS, Case, Study
+from meshsimp_pymoo.comparison.statistics import Summary, magnitude, signed_rank, summarise
+from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, INDICATORS, SCORINGS, Case, Study, ranked
 from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = [
@@ -194,27 +194,25 @@ def _measured_by(case: Case, method: str) -> str:
 
 
 def ranking(study: Study, budget: str, scoring: str) -> Table:
-    """Return the comparison of all methods in one table: the mean rank of their mean HVR over the models."""
+    """Return the comparison of all methods in one table: the mean rank of their median HVR over the models."""
     cases = study.compared(budget, scoring)
-    means = [{method: float(scores.hvr.mean()) for method, scores in case.scores.items()} for case in cases]
-    everywhere = [method for method in means[0] if all(method in values for values in means)]
+    medians = [{method: float(np.median(scores.hvr)) for method, scores in case.scores.items()} for case in cases]
     ranks: dict[str, float] = {}
     alike: set[str] = set()
     said = "no two methods on all models"
-    if len(everywhere) > 1:
-        found = friedman([[values[method] for method in everywhere] for values in means])
-        ranks = dict(zip(everywhere, map(float, found.mean_ranks), strict=True))
-        best = everywhere[int(np.argmin(found.mean_ranks))]
-        groups = [[everywhere[k] for k in group] for group in found.groups]
-        alike = {method for group in groups if best in group for method in group} | {best}
+    if sum(all(method in values for values in medians) for method in medians[0]) > 1:
+        methods, found = ranked(cases)
+        ranks = dict(zip(methods, map(float, found.mean_ranks), strict=True))
+        best = int(np.argmin(found.mean_ranks))
+        alike = {methods[k] for group in found.groups if best in group for k in group} | {methods[best]}
         said = f"Friedman p = {found.p:.2g}, critical difference {found.critical_difference:.3g}"
     columns = (
-        "method", "kind", "mean_rank", "hvr_mean", "best_on", "models", "evaluations_mean", "measured_by",
+        "method", "kind", "mean_rank", "hvr_median", "best_on", "models", "evaluations_mean", "measured_by",
         "not_told_apart_from_best",
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
     for method in dict.fromkeys(method for case in cases for method in case.runs):
-        there = [(case, values) for case, values in zip(cases, means, strict=True) if method in values]
+        there = [(case, values) for case, values in zip(cases, medians, strict=True) if method in values]
         chance = [case for case, _ in there if method not in case.classic]
         rows.append(
             (
@@ -227,7 +225,7 @@ def ranking(study: Study, budget: str, scoring: str) -> Table:
     rows.sort(key=lambda row: (ranks.get(str(row[0]), math.inf), str(row[0])))
     title = f"All methods, by the mean rank of their HVR over the models ({_setting(budget, scoring)}; {said})"
     names = {
-        "method": "method", "kind": "kind", "mean_rank": "mean rank", "hvr_mean": "HVR", "best_on": "best on",
+        "method": "method", "kind": "kind", "mean_rank": "mean rank", "hvr_median": "HVR", "best_on": "best on",
         "models": "of models", "evaluations_mean": "evaluations a front", "measured_by": "measured by",
         "not_told_apart_from_best": "not told apart from the best",
     }  # fmt: skip

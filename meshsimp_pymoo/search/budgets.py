@@ -76,7 +76,8 @@ class Moves(Termination):
 
 def moves_of(algorithm: Any) -> int | None:
     """Return the moves that an algorithm has made so far; None if it is of a kind that makes none."""
-    return getattr(algorithm, "moves", None)
+    moves = getattr(algorithm, "moves", None)
+    return moves if isinstance(moves, int) else None  # an algorithm of a reader's may call anything so
 
 
 def part_of(termination: Any, kind: type[End]) -> End | None:

@@ -153,7 +153,7 @@ class TchebycheffMOEAD(MOEAD):
         # What was drawn for it: which genes children take from the second parent (packed), where the moves of each
         # child begin, and the moves. Empty where operators are asked child by child.
         self.from_second: NDArray[np.uint8] = np.empty((0, 0), dtype=np.uint8)
-        self.moves: tuple[NDArray[np.int64], ...] = ()
+        self.shifts: tuple[NDArray[np.int64], ...] = ()
 
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         if problem.has_constraints():
@@ -184,7 +184,7 @@ class TchebycheffMOEAD(MOEAD):
             # whoever takes part in evaluating is shown every child as pymoo shows it
             alone = type(self.evaluator) is Evaluator and self.evaluator.callback is None and self.archive is None
             while self.position < len(self.order) - 1:
-                if alone and self.moves:
+                if alone and self.shifts:
                     self._serve()
                 else:
                     super().next()
@@ -208,7 +208,7 @@ class TchebycheffMOEAD(MOEAD):
         if self.position == len(self.order):
             self._begin_generation()
         pair = self.pop[self.parents[self.position]]
-        if self.moves:
+        if self.shifts:
             return Individual(X=self._child(*[parent.X for parent in pair]))
         children = self.mating.do(
             self.problem,
@@ -226,7 +226,7 @@ class TchebycheffMOEAD(MOEAD):
 
     def _child(self, first: NDArray[np.bool_], second: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return the child, (N,), of two parents by the paper's operators, with what was drawn for it."""
-        starts, vertex, target = self.moves
+        starts, vertex, target = self.shifts
         child = from_either(first, second, self.from_second[self.position])
         mine = slice(*starts[self.position : self.position + 2])
         shift_drawn(child, vertex[mine], target[mine])
@@ -249,7 +249,7 @@ class TchebycheffMOEAD(MOEAD):
             self.scale = np.where(extent > 0, extent, 1.0)
         if self._draws_ahead():
             self.from_second = self.mating.crossover.draw(n, self.problem.n_var, rng)
-            self.moves = self.mating.mutation.draw(self.problem, n, rng)
+            self.shifts = self.mating.mutation.draw(self.problem, n, rng)
 
     def _draws_ahead(self) -> bool:
         """Whether children are made by the paper's operators and nothing else."""

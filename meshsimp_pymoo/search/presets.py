@@ -88,6 +88,21 @@ PRESETS: dict[str, Preset] = {
         whole_front=False,
         evaluations=2.1,
     ),
+    "fujiwara_sawai": Preset(
+        home="search.weighted:fujiwara_sawai",
+        about="elitist GA on the error at one number of points, crossover in the plane",
+        is_the_papers=False,
+        whole_front=False,
+        sums_only=True,
+    ),
+    "huang_ho": Preset(
+        home="search.weighted:huang_ho",
+        about="elitist GA on the error at one number of points, crossover OAX over L4",
+        is_the_papers=False,
+        whole_front=False,
+        sums_only=True,
+        evaluations=2.1,
+    ),
 }
 
 # What the shell takes where nothing is said.

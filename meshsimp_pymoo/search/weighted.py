@@ -14,7 +14,15 @@ from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.util.display.column import Column
 from pymoo.util.display.output import Output
 
-from meshsimp_pymoo.search.operators import OAX, PackedDuplicates, SubsetUniformCrossover
+from meshsimp_pymoo.search.operators import (
+    OAX,
+    HalfPlaneCrossover,
+    PackedDuplicates,
+    RandomSubset,
+    SubsetUniformCrossover,
+)
+from meshsimp_pymoo.search.operators.oax import Score
+from meshsimp_pymoo.search.operators.random_subset import Size
 from meshsimp_pymoo.search.paper import CROSSOVER_PROBABILITY, GENERATIONS, POP_SIZE, paper_operators
 from meshsimp_pymoo.search.requirements import require_probability
 from meshsimp_pymoo.search.selection import objectives, score_tournament, violations
@@ -36,10 +44,8 @@ def weighted_ga_v1(w: float, pop_size: int = POP_SIZE, **kwargs: Any) -> Weighte
     return WeightedGA(w, pop_size, **(defaults | kwargs))
 
 
-def weighted_ga_v2(w: float, pop_size: int = POP_SIZE, **kwargs: Any) -> WeightedGA:
+def weighted_ga_v2(w: float, pop_size: int = POP_SIZE, *, effects: str = "weighted_sum", **kwargs: Any) -> WeightedGA:
     """Elitist GA on the weighted sum with the orthogonal-array crossover over L4, second version.
-
-    The main effects of the crossover are those on the weighted sum.
 
     Parameters
     ----------
@@ -47,11 +53,80 @@ def weighted_ga_v2(w: float, pop_size: int = POP_SIZE, **kwargs: Any) -> Weighte
         Weight of the error, in [0, 1]; the triangles weigh 1 - w. The paper runs 0, 0.1, ..., 1.
     pop_size : int
         Individuals in the population.
+    effects : {"weighted_sum", "error"}
+        What the main effects of the crossover are computed on (Eq. 5). The paper's text says "the total approximation
+        error determined by Eq. (4)" whatever the weight, and "In a minimization problem" of the fitness function,
+        which is Eq. 8 here. By default it is what the algorithm minimises: with w = 0 effects on the error would look
+        for what does not count. "error" is the text to the letter.
     **kwargs
         Further arguments of `WeightedGA`; they replace the preset's own.
+
+    Raises
+    ------
+    ValueError
+        If ``effects`` is unknown, or given beside a crossover; when run with "error" on a `WeightedSum`.
     """
-    defaults = paper_operators() | {"crossover": OAX("L4", prob=CROSSOVER_PROBABILITY)}
-    return WeightedGA(w, pop_size, **(defaults | kwargs))
+    if effects not in EFFECTS:
+        raise ValueError(f"effects = {effects!r} is unknown; choose one of {', '.join(EFFECTS)}")
+    if effects != "weighted_sum" and "crossover" in kwargs:
+        raise ValueError(f"effects = {effects!r} is for the preset's own crossover; leave one of the two out")
+    crossover = OAX("L4", prob=CROSSOVER_PROBABILITY, score=EFFECTS[effects])
+    return WeightedGA(w, pop_size, **(paper_operators() | {"crossover": crossover} | kwargs))
+
+
+def fujiwara_sawai(size: Size, pop_size: int = POP_SIZE, **kwargs: Any) -> WeightedGA:
+    """Elitist GA on the error alone at one number of points, with a crossover in the plane, after Fujiwara and Sawai.
+
+    The forerunner of the paper's methods (Sec. 2.3): a number of points is given, and a genetic algorithm looks for
+    those whose Delaunay triangulation has the least error. Here all individuals keep ``size`` vertices: the first
+    population, its children (`HalfPlaneCrossover`) and mutants (`NeighbourShift`) alike. In the manner of [1]_, with
+    the paper's probabilities and elitism, not a copy of it; vertices that children lack or have too many are chosen
+    well, not at random, and what that takes is not counted as evaluations. A run gives one mesh: in an experiment
+    ``merged_over: {size: [0.02, 0.05, 0.1, 0.2]}`` makes a front.
+
+    Parameters
+    ----------
+    size : int or float
+        Vertices to keep: a number or a share, see `RandomSubset`.
+    pop_size : int
+        Individuals in the population.
+    **kwargs
+        Further arguments of `WeightedGA`; they replace the preset's own.
+
+    References
+    ----------
+    .. [1] Y. Fujiwara and H. Sawai, "Evolutionary computation applied to mesh optimization of a 3-D facial image",
+       IEEE Transactions on Evolutionary Computation 3(2), 1999.
+    """
+    return _at_one_size(size, pop_size, HalfPlaneCrossover(CROSSOVER_PROBABILITY, keep_size=True), kwargs)
+
+
+def huang_ho(size: Size, pop_size: int = POP_SIZE, **kwargs: Any) -> WeightedGA:
+    """Elitist GA on the error alone at one number of points, with the orthogonal-array crossover, after Huang and Ho.
+
+    What the paper extends to two objectives (Sec. 2.3, 3.6): as `fujiwara_sawai`, with `OAX` over L4 and its main
+    effects on the error. In the manner of [1]_, without its coarse-to-fine stages.
+
+    Parameters
+    ----------
+    size : int or float
+        Vertices to keep: a number or a share, see `RandomSubset`.
+    pop_size : int
+        Individuals in the population.
+    **kwargs
+        Further arguments of `WeightedGA`; they replace the preset's own.
+
+    References
+    ----------
+    .. [1] H.-L. Huang and S.-Y. Ho, "Mesh optimization for surface approximation using an efficient coarse-to-fine
+       evolutionary algorithm", Pattern Recognition 36, 2003.
+    """
+    return _at_one_size(size, pop_size, OAX("L4", prob=CROSSOVER_PROBABILITY, keep_size=True), kwargs)
+
+
+def _at_one_size(size: Any, pop_size: int, crossover: Any, kwargs: dict[str, Any]) -> WeightedGA:
+    own = paper_operators() | {"sampling": RandomSubset(size), "crossover": crossover}
+    return WeightedGA(1.0, pop_size, **(own | kwargs))
 
 
 def weighted_sum(F: NDArray[np.float64], w: float) -> NDArray[np.float64]:
@@ -75,6 +150,17 @@ def weighted_sum(F: NDArray[np.float64], w: float) -> NDArray[np.float64]:
     [6.0]
     """
     return F[:, 0] if F.shape[1] == 1 else w * F[:, 0] + (1 - w) * F[:, 1]
+
+
+def error_alone(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the error (Eq. 4) of solutions, which a `WeightedSum` does not show."""
+    if F.shape[1] == 1:
+        raise ValueError("effects = 'error' needs both objectives; give the problem itself, not a WeightedSum of it")
+    return F[:, 0]
+
+
+# On what main effects are computed, by name; None: what the algorithm passes.
+EFFECTS: dict[str, Score | None] = {"weighted_sum": None, "error": error_alone}
 
 
 class WeightedSum(Problem):

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.config import BUDGET_KINDS, PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
@@ -18,6 +19,7 @@ from meshsimp_pymoo.search.operators import OAX, OPERATORS, SubsetUniformCrossov
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.surface.rules import Rules
 
+MESHLAB = ("quadric_collapse", "quadric_collapse_unit", "quadric_collapse_boundary", "vertex_clustering")
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 GOOD = {
@@ -59,7 +61,27 @@ def test_every_configuration_that_comes_along_can_be_run(path, tmp_path):
     assert {algorithm.preset for algorithm in experiment.algorithms} >= {"nsga2_v1", "nsga2_v2", "moead"}
     assert {budget.kind for budget in experiment.budgets} == {"generations", "evaluations"}
     assert len(experiment.problems) in (3, 6)
-    assert experiment.meshlab is not None
+    assert experiment.baselines.methods[:4] == MESHLAB
+
+
+@pytest.mark.parametrize(
+    ("given", "methods", "steps"),
+    [
+        ("true", tuple(BASELINES), 10),
+        ("{steps: 4}", tuple(BASELINES), 4),
+        ("meshlab", MESHLAB, 10),
+        ("[insertion, thinning]", ("thinning", "insertion_by_point", "insertion_by_triangle"), 10),
+        ("{methods: [pydelatin, vertex_clustering], steps: 2}", ("vertex_clustering", "pydelatin"), 2),
+    ],
+)
+def test_baselines_are_named_one_by_one_or_by_their_groups(tmp_path, given, methods, steps):
+    found = read_experiment_file(changed(tmp_path, baselines=given)).baselines
+    assert (found.methods, found.steps, found.down_to_fronts) == (methods, steps, True)
+
+
+@pytest.mark.parametrize("none", [None, "false"])
+def test_there_may_be_no_baselines(tmp_path, none):
+    assert read_experiment_file(changed(tmp_path, baselines=none)).baselines is None
 
 
 def test_the_papers_configuration_has_the_papers_numbers():
@@ -120,6 +142,21 @@ def test_a_size_that_a_problem_has_not_is_refused_before_anything_runs(tmp_path)
     said = message(changed(tmp_path, algorithms=lines))
     assert "algorithms[0]" in said
     assert "size=400 asks for 400 of" in said
+
+
+def test_the_forerunners_make_a_front_of_several_sizes_and_the_text_of_oax_can_be_had(tmp_path):
+    lines = (
+        "[{preset: fujiwara_sawai, merged_over: {size: [0.3, 0.5]}}, "
+        "{preset: huang_ho, merged_over: {size: [9, 0.5]}}, "
+        "{preset: weighted_ga_v2, parameters: {effects: error}, merged_over: {w: [0.0, 1.0]}}, "
+        "{preset: nsga2_v2, operators: {crossover: {name: oax, copies: true}}}]"
+    )
+    first, second, third, fourth = read_experiment_file(changed(tmp_path, algorithms=lines)).algorithms
+    assert first.description(0.3)["settings"]["sampling"]["size"] == 0.3
+    assert first.description(0.3)["settings"]["crossover"]["keep_size"] is True
+    assert second.description(9)["settings"]["sampling"]["size"] == 9
+    assert third.description(0.0)["parameters"] == {"effects": "error"}
+    assert fourth.description()["settings"]["crossover"]["copies"] is True
 
 
 def test_reference_directions_are_given_as_a_number(tmp_path):
@@ -206,10 +243,11 @@ MISTAKES = {
         {"title": "a\nproblem:\n  footprint: hull\n  max_edges: 3", "problem": None},
         ["line 8", "problem.max_edges: 3: unknown key", "'max_edge'", "known here: up, "],
     ),
-    "MeshLab is nothing": ({"baselines": "{meshlab: }"}, ["baselines.meshlab: nothing: expected a mapping"]),
+    "baselines are nothing": ({"baselines": ""}, ["baselines: nothing: expected true, or a list of some of quadric_c"]),
+    "no baseline": ({"baselines": "[]"}, ["baselines: expected true, or a list"]),
     "a number for true or false": (
-        {"baselines": "{meshlab: {down_to_fronts: 1}}"},
-        ["baselines.meshlab.down_to_fronts: 1: expected true or false"],
+        {"baselines": "{down_to_fronts: 1}"},
+        ["baselines.down_to_fronts: 1: expected true or false"],
     ),
     "tag on a list": (
         {"algorithms": "[{preset: nsga2_v1, parameters: {pop_size: !!python/tuple [1]}}]"},
@@ -330,10 +368,15 @@ MISTAKES = {
     ),
     "budget of no time": ({"budgets": "[{seconds: 0}]"}, ["budgets[0].seconds", "more than 0"]),
     "MeshLab method unknown": (
-        {"baselines": "{meshlab: {methods: [quadric_colapse]}}"},
-        ["baselines.meshlab.methods[0]", "'quadric_collapse'"],
+        {"baselines": "{methods: [quadric_colapse]}"},
+        ["baselines.methods[0]", "'quadric_collapse'"],
     ),
-    "baseline unknown": ({"baselines": "{meshlap: true}"}, ["baselines.meshlap", "'meshlab'"]),
+    "baseline unknown": ({"baselines": "[thinning, meshlap]"}, ["baselines[1]: 'meshlap'", "did you mean 'meshlab'?"]),
+    "baseline twice": (
+        {"baselines": "[insertion, insertion_by_point]"},
+        ["baselines[1]: 'insertion_by_point' is there twice"],
+    ),
+    "baselines' key unknown": ({"baselines": "{step: 3}"}, ["baselines.step", "'steps'"]),
 }
 
 

@@ -21,7 +21,8 @@ from pymoo.core.population import Population
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.comparison import analysis, meshlab, runner
+from meshsimp_pymoo.comparison import analysis, baselines, runner
+from meshsimp_pymoo.comparison.baselines import reductions
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.comparison.figures import meshes_figure
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
@@ -31,7 +32,7 @@ from meshsimp_pymoo.comparison.store import FORMAT, ExperimentWarning, RunStore,
 from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.comparison.trace import Trace
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import ResultError, ToolUnavailable
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.indicators import non_dominated
@@ -547,18 +548,18 @@ def die(task: object, shared: object) -> None:
     os._exit(9)
 
 
-# ------------------------------------------------------------------------------------------------ classic methods
+# ------------------------------------------------------------------------------------------------------ baselines
 
 
 def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_skipped(
     config, tmp_path, monkeypatch, reference
 ):
     def unavailable() -> None:
-        raise meshlab.MeshLabUnavailable("it needs the packages libgl1 and libopengl0")
+        raise ToolUnavailable("it needs the packages libgl1 and libopengl0")
 
     there = meshlab_available()
-    monkeypatch.setattr(meshlab, "_pymeshlab", unavailable)
-    config.write_text(CONFIG + "baselines: {meshlab: true}\n", encoding="utf-8")
+    monkeypatch.setattr(baselines, "load_pymeshlab", unavailable)
+    config.write_text(CONFIG + "baselines: meshlab\n", encoding="utf-8")
     out = tmp_path / "out"
     with pytest.warns(ExperimentWarning, match=r"skipped: Face / quadric_collapse.*Peaks / .*libgl1 and libopengl0"):
         done = run_experiment(config, out)
@@ -574,7 +575,7 @@ def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_ski
     if there:  # installed since: the same call adds what was left out, and does nothing again
         monkeypatch.undo()
         added = run_experiment(config, out)
-        assert (added.finished, added.reused, added.skipped) == (2 * len(meshlab.MESHLAB_METHODS), RUNS, ())
+        assert (added.finished, added.reused, added.skipped) == (2 * 4, RUNS, ())
         assert all("pymeshlab" in run.record["versions"] for run in Study(out).classic_runs.values())
 
 
@@ -583,7 +584,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
         pytest.skip("pymeshlab cannot be loaded here: it needs the packages libgl1 and libopengl0")
     config.write_text(
         CONFIG.replace("seeds: [1, 2, 3]", "seeds: [1]")
-        + "baselines: {meshlab: {methods: [quadric_collapse, vertex_clustering], steps: 3}}\n",
+        + "baselines: {methods: [quadric_collapse, vertex_clustering], steps: 3}\n",
         encoding="utf-8",
     )
     out = tmp_path / "out"
@@ -592,7 +593,7 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     problem = study.problems[0]
     run = study.classic_runs["Face", "quadric_collapse"]
     smallest = min(r.arrays["F"][:, 1].min() for r in study.all_runs if r.record["problem"] == "Face")
-    assert run.arrays["asked"].tolist() == list(meshlab.reductions(problem.triangles, down_to=int(smallest), steps=3))
+    assert run.arrays["asked"].tolist() == list(reductions(problem.triangles, down_to=int(smallest), steps=3))
     assert run.arrays["paper"].sum() == 10
     model = study.surface(problem).model
     from meshsimp_pymoo.comparison.store import classic_mesh

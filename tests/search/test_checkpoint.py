@@ -52,6 +52,8 @@ def problems():
 def set_up(name, problem, termination=("n_gen", 9), seed=3, **options):
     if name.startswith("weighted"):
         options["w"] = 0.3
+    if name in ("fujiwara_sawai", "huang_ho"):
+        options["size"] = 0.3
     if name == "memetic":
         options["moves_per_vertex"] = 1
     if name == "nsga3":

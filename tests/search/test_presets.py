@@ -23,8 +23,8 @@ from meshsimp_pymoo.search.presets import PRESETS
 
 
 def preset(name: str, pop_size: int = 20, **kwargs: Any) -> Any:
-    weight = [] if PRESETS[name].whole_front else [0.1]
-    return PRESETS[name].function(*weight, pop_size=pop_size, **kwargs)
+    required = [] if PRESETS[name].whole_front else [0.2]  # a weight, or a size as a share
+    return PRESETS[name].function(*required, pop_size=pop_size, **kwargs)
 
 
 class CountedMesh(MeshProblem):
@@ -40,7 +40,8 @@ class CountedMesh(MeshProblem):
 
 
 def problem_for(name: str) -> Any:
-    return CountedMesh() if name == "memetic" else GridProblem(7)
+    on_the_mesh = PRESETS[name].sums_only  # what searches on the live triangulation
+    return CountedMesh() if on_the_mesh else GridProblem(7)
 
 
 def test_the_table_is_light() -> None:
@@ -126,7 +127,7 @@ class TestEveryPreset:
         problem = problem_for(name)
         algorithm = preset(name)
         algorithm.setup(problem, termination=("n_gen", 5), seed=1)
-        for steps in (1, 1, 3):  # MOEA/D: in the middle of a generation
+        for steps in (1, 1, 3):
             for _ in range(steps):
                 if algorithm.has_next():
                     algorithm.next()

@@ -17,7 +17,8 @@ from pymoo.core.callback import Callback
 from pymoo.optimize import minimize
 from stand_in_problem import GridProblem, front_of
 
-from meshsimp_pymoo import MeshProblem, weighted_ga_v1, weighted_ga_v2
+from meshsimp_pymoo import MeshProblem, fujiwara_sawai, huang_ho, weighted_ga_v1, weighted_ga_v2
+from meshsimp_pymoo.search import weighted
 from meshsimp_pymoo.search.operators import OAX, OPERATORS, PackedDuplicates, SubsetUniformCrossover
 from meshsimp_pymoo.search.paper import paper_operators
 from meshsimp_pymoo.search.weighted import WeightedSum, weighted_sum
@@ -31,6 +32,58 @@ def test_the_weighted_ga_finds_the_best_weighted_sum(make: Make, w: float) -> No
     problem = GridProblem(4)
     result = minimize(problem, make(w, pop_size=40), ("n_gen", 60), seed=1)
     assert_allclose(weighted_sum(result.F, w), [weighted_sum(front_of(problem), w).min()])
+
+
+class EffectsOf(OAX):
+    """Note what the main effects would be computed on."""
+
+    seen: list[Any]
+
+    def _do(self, problem: Any, X: np.ndarray, *args: Any, **kwargs: Any) -> np.ndarray:
+        EffectsOf.seen.append((self.score or kwargs["score"])(np.array([[8.0, 2.0]])).tolist())
+        return super()._do(problem, X, *args, **kwargs)
+
+
+@pytest.mark.parametrize(
+    ("effects", "value"), [({}, 5.0), ({"effects": "weighted_sum"}, 5.0), ({"effects": "error"}, 8.0)]
+)
+def test_main_effects_are_on_equation_8_or_by_the_text_on_equation_4(
+    effects: dict[str, str], value: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    EffectsOf.seen = []
+    monkeypatch.setattr(weighted, "OAX", EffectsOf)
+    minimize(GridProblem(5), weighted_ga_v2(0.5, 10, **effects), ("n_gen", 3), seed=1)
+    assert EffectsOf.seen == [[value]] * len(EffectsOf.seen)
+    assert EffectsOf.seen
+
+
+def test_effects_that_cannot_be_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"effects = 'eq4' is unknown; choose one of weighted_sum, error"):
+        weighted_ga_v2(0.5, effects="eq4")
+    with pytest.raises(ValueError, match="is for the preset's own crossover; leave one of the two out"):
+        weighted_ga_v2(0.5, effects="error", crossover=OAX())
+    problem = WeightedSum(GridProblem(5), 0.5)
+    with pytest.raises(ValueError, match="give the problem itself, not a WeightedSum of it"):
+        minimize(problem, weighted_ga_v2(0.5, 10, effects="error"), ("n_gen", 3), seed=1)
+
+
+@pytest.mark.parametrize("make", [fujiwara_sawai, huang_ho])
+@pytest.mark.parametrize("size", [12, 0.25])
+def test_at_one_size_everybody_keeps_it_and_the_error_falls(make: Make, size: float) -> None:
+    problem = MeshProblem("peaks:7", n_threads=1)
+    sizes: list[int] = []
+    errors: list[float] = []
+
+    def note(algorithm: Any) -> None:
+        sizes.extend(algorithm.pop.get("X").sum(axis=1).tolist())
+        errors.append(algorithm.opt.get("F")[0, 0])
+
+    result = minimize(problem, make(size, 20), ("n_gen", 12), seed=1, callback=note)
+    assert set(sizes) == {12}
+    assert result.X.sum() == 12
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 0.8 * errors[0]
+    assert errors[-1] == min(result.pop.get("F")[:, 0])
 
 
 class BestSoFar(Callback):

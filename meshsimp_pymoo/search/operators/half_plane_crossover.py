@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshsimp_pymoo.search.local_search import relocate_all
-from meshsimp_pymoo.search.operators.pair_crossover import PairCrossover
-from meshsimp_pymoo.search.requirements import pinned_vertices, surface_of
+from meshsimp_pymoo.search.operators.pair_crossover import PairCrossover, of_the_parents_sizes
+from meshsimp_pymoo.search.requirements import surface_of
 
 
 class HalfPlaneCrossover(PairCrossover):
@@ -47,15 +46,7 @@ class HalfPlaneCrossover(PairCrossover):
         exchanged = half_planes(surface.places, X.shape[1], random_state)
         exchanged &= X[0] ^ X[1]
         children = X[: self.n_offsprings] ^ exchanged
-        if self.keep_size:
-            pinned = pinned_vertices(problem, self)
-            sizes = (X[: self.n_offsprings] | pinned).sum(axis=2).ravel()
-            flat = children.reshape(-1, X.shape[2])
-            unequal = np.flatnonzero((flat | pinned).sum(axis=1) != sizes)
-            flat[unequal] = relocate_all(
-                surface, flat[unequal], np.zeros(len(unequal), int), random_state, sizes=sizes[unequal]
-            )
-        return children
+        return of_the_parents_sizes(problem, self, children, X, random_state) if self.keep_size else children
 
 
 def half_planes(places: NDArray[np.float64], n: int, rng: np.random.Generator) -> NDArray[np.bool_]:

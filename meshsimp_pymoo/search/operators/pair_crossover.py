@@ -13,7 +13,8 @@ from pymoo.core.population import Population
 from pymoo.core.variable import get
 from pymoo.util import default_random_state
 
-from meshsimp_pymoo.search.requirements import require_bool, require_probability
+from meshsimp_pymoo.search.local_search import relocate_all
+from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool, require_probability, surface_of
 
 
 class PairCrossover(Crossover):
@@ -75,3 +76,34 @@ class PairCrossover(Crossover):
             parental = X if crosses.all() else X[:, crosses]
             children[:, crosses] = self._do(problem, parental, *args, random_state=random_state, mates=mates, **kwargs)
         return Population.new("X", children.reshape(-1, X.shape[2]))
+
+
+def of_the_parents_sizes(
+    problem: Any, operator: object, children: NDArray[np.bool_], parents: NDArray[np.bool_], rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """Add or drop vertices, good ones of a few drawn, until children keep as many as their parents.
+
+    Parameters
+    ----------
+    problem : MeshProblem
+        The problem being solved.
+    operator : Crossover
+        Whose children they are.
+    children, parents : (n_offsprings, n, N) bool arrays
+        First children beside first parents, second ones beside second ones; children may be changed in place.
+    rng : numpy.random.Generator
+        Source of randomness.
+
+    Returns
+    -------
+    (n_offsprings, n, N) bool array
+        The children.
+    """
+    pinned = pinned_vertices(problem, operator)
+    sizes = (parents[: len(children)] | pinned).sum(axis=2).ravel()
+    flat = children.reshape(-1, children.shape[2])  # a copy where the vectors of parents lie apart
+    unequal = np.flatnonzero((flat | pinned).sum(axis=1) != sizes)
+    flat[unequal] = relocate_all(
+        surface_of(problem, operator), flat[unequal], np.zeros(len(unequal), int), rng, sizes=sizes[unequal]
+    )
+    return flat.reshape(children.shape)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.population import Population
 from scipy.optimize import linprog
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.search.greedy import thinning
-from meshsimp_pymoo.search.operators import HalfPlaneCrossover
+from meshsimp_pymoo.search.operators import OAX, HalfPlaneCrossover
 from meshsimp_pymoo.search.operators.half_plane_crossover import half_planes
 
 
@@ -28,9 +30,16 @@ def test_half_planes_are_sides_of_lines():
         assert line.success
 
 
-def test_half_plane_children_of_one_size(problem):
+@pytest.mark.parametrize("crossover", [HalfPlaneCrossover, OAX])
+def test_children_have_the_sizes_of_their_parents_when_asked(problem, crossover):
     front = thinning(problem.surface)
-    pairs = np.stack([np.array([front.kept(30)] * 6), np.array([front.kept(50)] * 6)])
-    children = HalfPlaneCrossover(keep_size=True)._do(problem, pairs, random_state=np.random.default_rng(2))
-    np.testing.assert_array_equal(children[0].sum(axis=1), front.kept(30).sum())
-    np.testing.assert_array_equal(children[1].sum(axis=1), front.kept(50).sum())
+    pairs = Population.new(X=np.array([front.kept(30), front.kept(50)] * 6)).reshape(6, 2)
+    evaluator = Evaluator()
+    sizes = {}
+    for keep_size in (True, False):
+        children = crossover(prob=1.0, keep_size=keep_size)(
+            problem, pairs, random_state=np.random.default_rng(2), evaluator=evaluator
+        )
+        sizes[keep_size] = children.get("X").sum(axis=1).reshape(2, 6)
+    np.testing.assert_array_equal(sizes[True], np.repeat([[front.kept(30).sum()], [front.kept(50).sum()]], 6, axis=1))
+    assert (sizes[False] != sizes[True]).any()

@@ -38,7 +38,9 @@ def test_arrays_are_those_of_the_public_code(rows: list[str]) -> None:
     assert ["".join(str(int(b)) for b in row) for row in orthogonal_array(len(rows[0]))] == rows
 
 
-def slow_twin(problem: GridProblem, first: list[bool], second: list[bool], cuts: list[int], rows: list[str]) -> list:
+def slow_twin(
+    problem: GridProblem, first: list[bool], second: list[bool], cuts: list[int], rows: list[str], copies: bool
+) -> list:
     """Return both children, following the published procedure one step at a time, in plain Python."""
     n_segments = len(cuts) - 1
 
@@ -59,10 +61,13 @@ def slow_twin(problem: GridProblem, first: list[bool], second: list[bool], cuts:
         sums = {level: sum(y_t for y_t, row in zip(y, rows, strict=True) if row[j] == level) for level in "01"}
         best += "0" if sums["0"] < sums["1"] else "1"
         difference.append(abs(sums["0"] - sums["1"]))
-    differing = [j for j in range(n_segments) if first[cuts[j] : cuts[j + 1]] != second[cuts[j] : cuts[j + 1]]]
 
     def flipped(positions: list[int]) -> list[bool]:
         return mix("".join(str(int(b) ^ (j in positions)) for j, b in enumerate(best)))
+
+    if copies:
+        return [flipped([]), flipped([min(range(n_segments), key=lambda j: difference[j])])]
+    differing = [j for j in range(n_segments) if first[cuts[j] : cuts[j + 1]] != second[cuts[j] : cuts[j + 1]]]
 
     by_difference = sorted(differing, key=lambda j: difference[j])
     ranked = [flipped([]), *[flipped([j]) for j in by_difference], flipped(differing)]
@@ -75,16 +80,51 @@ def slow_twin(problem: GridProblem, first: list[bool], second: list[bool], cuts:
 
 @pytest.mark.parametrize(("name", "rows"), [("L4", L4), ("L8", L8)])
 @pytest.mark.parametrize("equal_genes", [0.0, 0.8, 0.95])
-def test_children_are_those_of_a_slow_twin(name: str, rows: list[str], equal_genes: float) -> None:
+@pytest.mark.parametrize("copies", [False, True])
+def test_children_are_those_of_a_slow_twin(name: str, rows: list[str], equal_genes: float, copies: bool) -> None:
     problem = GridProblem(5)
     pairs = evaluated_pairs(problem, 30, seed=1, equal_genes=equal_genes)
-    children, _ = call(OAX(name, prob=1.0), problem, pairs, seed=2)
+    children, _ = call(OAX(name, prob=1.0, copies=copies), problem, pairs, seed=2)
     rng = np.random.default_rng(2)
     rng.random(30)  # who crosses: all
     for k, (first, second) in enumerate(pairs):
         cuts = random_cuts(25, len(rows[0]), rng).tolist()
-        expected = slow_twin(problem, first.X.tolist(), second.X.tolist(), cuts, rows)
+        expected = slow_twin(problem, first.X.tolist(), second.X.tolist(), cuts, rows, copies)
         assert children[:, k].tolist() == expected
+
+
+@pytest.mark.parametrize("rows", [L4, L8])
+def test_levels_are_those_of_equation_5(rows: list[str]) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        fe = rng.integers(0, 9, size=len(rows)).tolist()  # few values: ties
+        S = {
+            (j, k): sum(f * (row[j] == k) for f, row in zip(fe, rows, strict=True))
+            for j in range(len(rows[0]))
+            for k in "01"
+        }
+        first = [int(S[j, "1"] <= S[j, "0"]) for j in range(len(rows[0]))]
+        med = [abs(S[j, "0"] - S[j, "1"]) for j in range(len(rows[0]))]
+        least = med.index(min(med))
+        second = [level ^ (j == least) for j, level in enumerate(first)]
+        array = orthogonal_array(len(rows[0]))
+        assert child_levels(np.array(fe, float), array, np.ones(len(first), bool), copies=True).tolist() == [
+            [bool(level) for level in child] for child in (first, second)
+        ]
+
+
+def test_only_when_asked_are_children_copies_of_a_parent() -> None:
+    problem = GridProblem(5)
+    pairs = opposite_pairs(problem, 300, seed=8)
+    copied = {}
+    for copies in (False, True):
+        children, _ = call(OAX(prob=1.0, copies=copies), problem, pairs, seed=9)
+        family = [{parent.X.tobytes() for parent in pair} for pair in pairs]
+        copied[copies] = sum(
+            any(child.tobytes() in parents for child in children[:, k]) for k, parents in enumerate(family)
+        )
+    assert copied[False] == 0
+    assert copied[True] > 100
 
 
 @pytest.mark.parametrize("name", ["L4", "L8", "L16"])
