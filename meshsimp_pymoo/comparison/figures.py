@@ -54,6 +54,8 @@ CLASSIC_MARKS = ("+", "x", "1", "2", "3", "4", "*")
 CLASSIC_LINES = dict(zip([b.label for b in BASELINES.values() if b.front], ("-", "--", ":"), strict=True))
 KINDS = {"fewest_triangles": "fewest triangles", "trade_off": "best trade-off", "least_error": "least error"}
 
+# Letters of a method's name: longer ones would leave no room for what is drawn.
+MOST_LETTERS = 37
 # Seconds: the shortest time that a logarithmic axis shows.
 SHORTEST = 1e-3
 # At most so many meshes beside the original: more would be too small to see.
@@ -91,12 +93,12 @@ def fronts_figure(study: Study, case: Case) -> Figure:
         style: dict[str, Any] = {"color": colour, "marker": mark, "linestyle": "none", "zorder": 3}
         if method in CLASSIC_LINES:
             line = {"color": colour, "linestyle": CLASSIC_LINES[method], "linewidth": 1.3}
-            ax.step(front[:, 1], front[:, 0], where="post", label=method, zorder=2, **line)
+            ax.step(front[:, 1], front[:, 0], where="post", label=_short(method), zorder=2, **line)
             continue
         if method in case.classic:
-            ax.plot(front[:, 1], front[:, 0], markersize=7, label=method, **style)
+            ax.plot(front[:, 1], front[:, 0], markersize=7, label=_short(method), **style)
             continue
-        ax.plot(front[:, 1], front[:, 0], markersize=3.5, fillstyle="none", label=method, **style)
+        ax.plot(front[:, 1], front[:, 0], markersize=3.5, fillstyle="none", label=_short(method), **style)
         if len(runs) > 1:
             half = attainment_surfaces(runs, [50])[50]
             ax.step(half[:, 1], half[:, 0], where="post", color=colour, linewidth=0.9, alpha=0.7, zorder=2)
@@ -146,7 +148,7 @@ def box_figure(study: Study, cases: Sequence[Case], indicator: str) -> Figure:
             colour, mark = method_look(study, case, method)
             if len(runs) == 1:
                 panel.plot([place], runs, marker=mark, color=colour, markersize=8, linestyle="none")
-        panel.set_xticks(range(1, len(methods) + 1), methods, rotation=40, ha="right", fontsize=8)
+        panel.set_xticks(range(1, len(methods) + 1), map(_short, methods), rotation=40, ha="right", fontsize=8)
         panel.set_title(case.problem.name, loc="left", fontsize=10)
         panel.grid(axis="y", color="0.92", linewidth=0.6)
         panel.set_axisbelow(True)
@@ -291,7 +293,7 @@ def critical_difference_figure(study: Study, cases: Sequence[Case]) -> Figure:
             y = labels - row
             ax.plot([ranks[place], ranks[place], edge], [0, y, y], color=colour, linewidth=1.0, clip_on=False)
             ax.plot([ranks[place]], [0], color=colour, marker=mark, markersize=6, clip_on=False, zorder=3)
-            name = f" {methods[place]}  {ranks[place]:.2f} "
+            name = f" {_short(methods[place])}  {ranks[place]:.2f} "
             ax.text(edge, y, name, ha=align, va="center", fontsize=9)
     models = f"{len(cases)} model" + "s" * (len(cases) > 1)
     _title(figure, f"mean ranks by hypervolume ratio over {models}, 1 is best{_absent(cases, methods)}", cases)
@@ -326,7 +328,7 @@ def profile_figure(study: Study, cases: Sequence[Case]) -> Figure:
         colour, mark = method_look(study, cases[0], method)
         ax.step(
             np.append(factors, end), np.append(shares[:, place], shares[-1, place]), where="post", color=colour,
-            linestyle="--" if method in cases[0].classic else "-", linewidth=1.4, label=method, marker=mark,
+            linestyle="--" if method in cases[0].classic else "-", linewidth=1.4, label=_short(method), marker=mark,
             markevery=max(1, len(factors) // 8), markersize=4.5,
         )  # fmt: skip
     ax.set_xscale("log")
@@ -460,7 +462,7 @@ def _mesh_title(
     """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons."""
     mean = np.average(deviation, weights=surface.model.weights)
     bare = len(covered) - np.count_nonzero(covered)
-    return f"{method}\n{triangles:,} triangles, mean {mean:.3g}\n{bare:,} vertices uncovered"
+    return f"{_short(method)}\n{triangles:,} triangles, mean {mean:.3g}\n{bare:,} vertices uncovered"
 
 
 def method_look(study: Study, case: Case, method: str) -> tuple[str, str]:
@@ -478,6 +480,15 @@ def _absent(cases: Sequence[Case], methods: Sequence[str]) -> str:
     return f"; left out, without runs on some model: {n}" if n else ""
 
 
+def _short(name: str) -> str:
+    """Return a name as there is room for it: its beginning and its end.
+
+    >>> _short("An algorithm of the reader's own, number 12")
+    'An algorithm of the re…own, number 12'
+    """
+    return name if len(name) <= MOST_LETTERS else f"{name[: MOST_LETTERS - 15]}…{name[-14:]}"
+
+
 def _title(figure: Figure, what: str, cases: Sequence[Case]) -> None:
     """Put a title over all panels: what is drawn, of which budget and scoring, in as many lines as that takes."""
     letters = int(11 * figure.get_figwidth())
@@ -489,12 +500,11 @@ def _title(figure: Figure, what: str, cases: Sequence[Case]) -> None:
 
 def _legend_below(figure: Figure, lines: dict[str, Any]) -> None:
     """Name the methods below all panels, in as many columns as there is room for, and make room for the lines."""
-    width = 0.075 * max(map(len, lines), default=1) + 0.7  # inches that the longest name takes
+    names = [_short(method) for method in lines]
+    width = 0.075 * max(map(len, names), default=1) + 0.7  # inches that the longest name takes
     columns = max(1, int(figure.get_figwidth() / width))
     figure.set_figheight(figure.get_figheight() + 0.2 * -(-len(lines) // columns))
-    figure.legend(
-        list(lines.values()), list(lines), frameon=False, loc="outside lower center", ncols=columns, fontsize=8.5
-    )
+    figure.legend(list(lines.values()), names, frameon=False, loc="outside lower center", ncols=columns, fontsize=8.5)
 
 
 def _grid(n: int, width: float, height: float) -> tuple[Figure, list[Axes]]:

@@ -349,8 +349,8 @@ class Case:
             for run in runs
         ]
         shares = [moments / (moments[-1] or 1.0) for moments in spent]
-        # the moments of the run that begins last: by then all others have a front
-        last = int(np.argmax([share[0] for share in shares]))
+        # the moments of the run that begins last: by then all others have a front; of several, of the most moments
+        last = max(range(len(runs)), key=lambda k: (shares[k][0], len(shares[k])))
         hvr = []
         for share in shares[last]:
             fronts = []

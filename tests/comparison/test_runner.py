@@ -626,10 +626,28 @@ def test_meshlabs_meshes_are_stored_scored_and_taken_down_to_the_smallest_evolut
     assert results(out) == before
 
 
+def test_progress_ends_where_the_runs_do(reference):
+    study = Study(reference)
+    for budget in study.budgets:
+        case = study.cases["Face", budget, "searched"]
+        for method in ("N1", "N2", "G1"):
+            for over in ("evaluations", "seconds"):
+                curves = case.progress(method, over)
+                np.testing.assert_allclose([hvr[-1] for _, hvr in curves], case.scores[method].hvr)
+                assert all((np.diff(x) > 0).all() for x, _ in curves)
+            np.testing.assert_allclose(
+                [x[-1] for x, _ in case.progress(method, "evaluations")], case.evaluations(method)
+            )
+            assert study.cases["Face", budget, "nearest"].progress(method, "evaluations") == []
+
+
 def test_pictures_say_of_every_mesh_how_much_of_the_model_it_abandons(reference):
     study = Study(reference)
     case = study.cases["Face", "6 generations", "searched"]
-    titles = {axes.get_title() for axes in meshes_figure(study, case).axes}
+    titles = [axes.get_title() for axes in meshes_figure(study, case).axes]
+    # the paper's Figure 10 first, then by hypervolume
+    best = sorted(("N1", "G1"), key=lambda method: -case.scores[method].merged_hvr)
+    assert [title.split("\n")[0] for title in titles if title][:4] == ["original", "N2", *best]
     chosen = analysis.selected_solutions(case.runs, optimal=case.optimal)
     for method in ("N1", "N2", "G1"):
         (solution,) = (s for s in chosen[method] if s.kind == "trade_off")
@@ -699,7 +717,10 @@ def test_the_shell_runs_the_quick_configuration_shortened_and_reports_it_again(t
         assert said.err == ""
     for scoring in ("searched", "nearest"):
         figures = {path.name for path in (out / "figures" / "3-generations" / scoring).iterdir()}
-        assert figures == {"hvr.png", "cardinality.png", "selected.png", "fronts_Face.png", "meshes_Face.png"}
+        expected = {"hvr.png", "cardinality.png", "selected.png", "fronts_Face.png", "meshes_Face.png", "profile.png"}
+        if scoring == "searched":  # what a run kept on its way is as it searched
+            expected |= {"convergence_evaluations.png", "convergence_seconds.png"}
+        assert figures == expected
         assert (out / "tables" / "3-generations" / scoring / "scores.tex").stat().st_size > 500
     before = results(out)
     assert (out / "times.csv").read_text().startswith("model,method,")

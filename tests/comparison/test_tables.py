@@ -13,7 +13,6 @@ from comparing import INDICATORS, compared
 from handmade import BUDGET, store
 
 from meshsimp_pymoo.comparison import tables
-from meshsimp_pymoo.comparison.figures import box_figure, fronts_figure, selected_figure
 from meshsimp_pymoo.comparison.report import write_tables
 from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, Study
@@ -190,21 +189,3 @@ def test_one_run_of_one_method_is_report_enough(tmp_path):
     scores = (out / "tables" / slug(BUDGET) / NEAREST / "scores.csv").read_text()
     assert scores.splitlines()[1].startswith("A,X,1,1.0,,1.0,,1.0,,1.0,,1.0,")
     assert "| X | own |" in (out / "findings.md").read_text()
-
-
-def test_figures_show_every_method_and_every_model(tmp_path):
-    fronts = {"A": FRONTS["M_1 & co"], "B": FRONTS["M_1 & co"]}
-    classic = {name: {"vertex_clustering": [(9.0, 30, True)]} for name in fronts}
-    study = Study(store(tmp_path / "out", fronts, classic=classic))
-    cases = study.compared(BUDGET, NEAREST)
-    legend = [text.get_text() for text in fronts_figure(study, cases[0]).axes[0].get_legend().get_texts()]
-    assert legend == ["pseudo-optimal", "N1", "MD", "MeshLab clustering"]
-    for indicator in ("hvr", "cardinality"):
-        panels = box_figure(study, cases, indicator).axes
-        assert [panel.get_title(loc="left") for panel in panels] == ["A", "B"]
-        assert [t.get_text() for t in panels[0].get_xticklabels()] == ["N1", "MD", "MeshLab clustering"]
-    figure = selected_figure(study, cases)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["N1", "MD", "MeshLab clustering"]
-    for panel in figure.axes:
-        points = {(x, y) for line in panel.get_lines()[1:] for x, y in zip(*line.get_data(), strict=True)}
-        assert {(20.0, 10.0), (60.0, 0.0), (40.0, 5.0), (30.0, 9.0)} <= points
