@@ -39,13 +39,14 @@ import typing
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 import yaml
 from pydantic import AfterValidator, BaseModel, Field, PlainValidator, ValidationError, create_model, model_validator
+from pymoo.core.duplicate import NoDuplicateElimination
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
@@ -57,6 +58,7 @@ from meshsimp_pymoo.problem import MeshProblem, minimises_one_number
 from meshsimp_pymoo.search.checkpoint import Checkpoints, NotResumable
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.search.requirements import require_probability
 from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -97,6 +99,9 @@ MOST = {
     "n_neighbors": 5_000,
     "moves_per_vertex": 1_000,
 }
+# Algorithms that never return when duplicates are taken out of the first population, which nobody refills: pymoo's
+# CTAEA waits for as many individuals as there are directions.
+WITH_A_FULL_START = ("pymoo.algorithms.moo.ctaea.CTAEA",)
 # The weight of the error, for algorithms of one objective.
 WEIGHT = "w"
 # Parameters that are points or directions in the space of the two objectives.
@@ -405,6 +410,8 @@ class AlgorithmConfig(Part):
             operator = arguments[ARGUMENT_OF_KIND[kind]]
             if getattr(operator, "evaluator", algorithm) is None:
                 operator.evaluator = algorithm.evaluator
+        if any(f"{kind.__module__}.{kind.__qualname__}" in WITH_A_FULL_START for kind in type(algorithm).__mro__):
+            algorithm.initialization.eliminate_duplicates = NoDuplicateElimination()
         return copy.deepcopy(algorithm)
 
     def searched(self, problem: MeshProblem, merged_value: Any = None) -> Problem:
@@ -459,6 +466,8 @@ class AlgorithmConfig(Part):
             if "ref_dirs" in (_parameters(self.target) or ()) and "ref_dirs" not in self._all_parameters(value):
                 at += " without ref_dirs (under 'parameters': a number of directions, or the list of pairs)"
             with _blaming(what=f"the algorithm {self.name!r} cannot be made{at}"):
+                if self.weighs_the_problem:
+                    require_probability(WEIGHT, self._all_parameters(value)[WEIGHT])
                 self.build(value)
         return self
 
@@ -781,6 +790,7 @@ def _parameters(target: Any) -> set[str] | None:
     return names
 
 
+@cache
 def _given_to_the_parent(constructor: Any) -> tuple[int, set[str]]:
     """Return how many arguments and which keywords a constructor passes to its parent's, not counting what it is given.
 
