@@ -11,7 +11,7 @@
       - name: NSGA-II v1
         preset: nsga2_v1                  # a key of presets.PRESETS, or instead
         class: pymoo.algorithms.moo.spea2.SPEA2      # any pymoo algorithm by import path
-        parameters: {pop_size: 100}       # its arguments
+        parameters: {pop_size: 100}       # its arguments; w where it has one objective: it searches the weighted sum
         operators: {crossover: {name: oax, arrays: L4}}    # keys of operators.OPERATORS, or import paths
         merged_over: {w: [0, 0.5, 1]}     # one run for each value, merged to one front for each seed
     seeds: [1, 2, 3]
