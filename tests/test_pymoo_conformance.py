@@ -41,6 +41,9 @@ from meshsimp_pymoo.search.checkpoint import Checkpoints, NotResumable, read_che
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.search.weighted import WeightedSum
 
+# what pymoo divides by 0 within
+pytestmark = pytest.mark.filterwarnings(r"ignore::RuntimeWarning:pymoo\..*")
+
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "pymoo.md"
 MODEL, SIZE, GENERATIONS, WEIGHT = "pyramid:5", 12, 3, 0.02
 POINTS = [[10.0, 20.0], [40.0, 4.0]]  # (error, triangles), as all points in the space of objectives
@@ -157,6 +160,8 @@ def made(
         given["ref_dirs"] = get_reference_directions("uniform", 2, n_partitions=given["ref_dirs"] - 1)
     if "random_search" in path:
         return class_of(path)(**given, sampling=OPERATORS["sampling"][sampling]())
+    if path.endswith("CTAEA"):
+        given["eliminate_duplicates"] = False  # else it waits for ever for as many individuals as there are directions
     evaluator, crossing = Evaluator(), OPERATORS["crossover"][crossover]()
     if crossover == "oax":
         crossing.evaluator = evaluator  # for pymoo's MOEAD, which does not say who is calling
@@ -415,6 +420,8 @@ def in_place(path: str) -> Any:
     return run(path, made(path), copy_algorithm=False).algorithm
 
 
+# DNSGA2 asks for nothing: it evaluates by itself where others would be told.
+UNASKED = (ask_and_tell.__name__, f"{MOO}.dnsga2.DNSGA2")
 WAYS = {way.__name__: way for way in (threads, starmap, ask_and_tell, copied_halfway, with_history, in_place)}
 
 
@@ -423,6 +430,7 @@ WAYS = {way.__name__: way for way in (threads, starmap, ask_and_tell, copied_hal
     [
         pytest.param(way, path, marks=[] if place % 5 == 0 and ".age" not in path else [pytest.mark.slow])
         for place, (way, path) in enumerate(itertools.product(WAYS, ALL))
+        if (way, path) != UNASKED
     ],
 )
 def test_however_it_is_run_it_finds_the_same(way: str, path: str) -> None:

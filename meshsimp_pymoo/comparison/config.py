@@ -11,7 +11,7 @@
       - name: NSGA-II v1
         preset: nsga2_v1                  # a key of presets.PRESETS, or instead
         class: pymoo.algorithms.moo.spea2.SPEA2      # any pymoo algorithm by import path
-        parameters: {pop_size: 100}       # its arguments
+        parameters: {pop_size: 100}       # its arguments; w where it has one objective: it searches the weighted sum
         operators: {crossover: {name: oax, arrays: L4}}    # keys of operators.OPERATORS, or import paths
         merged_over: {w: [0, 0.5, 1]}     # one run for each value, merged to one front for each seed
     seeds: [1, 2, 3]
@@ -39,13 +39,14 @@ import typing
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 import yaml
 from pydantic import AfterValidator, BaseModel, Field, PlainValidator, ValidationError, create_model, model_validator
+from pymoo.core.duplicate import NoDuplicateElimination
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
@@ -58,6 +59,7 @@ from meshsimp_pymoo.problem import MeshProblem, minimises_one_number
 from meshsimp_pymoo.search.checkpoint import Checkpoints, NotResumable
 from meshsimp_pymoo.search.operators import OPERATORS, RandomSubset
 from meshsimp_pymoo.search.presets import PRESETS, Preset
+from meshsimp_pymoo.search.requirements import require_probability
 from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -98,6 +100,9 @@ MOST = {
     "n_neighbors": 5_000,
     "moves_per_vertex": 1_000,
 }
+# Algorithms that never return when duplicates are taken out of the first population, which nobody refills: pymoo's
+# CTAEA waits for as many individuals as there are directions.
+WITH_A_FULL_START = ("pymoo.algorithms.moo.ctaea.CTAEA",)
 # The weight of the error, for algorithms of one objective.
 WEIGHT = "w"
 # Parameters that are points or directions in the space of the two objectives.
@@ -411,6 +416,8 @@ class AlgorithmConfig(Part):
             operator = arguments[ARGUMENT_OF_KIND[kind]]
             if getattr(operator, "evaluator", algorithm) is None:
                 operator.evaluator = algorithm.evaluator
+        if any(f"{kind.__module__}.{kind.__qualname__}" in WITH_A_FULL_START for kind in type(algorithm).__mro__):
+            algorithm.initialization.eliminate_duplicates = NoDuplicateElimination()
         return copy.deepcopy(algorithm)
 
     def searched(self, problem: MeshProblem, merged_value: Any = None) -> Problem:
@@ -465,6 +472,8 @@ class AlgorithmConfig(Part):
             if "ref_dirs" in (_parameters(self.target) or ()) and "ref_dirs" not in self._all_parameters(value):
                 at += " without ref_dirs (under 'parameters': a number of directions, or the list of pairs)"
             with _blaming(what=f"the algorithm {self.name!r} cannot be made{at}"):
+                if self.weighs_the_problem:
+                    require_probability(WEIGHT, self._all_parameters(value)[WEIGHT])
                 self.build(value)
         return self
 
@@ -835,6 +844,7 @@ def _parameters(target: Any) -> set[str] | None:
     return names
 
 
+@cache
 def _given_to_the_parent(constructor: Any) -> tuple[int, set[str]]:
     """Return how many arguments and which keywords a constructor passes to its parent's, not counting what it is given.
 

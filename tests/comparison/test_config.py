@@ -9,14 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pymoo.optimize import minimize
 
 from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.config import BUDGET_KINDS, PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh
+from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.operators import OAX, OPERATORS, SubsetUniformCrossover
 from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.surface.rules import Rules
 
 MESHLAB = ("quadric_collapse", "quadric_collapse_unit", "quadric_collapse_boundary", "vertex_clustering")
@@ -163,6 +166,67 @@ def test_reference_directions_are_given_as_a_number(tmp_path):
     spelled = "[{name: N3, class: pymoo.algorithms.moo.nsga3.NSGA3, parameters: {ref_dirs: 5}}]"
     (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
     np.testing.assert_allclose(algorithm.build().ref_dirs[:, 0], [0, 0.25, 0.5, 0.75, 1])
+
+
+def test_an_evaluating_crossover_shares_the_evaluator_of_an_algorithm_that_does_not_name_itself(tmp_path):
+    spelled = (
+        "[{class: pymoo.algorithms.moo.moead.MOEAD, parameters: {ref_dirs: 7, n_neighbors: 4}, "
+        "operators: {crossover: {name: oax, n_offsprings: 1, prob: 1.0}}}]"
+    )
+    (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    one, other = algorithm.build(), algorithm.build()
+    assert one.mating.crossover.evaluator is one.evaluator
+    assert other.evaluator is not one.evaluator
+    problem = MeshProblem("face:90", memo=0, n_threads=1)
+    seen = Counted(problem)
+    minimize(seen, one, ("n_gen", 3), seed=1, copy_algorithm=False)
+    assert one.evaluator.n_eval == seen.count > 3 * 7
+
+
+class Counted(WeightedSum):
+    """The two objectives as they are, counted."""
+
+    def __init__(self, problem):
+        super().__init__(problem, 0.5)
+        self.n_obj, self.count = 2, 0
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        self.count += len(X)
+        out |= self.problem.evaluate(X, return_as_dictionary=True)
+
+
+def test_every_list_of_numbers_is_an_array_in_parameters_and_in_what_is_merged_over(tmp_path):
+    rnsga2 = "class: pymoo.algorithms.moo.rnsga2.RNSGA2"
+    spelled = (
+        f"[{{name: A, {rnsga2}, parameters: {{ref_points: [[10, 20], [40.5, 4]], weights: [0.5, 0.5], pop_size: 8}}}}, "
+        f"{{name: B, {rnsga2}, merged_over: {{ref_points: [[[1, 2]], [[3, 4]]]}}}}]"
+    )
+    one, merged = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    built = one.build().survival
+    assert built.ref_points.tolist() == [[10.0, 20.0], [40.5, 4.0]]
+    assert built.weights.dtype == float
+    assert [merged.build(value).survival.ref_points.tolist() for value in merged.merged_values] == [[[1, 2]], [[3, 4]]]
+
+
+def test_an_algorithm_of_one_objective_searches_the_weighted_sum(tmp_path):
+    weighted = "{class: pymoo.algorithms.soo.nonconvex.ga.GA, parameters: {pop_size: 8}, merged_over: {w: [0.2, 1]}}"
+    spelled = f"[{weighted}, nsga2_v1]"
+    ga, other = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    problem = MeshProblem("roof:5", n_threads=1)
+    assert [(ga.searched(problem, w).w, ga.searched(problem, w).n_obj) for w in ga.merged_values] == [
+        (0.2, 1),
+        (1.0, 1),
+    ]
+    assert other.searched(problem) is problem
+    assert ga.description(0.2) != ga.description(1)
+
+
+def test_the_first_population_of_ctaea_is_whole_or_it_would_never_return(tmp_path):
+    spelled = "[{class: pymoo.algorithms.moo.ctaea.CTAEA, parameters: {ref_dirs: 40}, operators: {sampling: nested}}]"
+    (algorithm,) = read_experiment_file(changed(tmp_path, algorithms=spelled)).algorithms
+    built = algorithm.build().setup(MeshProblem("roof:5", n_threads=1), termination=("n_gen", 2), seed=1)
+    first = built.ask()
+    assert len({row.tobytes() for row in first.get("X")}) < len(first) == 40
 
 
 def test_an_algorithm_is_made_anew_each_time_down_to_its_default_operators(tmp_path):
@@ -342,7 +406,39 @@ MISTAKES = {
     ),
     "single-objective algorithm": (
         {"algorithms": "[{class: pymoo.algorithms.soo.nonconvex.ga.GA}]"},
-        ["algorithms[0]", "fails on"],
+        ["algorithms[0]", "'GA' fails on", "minimises one number", "merged_over: {w: [0, 0.5, 1]}"],
+    ),
+    "single-objective algorithm with a weight that is none": (
+        {"algorithms": "[{class: pymoo.algorithms.soo.nonconvex.ga.GA, merged_over: {w: [0.5, 7]}}]"},
+        ["algorithms[0]", "w = 7", "probability"],
+    ),
+    "algorithm that asks a person": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.pinsga2.PINSGA2}]"},
+        ["algorithms[0].class", "PINSGA2 asks a person"],
+    ),
+    "what the algorithm sets itself": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.moead.MOEAD, parameters: {ref_dirs: 5, pop_size: 9}}]"},
+        ["algorithms[0].parameters.pop_size", "no such parameter", "it takes:"],
+    ),
+    "directions missing": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.moead.MOEAD}]"},
+        ["algorithms[0]", "'MOEAD' cannot be made without ref_dirs", "a number of directions"],
+    ),
+    "points that are no pairs": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.rnsga2.RNSGA2, parameters: {ref_points: [1.0, 2.0]}}]"},
+        ["algorithms[0].parameters.ref_points", "expected a list of pairs, [error, triangles]"],
+    ),
+    "points of unequal length": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.rnsga2.RNSGA2, parameters: {ref_points: [[1.0, 2.0], [3.0]]}}]"},
+        ["algorithms[0].parameters.ref_points", "expected rows of equal length"],
+    ),
+    "an algorithm of real numbers": (
+        {"algorithms": "[{class: pymoo.algorithms.moo.nsde.NSDE}]"},
+        ["algorithms[0]", "calculates with variables as real numbers"],
+    ),
+    "a base class": (
+        {"algorithms": "[{class: pymoo.core.algorithm.Algorithm}]"},
+        ["algorithms[0]", "'Algorithm' fails on", "no front"],
     ),
     "constraints for MOEA/D": (
         {"problem": "{max_triangles: 50}", "algorithms": "[moead]"},

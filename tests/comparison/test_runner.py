@@ -14,10 +14,12 @@ import time
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from counts import tried
+from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.population import Population
 from pymoo.optimize import minimize
 
@@ -664,6 +666,58 @@ def test_a_folder_with_other_things_in_it_is_refused(config, tmp_path):
     with pytest.raises(ResultError, match=r"thesis\.txt|tiny\.yaml"):
         run_experiment(config, tmp_path)
     assert not (tmp_path / "runs").exists()
+
+
+class Unsaved(NSGA2):
+    """NSGA-II of somebody's own, of whose state a checkpoint knows nothing."""
+
+
+def test_an_algorithm_whose_state_cannot_be_saved_is_named_once_before_its_searches(tmp_path):
+    text = CONFIG.replace("{name: N1, preset: nsga2_v1", "{name: U1, class: test_runner.Unsaved")
+    (tmp_path / "u.yaml").write_text(text.replace("[1, 2, 3]", "[1, 2]"), encoding="utf-8")
+    with pytest.warns(ExperimentWarning) as caught:
+        run_experiment(tmp_path / "u.yaml", tmp_path / "out", checkpoint=0.0)
+    assert [str(warning.message) for warning in caught] == [
+        "U1: a search that is cut off begins anew, for its state cannot be saved: algorithm is a test_runner.Unsaved, "
+        "which a checkpoint cannot carry"
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ExperimentWarning)
+        run_experiment(tmp_path / "u.yaml", tmp_path / "out", checkpoint=0.0)  # nothing is left to do, or to say
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["moo.moead.MOEAD", "moo.ctaea.CTAEA", "moo.spea2.SPEA2", pytest.param("moo.age.AGEMOEA", marks=pytest.mark.slow)],
+)
+def test_a_search_of_pymoos_that_was_cut_off_goes_on_to_the_same_run(tmp_path, path):
+    size = "ref_dirs" if path in ("moo.moead.MOEAD", "moo.ctaea.CTAEA") else "pop_size"
+    algorithms = f"[{{name: A, class: pymoo.algorithms.{path}, parameters: {{{size}: 12}}}}]"
+    text = (
+        CONFIG[: CONFIG.index("algorithms")] + f"algorithms: {algorithms}\nseeds: [1]\nbudgets: [{{generations: 6}}]\n"
+    )
+    (tmp_path / "p.yaml").write_text(text, encoding="utf-8")
+    experiment = read_experiment_file(tmp_path / "p.yaml")
+    task, problem, saved = plan(experiment)[0], experiment.problems[0].build(), tmp_path / "c.npz"
+    ((_, whole, _),) = runner.perform(task, problem)
+    save, kept = runner.Checkpoints.save, []
+
+    def cut_off(self: Any, **facts: Any) -> None:
+        save(self, **facts)
+        kept.append(facts["generations"])
+        if len(kept) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner.Checkpoints, "save", cut_off)
+        patch.setattr(runner.Checkpoints, "due", lambda _: True)
+        with pytest.raises(KeyboardInterrupt):
+            list(runner.perform(task, problem, checkpoint=saved, interval=0.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ExperimentWarning)
+        ((_, again, facts),) = runner.perform(task, problem, checkpoint=saved)
+    assert facts["generations"] == 6
+    assert {name: array.tolist() for name, array in again.items()} == {k: a.tolist() for k, a in whole.items()}
 
 
 def test_a_folder_that_a_killed_process_had_only_begun_is_continued(config, tmp_path, reference):

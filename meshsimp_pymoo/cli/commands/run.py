@@ -29,7 +29,11 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("config", metavar="CONFIG.yaml")
     parser.add_argument("-o", "--output", metavar="OUT", help="folder to make or to continue (default: CONFIG_results)")
     add_workers(parser)
-    add_checkpoint(parser, "the state of every run is saved", "; algorithms given by import path may begin anew")
+    add_checkpoint(
+        parser,
+        "the state of every run is saved",
+        "; an algorithm whose state cannot be saved is named, and begins anew",
+    )
     parser.add_argument(
         "--models", metavar="FOLDER", help="where the model files are, in place of the configuration's folder"
     )
