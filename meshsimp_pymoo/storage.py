@@ -13,7 +13,8 @@
                        solution s keeps the rows of higher level, unless moved_start (S + 1,) gives it a part of moved.
                        No pickles
     OUT/run.json       the model with its hash, how it was read (options), what counted (rules), what was minimised
-                       (objectives), how it was searched and written (settings, seed), package versions, evaluations,
+                       (objectives), how it was searched and written (settings, seed), package versions, the machine
+                       (environment), when the search was begun, evaluations,
                        moves, seconds
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
@@ -30,7 +31,9 @@ import csv
 import json
 import os
 import platform
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
@@ -343,6 +346,7 @@ def write_front(
             "solutions": len(order),
             "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
             "versions": package_versions(),
+            "environment": machine(),
         }
         (partial / "run.json").write_text(
             json.dumps(record, indent=2, default=_plain, allow_nan=False) + "\n", encoding="utf-8"
@@ -480,6 +484,21 @@ def _versions(*others: str) -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return versions
+
+
+@cache
+def machine() -> dict[str, Any]:
+    """Return what the times of a run depend on besides: operating system, processor, number of cores."""
+    processor = platform.processor() or platform.machine()
+    with suppress(OSError), Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as lines:
+        names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+        processor = next(names, processor)
+    return {"platform": platform.platform(), "processor": processor, "cores": os.cpu_count()}
+
+
+def now() -> str:
+    """Return the date and time, in UTC, as ISO 8601 spells it."""
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
 
 
 def even_selection(count: int, most: int | None) -> list[int]:

@@ -153,6 +153,7 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
     assert record["generations"] == 3
     assert record["evaluations"] == 36
     assert record["seconds"] > 0
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", record["begun"])
     assert record["interrupted"] is False
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import itertools
 import re
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from meshsimp_pymoo import OAX, MeshProblem, NeighbourShift, PinnedCorners, RandomSubset, SubsetUniformCrossover
+from meshsimp_pymoo.comparison.findings import CLAIMS, PAPER_CLASSIC
 from meshsimp_pymoo.search.presets import PRESETS
 
 ROOT = Path(__file__).parents[1]
@@ -98,3 +100,13 @@ def test_the_presets_have_the_papers_settings() -> None:
     moead = PRESETS["moead"].function()
     assert (moead.n_neighbors, moead.prob_neighbor_mating, moead.normalised) == (20, 1.0, False)
     np.testing.assert_array_equal(moead.ref_dirs.sum(axis=1), 1.0)
+
+
+def test_every_pair_that_the_paper_compares_is_in_a_claim() -> None:
+    methods = {name for name, preset in PRESETS.items() if preset.is_the_papers} | set(PAPER_CLASSIC)
+    for indicator in ("coverage", "epsilon"):
+        compared: set[frozenset[str]] = set()
+        for claim in CLAIMS:
+            for first, second in claim.pairs if indicator in claim.indicators else ():
+                compared |= {frozenset((first, one)) for one in (PAPER_CLASSIC if second == "classic" else (second,))}
+        assert compared == {frozenset(pair) for pair in itertools.combinations(methods, 2)}

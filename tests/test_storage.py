@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -56,6 +58,12 @@ def test_a_front_reads_back_as_it_was_written(tmp_path, model, solutions):
     assert stored.run["chosen"] == order.tolist().index(4)
     assert stored.run["model"]["hash"] == model.hash
     assert stored.run["versions"]["numpy"] == np.__version__
+    assert stored.run["environment"] == {
+        "platform": platform.platform(),
+        "processor": stored.run["environment"]["processor"],
+        "cores": os.cpu_count(),
+    }
+    assert stored.run["environment"]["processor"]
 
 
 def test_other_fronts_are_stored_beside_it_sorted_by_triangles(tmp_path, model, solutions):

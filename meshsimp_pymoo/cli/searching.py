@@ -51,6 +51,7 @@ from meshsimp_pymoo.storage import (
     claim_output,
     even_selection,
     is_unfinished,
+    now,
     package_versions,
 )
 from meshsimp_pymoo.surface.measures import OBJECTIVES
@@ -258,6 +259,8 @@ class Keeper:
         self.output = request.output
         self.before = before
         self.path = self.output.folder / CHECKPOINT
+        #: When the search was begun, perhaps by another process.
+        self.begun = now()
         #: Whether the folder holds a checkpoint of this search.
         self.is_kept = False
         self._checkpoints: Checkpoints | None = None
@@ -305,6 +308,7 @@ class Keeper:
         if other := difference(stored.what, self.what):
             raise CheckpointError(f"{self.path}: belongs to another search ({other})")
         restore(stored, algorithm)
+        self.begun = stored.facts.get("begun", self.begun)
         if not self.output.quiet:
             say(
                 f"{self.output.folder} holds a search that was stopped after {algorithm.n_iter - 1} generations, "
@@ -318,7 +322,7 @@ class Keeper:
         if checkpoints is None or not (checkpoints.due() or (last and self.is_kept)):
             return
         try:
-            checkpoints.save()
+            checkpoints.save(begun=self.begun)
             self.is_kept = True
         except (CheckpointError, NotResumable, OSError) as problem:
             self._warn(problem)
@@ -346,6 +350,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
             "generations": found.generations,
             "evaluations": found.evaluations,
             **({} if found.moves is None else {"moves": found.moves}),
+            "begun": keeper.begun,
             "seconds": round(found.seconds, 3),
             **{name: round(seconds, 3) for name, seconds in keeper.before.items()},
             **({} if fitted is None else {"refit_seconds": round(shown.seconds["refitting"], 3)}),

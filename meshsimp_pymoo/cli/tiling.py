@@ -18,7 +18,7 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.opening import count_samples, open_grid
 from meshsimp_pymoo.settings import plain
-from meshsimp_pymoo.storage import TILES, claim_output
+from meshsimp_pymoo.storage import TILES, claim_output, now
 from meshsimp_pymoo.surface.grid_surface import FREE_RULES, GridSurface
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, identity, tiled_front, usual_most
@@ -70,7 +70,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     surface = GridSurface(grid, request.rules)
     if is_drawn_only:
         return hand_over_stored(request, surface, shown)
-    start = time.perf_counter()
+    start, begun = time.perf_counter(), now()
     format_to_write(output.format).check(grid)
     jobs = tiling.jobs or os.cpu_count() or 1
     most = max(wish.triangles or 2, usual_most(grid))
@@ -107,6 +107,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
                 stop_if_interrupted()
             with shown.stage("writing", "writing"):
                 run = what | {
+                    "begun": begun,
                     "seconds": round(time.perf_counter() - start, 3),
                     "read_seconds": round(read_seconds, 3),
                     "compile_seconds": round(compiled.seconds, 3),

@@ -83,7 +83,7 @@ from meshsimp_pymoo.search.checkpoint import (
 )
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
-from meshsimp_pymoo.storage import package_versions
+from meshsimp_pymoo.storage import machine, now, package_versions
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
@@ -256,7 +256,7 @@ def run_experiment(
         at_once = min(jobs, max(len(missing), n_baselines))
         own = Serial() if at_once < 2 else Processes(at_once)
         problems = {problem.name: problem for problem in experiment.problems}
-        shared = _Shared(problems, store.folder, checkpoint, experiment.not_resumable)
+        shared = _Shared(problems, store.folder, checkpoint, experiment.not_resumable, (engine or own).jobs)
         with own:
             _perform_all(missing, store, engine or own, shown, shared)
             with contextlib.suppress(OSError):
@@ -306,6 +306,7 @@ def perform(
     *,
     checkpoint: Path | None = None,
     interval: float = INTERVAL,
+    jobs: int = 1,
 ) -> Iterator[tuple[int, dict[str, npt.NDArray[Any]], dict[str, Any]]]:
     """Search, and yield each run of a task when its budget is reached.
 
@@ -319,6 +320,8 @@ def perform(
         File for the state of the search. If there is one, the search goes on from there; it is removed at the end.
     interval : float
         Seconds between two savings.
+    jobs : int
+        How many searches go on at once, for the record.
 
     Yields
     ------
@@ -344,7 +347,7 @@ def perform(
         searched = task.algorithm.searched(problem, task.merged_value)
         return task.algorithm.build(task.merged_value).setup(searched, termination=termination, seed=task.seed)
 
-    start = time.perf_counter()
+    start, begun, cpu_seconds = time.perf_counter(), now(), 0.0
     algorithm, stored = set_up(), None if checkpoint is None else _usable_checkpoint(task, checkpoint)
     trace = Trace()
     if stored is not None:
@@ -352,6 +355,7 @@ def perform(
             restore(stored, algorithm)
             start -= float(stored.facts["seconds"])
             trace = Trace.from_plain(stored.facts["trace"])
+            begun, cpu_seconds = stored.facts["begun"], stored.facts["cpu_seconds"]
         except CheckpointError as damage:
             warnings.warn(f"{damage}; its search begins anew", ExperimentWarning, stacklevel=2)
             algorithm = set_up()
@@ -366,8 +370,9 @@ def perform(
     while left:
         ended = not algorithm.has_next()
         if not ended:
-            before = algorithm.n_iter
+            before, cpu_before = algorithm.n_iter, time.process_time()
             algorithm.next()
+            cpu_seconds += time.process_time() - cpu_before
             if algorithm.n_iter == before:  # in the middle of a generation
                 continue
             ended = not algorithm.has_next()
@@ -388,14 +393,17 @@ def perform(
                     "evaluations": evaluations,
                     "moves": moves,
                     "seconds": round(seconds, 4),
+                    "cpu_seconds": round(cpu_seconds, 4),
                     "trace_seconds": until_now.seconds,
+                    "begun": begun,
                     "versions": package_versions(),
+                    "environment": machine() | {"jobs": jobs},
                 }
                 yield k, _front_arrays(problem, algorithm.opt) | until_now.arrays, facts
                 left.remove(k)
         if left and keeper is not None and keeper.due():
             try:
-                keeper.save(**reached, trace=trace.plain)
+                keeper.save(**reached, begun=begun, cpu_seconds=cpu_seconds, trace=trace.plain)
             except (CheckpointError, NotResumable) as trouble:
                 warnings.warn(f"{trouble}; the search goes on without it", ExperimentWarning, stacklevel=2)
                 keeper = None
@@ -629,6 +637,7 @@ class _Shared:
     folder: Path | None
     checkpoint: float | None
     not_resumable: Mapping[str, str]  # algorithms whose state cannot be saved, and why
+    jobs: int  # how many at once
 
 
 def _perform_all(tasks: Sequence[Task], store: RunStore, engine: Engine, shown: _Shown, shared: _Shared) -> None:
@@ -665,17 +674,17 @@ def _work_on(task: Task, shared: _Shared) -> list[Any]:
         return list(_perform_and_write(task, shared, shared.folder))
     return [
         (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
-        for k, arrays, facts in perform(task, shared.problems[task.problem].build())
+        for k, arrays, facts in perform(task, shared.problems[task.problem].build(), jobs=shared.jobs)
     ]
 
 
 def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
     problem = shared.problems[task.problem].build()
-    saved: dict[str, Any] = {}
+    how: dict[str, Any] = {"jobs": shared.jobs}
     if shared.checkpoint is not None and task.algorithm.name not in shared.not_resumable:
-        saved = {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
+        how |= {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
     paths = []
-    for k, arrays, facts in perform(task, problem, **saved):
+    for k, arrays, facts in perform(task, problem, **how):
         label = f"{task.label} / {task.budgets[k].name}"
         paths.append(write_run(folder, label, task.descriptions[k], arrays, facts))
     return paths
@@ -780,7 +789,7 @@ def _fewest_triangles(problem: ProblemConfig, tasks: Sequence[Task], store: RunS
 def _baseline_on(task: _BaselineTask, shared: _Shared) -> Path | str:
     """Do a baseline; return the record of what it made, or why it cannot be used here."""
     assert shared.folder is not None
-    problem, baseline = shared.problems[task.problem].build(), BASELINES[task.method]
+    problem, baseline, begun = shared.problems[task.problem].build(), BASELINES[task.method], now()
     try:
         arrays, facts = (_meshes_of if baseline.tool else _front_of)(task, problem)
     except ToolUnavailable as reason:
@@ -789,6 +798,8 @@ def _baseline_on(task: _BaselineTask, shared: _Shared) -> Path | str:
     facts |= {
         "problem": task.problem,
         "algorithm": task.method,
+        "begun": begun,
+        "environment": machine() | {"jobs": shared.jobs},
         "versions": package_versions(*[baseline.package] * bool(baseline.package)),
     }
     return write_run(shared.folder, task.label, task.description, arrays, facts)

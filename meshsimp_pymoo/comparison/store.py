@@ -4,7 +4,7 @@
 
     OUT/experiment.json       the resolved configuration, and the key of every run that it asks for
     OUT/models/NAME.KEY.npz   the models as they were searched
-    OUT/runs/NAME.KEY.json    the record of a run: description, versions, evaluations, seconds, checksums
+    OUT/runs/NAME.KEY.json    the record of a run: description, evaluations, seconds, versions, environment, checksums
     OUT/runs/NAME.KEY.npz     its arrays; no pickles
     OUT/.checkpoints/KEY.npz  the state of a run that is not finished; see `meshsimp_pymoo.search.checkpoint`
 
@@ -64,7 +64,10 @@ class StoredRun:
     path : Path
         Its record.
     record : dict
-        The content of the record.
+        The content of the record. Of an evolutionary run also how far it went (``generations``, ``evaluations``,
+        ``moves``; None where the algorithm makes none), what that took (``seconds``; ``cpu_seconds`` of all threads:
+        an annealing uses all cores, all else one), and where: ``begun``, ``versions`` and ``environment`` with the
+        ``jobs`` that went on at once.
     arrays : dict of str to array
         For an evolutionary run ``F`` (S, 2), ``kept`` (S, ceil(N / 8)) packed bits, and one value per
         solution of ``error_nearest`` (the error when uncovered vertices cost their distance) and of every

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import calendar
 import json
 import multiprocessing
 import os
@@ -120,6 +121,11 @@ def test_a_stored_run_is_what_pymoo_finds_in_one_go(reference, config):
     run = read_run(record_of(reference, problem="Face", algorithm="N1", seed=2, budget="6 generations"))
     np.testing.assert_array_equal(run.arrays["F"], non_dominated(result.F))
     assert run.record["evaluations"] == result.algorithm.evaluator.n_eval == 72
+    assert set(run.record["environment"]) == {"platform", "processor", "cores", "jobs"}
+    assert (run.record["environment"]["cores"], run.record["environment"]["jobs"]) == (os.cpu_count(), 1)
+    assert 0 < run.record["cpu_seconds"]
+    begun = calendar.timegm(time.strptime(run.record["begun"], "%Y-%m-%dT%H:%M:%SZ"))
+    assert run.path.stat().st_mtime - 60 < begun <= run.path.stat().st_mtime
     kept = np.unpackbits(run.arrays["kept"], axis=1)[:, : problem.n_var].astype(bool)
     for row, q in enumerate(map(problem.quality, kept)):
         assert (q.error, q.triangles) == tuple(run.arrays["F"][row])

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pymoo.algorithms.moo.moead import MOEAD
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.individual import Individual
+from pymoo.core.population import Population
 from pymoo.optimize import minimize
 from pymoo.util.archive import Archive, MultiObjectiveArchive
 from stand_in_problem import GridProblem, front_of
@@ -113,7 +114,15 @@ class TestItsTwin:
 
 
 class Shown(Evaluator):
-    """An evaluator of somebody's own."""
+    """An evaluator of somebody's own, which counts what it is shown."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.shown = 0
+
+    def eval(self, problem: Any, pop: Any, **kwargs: Any) -> Any:
+        self.shown += 1 if isinstance(pop, Individual) else len(pop)
+        return super().eval(problem, pop, **kwargs)
 
 
 def asked_and_told(algorithm: Any) -> Any:
@@ -168,8 +177,11 @@ class TestEveryWayToRunIt:
         assert found(half_asked(begun())) == expected
         seen: list[int] = []
         problem.calls = 0
-        assert found(gone_through(begun(evaluator=Shown(callback=lambda pop: seen.append(len(pop)))))) == expected
+        assert found(gone_through(begun(evaluator=Evaluator(callback=lambda pop: seen.append(len(pop)))))) == expected
         assert sum(seen) == expected[2] == problem.calls
+        own = Shown()
+        assert found(gone_through(begun(evaluator=own))) == expected
+        assert own.shown == expected[2]
         assert found(gone_through(begun(archive=MultiObjectiveArchive()))) == expected
 
     def test_a_step_is_a_generation_and_a_callback_is_called_once_in_it(self) -> None:
@@ -193,6 +205,15 @@ class TestEveryWayToRunIt:
 
         minimize(GridProblem(6), moead(20, archive=Everything()), ("n_gen", 4), seed=1)
         assert [one.get("n_gen") for one in shown] == [n for n in (1, 2, 3, 4) for _ in range(20)]
+
+    def test_children_have_the_pins_that_their_parents_lack(self) -> None:
+        problem = GridProblem(6)
+        X = (np.random.default_rng(3).random((20, 36)) < 0.5) & ~problem.pinned
+        known = Evaluator().eval(problem, Population.new(X=X))  # evaluated, hence not repaired
+        pop = minimize(problem, moead(20, sampling=known), ("n_gen", 8), seed=1).pop
+        children = pop[pop.get("n_gen") > 1]
+        assert len(children) > 10
+        assert children.get("X")[:, problem.pinned].all()
 
     @pytest.mark.parametrize("kind", ["crossover", "mutation", "repair", "attached"])
     def test_an_operator_of_ones_own_is_asked(self, kind: str) -> None:
