@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawing import overlaps
 from handmade import BUDGET, store
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -128,8 +128,11 @@ class TestAnytime:
 
 class TestRanked:
     def test_by_the_median_ratio_of_every_model(self, tmp_path):
-        # medians of N1: 1 and 1.1 * 0.1 + 0.6 * 0.5 of the whole, of MD less; the model C lacks MD, X lacks A and B
-        fronts = {"A": FRONTS, "B": FRONTS, "C": {"N1": FRONTS["N1"], "X": FRONTS["MD"]}}
+        # N1 finds everything in two runs of three and one end in the third, MD the middle in each: better by the
+        # median, worse by the worst run; the model C lacks MD, A and B lack X
+        full, middle = FRONTS["N1"][1], FRONTS["MD"][1]
+        both = {"N1": {1: full, 2: full, 3: full[:1]}, "MD": dict.fromkeys((1, 2, 3), middle)}
+        fronts = {"A": both, "B": both, "C": {"N1": both["N1"], "X": both["MD"]}}
         study = Study(store(tmp_path / "out", fronts))
         cases = study.compared(BUDGET, NEAREST)
         methods, found = ranked(cases[:2])
@@ -190,20 +193,6 @@ DRAWINGS = {
     "critical differences": critical_difference_figure,
     "profile": profile_figure,
 }
-
-
-def overlaps(figure):
-    """Return what of a figure's title, panels and legends overlaps, and what sticks out of it [pixels]."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    renderer = canvas.get_renderer()
-    title = figure._suptitle.get_window_extent(renderer)
-    others = [ax.get_tightbbox(renderer) for ax in figure.axes] + [
-        x.get_window_extent(renderer) for x in figure.legends
-    ]
-    touching = [box for box in others if box is not None and box.y1 > title.y0 - 2]
-    outside = [box for box in [title, *others] if box.x0 < -1 or box.y0 < -1 or box.x1 > figure.bbox.x1 + 1]
-    return touching, outside
 
 
 @pytest.mark.parametrize("drawing", DRAWINGS)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 from counts import tried
+from drawing import overlaps
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.population import Population
 from pymoo.optimize import minimize
@@ -646,7 +647,9 @@ def test_progress_ends_where_the_runs_do(reference):
 def test_pictures_say_of_every_mesh_how_much_of_the_model_it_abandons(reference):
     study = Study(reference)
     case = study.cases["Face", "6 generations", "searched"]
-    titles = [axes.get_title() for axes in meshes_figure(study, case).axes]
+    figure = meshes_figure(study, case)
+    assert overlaps(figure) == ([], [])
+    titles = [axes.get_title() for axes in figure.axes]
     # the paper's Figure 10 first, then by hypervolume
     best = sorted(("N1", "G1"), key=lambda method: -case.scores[method].merged_hvr)
     assert [title.split("\n")[0] for title in titles if title][:4] == ["original", "N2", *best]
