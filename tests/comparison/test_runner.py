@@ -714,20 +714,18 @@ def test_the_shell_runs_the_quick_configuration_shortened_and_reports_it_again(t
     assert "missing" not in capsys.readouterr().out
 
 
-def test_where_there_is_no_terminal_a_line_now_and_then_says_how_far_it_is(config, tmp_path, capsys, monkeypatch):
-    config.write_text(CONFIG.replace("[1, 2, 3]", "[1]"), encoding="utf-8")
+def test_where_there_is_no_terminal_a_line_now_and_then_says_how_far_it_is(capsys, monkeypatch):
     monkeypatch.setattr(terminal, "LINE_SECONDS", 0.02)
-    assert main(["run", str(config), "-o", str(tmp_path / "out"), "--jobs", "1"]) == 0
-    lines = capsys.readouterr().err.splitlines()
-    runs, report = ([line for line in lines if line.startswith(f"meshsimp: {part}: ")] for part in ("runs", "report"))
-    assert len(lines) == len(runs) + len(report)
-    shares = [int(re.fullmatch(r"meshsimp: runs: (\d+)% after \d+ s(; .+)?", line)[1]) for line in runs]
-    assert len(set(shares)) > 2
-    assert shares == sorted(shares)
-    assert any("; Face / " in line for line in runs)
-    assert any(".png" in line for line in report)
-    assert main(["run", str(config), "-o", str(tmp_path / "out"), "--quiet"]) == 0
-    assert capsys.readouterr().err == ""
+    for quiet in (False, True):
+        with terminal.bar(quiet, "runs") as show:
+            show(0.25, "Face / N1")
+            time.sleep(0.3)
+            show(1.0, "")
+            time.sleep(0.3)
+        lines = capsys.readouterr().err.splitlines()
+        assert bool(lines) is not quiet
+        said = {re.sub(r"after \d+ s", "after", line) for line in lines}
+        assert quiet or said == {"meshsimp: runs: 25% after; Face / N1", "meshsimp: runs: 99% after"}
 
 
 def test_a_report_of_nothing_is_refused(tmp_path, capsys):
