@@ -51,7 +51,10 @@ def compiling(names: Iterable[str], shown: Stages) -> Iterator[Compiling]:
 
 def compile_first(names: Iterable[str], *, quiet: bool) -> None:
     """Compile what is missing of these parts, and say so."""
-    with Stages(quiet, "meshsimp", {"compiling": 0.0}) as shown, compiling(names, shown) as under_way:
+    with (
+        Stages(quiet, "compiling", {"compiling": 0.0}, lines=True) as shown,
+        compiling(names, shown) as under_way,
+    ):
         under_way.finish()
 
 

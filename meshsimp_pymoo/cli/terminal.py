@@ -76,6 +76,9 @@ DRAWING = ("stopping without all pictures; the results are in place",)
 # Signals that ask a program to end.
 ENDING = (signal.SIGINT, signal.SIGTERM)
 
+# Where nobody sees a bar: seconds between two lines of progress, and at least this share of the time so far.
+LINE_SECONDS, LINE_SHARE = 10.0, 0.05
+
 # Of the name before the progress bar; the front so far is to fit beside it into 80 columns.
 LONGEST_NAME = 18
 
@@ -236,16 +239,18 @@ class Stages:
         What it is about.
     plan : mapping
         The stages in their order, and about how many seconds each takes.
+    lines : bool
+        Whether a line is said now and then where there is no terminal.
     """
 
-    def __init__(self, quiet: bool, name: str, plan: Mapping[str, float]) -> None:
+    def __init__(self, quiet: bool, name: str, plan: Mapping[str, float], *, lines: bool = False) -> None:
         self.quiet = quiet
         #: What each stage has taken [s].
         self.seconds: dict[str, float] = {}
         self._plan = dict(plan)
-        self._is_shown = _is_seen(quiet)
+        self._is_shown = _is_seen(quiet) or (lines and not quiet)
         self._shown = ExitStack()
-        self._draw = self._shown.enter_context(bar(quiet, name, timed=False))
+        self._draw = self._shown.enter_context(bar(quiet, name, timed=False, lines=lines))
         self._begun = time.perf_counter()
 
     def expect(self, stage: str, seconds: float) -> None:
@@ -305,13 +310,17 @@ def _in_words(seconds: float) -> str:
 
 
 @contextmanager
-def bar(quiet: bool, name: str, *, timed: bool = True) -> Iterator[Callable[[float, str], None]]:
-    """Yield what shows (share done, what is being done): on a terminal a line of its width; elsewhere nothing.
+def bar(quiet: bool, name: str, *, timed: bool = True, lines: bool = True) -> Iterator[Callable[[float, str], None]]:
+    """Yield what shows (share done, what is being done): on a terminal a line of its width; elsewhere one now and then.
 
-    With ``timed`` the time that is left is reckoned from the shares.
+    With ``timed`` the time that is left is reckoned from the shares; without ``lines`` there is nothing elsewhere.
     """
     if not _is_seen(quiet):
-        yield lambda share, state: None
+        if quiet or not lines:
+            yield lambda share, state: None
+        else:
+            with _lines(name) as show:
+                yield show
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -336,6 +345,31 @@ def bar(quiet: bool, name: str, *, timed: bool = True) -> Iterator[Callable[[flo
             shown.update(task, completed=min(share, 1.0), state=state)
 
         yield show
+
+
+@contextmanager
+def _lines(name: str) -> Iterator[Callable[[float, str], None]]:
+    """Yield what takes the progress, and say it now and then, further and further apart."""
+    begun, told, done = time.perf_counter(), (0.0, ""), threading.Event()
+
+    def show(share: float, state: str) -> None:
+        nonlocal told
+        told = min(share, 0.99), state  # what is still said is not done
+
+    def speak() -> None:
+        pause = LINE_SECONDS
+        while not done.wait(pause):
+            spent, (share, state) = time.perf_counter() - begun, told
+            say(f"{name}: {share:.0%} after {_in_words(spent)}{state and '; '}{state}")
+            pause = max(LINE_SECONDS, LINE_SHARE * spent)
+
+    speaking = threading.Thread(target=speak, name="meshsimp-lines", daemon=True)
+    speaking.start()
+    try:
+        yield show
+    finally:
+        done.set()
+        speaking.join()
 
 
 @contextmanager

@@ -584,7 +584,12 @@ class Experiment:
     not_resumable: Mapping[str, str]
 
 
-def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathLike[str] | None = None) -> Experiment:
+def read_experiment_file(
+    path: str | os.PathLike[str],
+    *,
+    folder: str | os.PathLike[str] | None = None,
+    before_trials: Callable[[], object] = lambda: None,
+) -> Experiment:
     """Read a configuration and make sure that all of it can be done.
 
     Parameters
@@ -594,6 +599,8 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
         the file's own or below: a file that came from elsewhere reads nothing else.
     folder : path, optional
         Where the model files are, in place of what the file says: any folder.
+    before_trials : callable, optional
+        Called when all that is quick to check is right, before the algorithms are tried out, which compiles them.
 
     Raises
     ------
@@ -611,6 +618,7 @@ def read_experiment_file(path: str | os.PathLike[str], *, folder: str | os.PathL
             with _blaming("problems", place):
                 problems.append(_opened(entry, file, models))
         reasons = {}
+        before_trials()
         for place, algorithm in enumerate(file.algorithms):
             with _blaming("algorithms", place):
                 reasons[algorithm.name] = _try_out(algorithm, problems)

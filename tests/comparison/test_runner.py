@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -24,7 +25,7 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.population import Population
 from pymoo.optimize import minimize
 
-from meshsimp_pymoo.cli import main
+from meshsimp_pymoo.cli import main, terminal
 from meshsimp_pymoo.comparison import analysis, baselines, runner
 from meshsimp_pymoo.comparison.baselines import reductions
 from meshsimp_pymoo.comparison.config import read_experiment_file
@@ -771,7 +772,8 @@ def test_the_shell_runs_the_quick_configuration_shortened_and_reports_it_again(t
     said = capsys.readouterr()
     assert "runs done" in said.out
     if meshlab_available():
-        assert said.err == ""
+        lines = said.err.splitlines()
+        assert [line for line in lines if not re.match(r"meshsimp: (runs|report|compiling): ", line)] == []
     for scoring in ("searched", "nearest"):
         figures = {path.name for path in (out / "figures" / "3-generations" / scoring).iterdir()}
         expected = {"hvr.png", "cardinality.png", "selected.png", "fronts_Face.png", "meshes_Face.png", "profile.png"}
@@ -789,6 +791,20 @@ def test_the_shell_runs_the_quick_configuration_shortened_and_reports_it_again(t
     assert main(["report", str(out)]) == 0
     assert results(out) == before
     assert "missing" not in capsys.readouterr().out
+
+
+def test_where_there_is_no_terminal_a_line_now_and_then_says_how_far_it_is(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.02)
+    for quiet in (False, True):
+        with terminal.bar(quiet, "runs") as show:
+            show(0.25, "Face / N1")
+            time.sleep(0.3)
+            show(1.0, "")
+            time.sleep(0.3)
+        lines = capsys.readouterr().err.splitlines()
+        assert bool(lines) is not quiet
+        said = {re.sub(r"after \d+ s", "after", line) for line in lines}
+        assert quiet or said == {"meshsimp: runs: 25% after; Face / N1", "meshsimp: runs: 99% after"}
 
 
 def test_a_report_of_nothing_is_refused(tmp_path, capsys):

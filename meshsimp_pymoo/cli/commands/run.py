@@ -47,17 +47,20 @@ def run(args: argparse.Namespace) -> int:
     from contextlib import ExitStack
     from pathlib import Path
 
-    from meshsimp_pymoo.cli.preparing import compile_first
+    from meshsimp_pymoo.cli.preparing import compiling
     from meshsimp_pymoo.cli.reporting import report_on_experiment
-    from meshsimp_pymoo.cli.terminal import INTERRUPTED, answering, bar, say, tell
+    from meshsimp_pymoo.cli.terminal import INTERRUPTED, Stages, answering, bar, say, tell
     from meshsimp_pymoo.comparison.config import read_experiment_file
     from meshsimp_pymoo.comparison.runner import run_experiment
     from meshsimp_pymoo.warming import SEARCH
 
-    experiment = read_experiment_file(args.config, folder=args.models)
+    with (
+        Stages(args.quiet, "compiling", {"compiling": 0.0}, lines=True) as shown,
+        compiling((*SEARCH, "insertion"), shown) as compiled,
+    ):
+        experiment = read_experiment_file(args.config, folder=args.models, before_trials=compiled.finish)
     out = Path(args.output or f"{Path(args.config).stem}_results")
     jobs = args.jobs or os.cpu_count() or 1
-    compile_first((*SEARCH, "insertion"), quiet=args.quiet)
     start = time.perf_counter()
     try:
         with (
