@@ -82,7 +82,7 @@ def fronts_figure(study: Study, case: Case) -> Figure:
     """Draw the merged front of every method, the pseudo-optimal front, and how far half of the runs get."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9.5, 6.0), dpi=110, layout="constrained")
+    figure = Figure(figsize=(9.5, max(6.0, _legend_inches(len(case.runs) + 2))), dpi=110, layout="constrained")
     ax = figure.subplots()
     optimal = case.optimal.front
     ax.step(optimal[:, 1], optimal[:, 0], where="post", color="0.75", linewidth=5, label="pseudo-optimal", zorder=1)
@@ -278,7 +278,8 @@ def critical_difference_figure(study: Study, cases: Sequence[Case]) -> Figure:
     ax.plot([1, k], [0, 0], color="black", linewidth=1.2, clip_on=False)
     for rank in range(1, k + 1):
         ax.plot([rank, rank], [0, 0.25], color="black", linewidth=1.0, clip_on=False)
-        ax.text(rank, 0.4, str(rank), ha="center", va="bottom", fontsize=9)
+        if (rank - 1) % -(-k // 15) == 0:  # of many ranks not every one has room for its number
+            ax.text(rank, 0.4, str(rank), ha="center", va="bottom", fontsize=9)
     length = min(found.critical_difference, k - 1)
     ax.plot([1, 1 + length], [1.9, 1.9], color="0.3", linewidth=1.2, marker="|", markersize=8, clip_on=False)
     more = " (more than all ranks)" if found.critical_difference > k - 1 else ""
@@ -321,7 +322,7 @@ def profile_figure(study: Study, cases: Sequence[Case]) -> Figure:
 
     methods, values = profiled(cases)
     factors, shares = performance_profile(values)
-    figure = Figure(figsize=(9.5, 5.0), dpi=110, layout="constrained")
+    figure = Figure(figsize=(9.5, max(5.0, _legend_inches(len(methods)))), dpi=110, layout="constrained")
     ax = figure.subplots()
     end = max(factors[-1] ** 1.05, 1.05)
     for place, method in enumerate(methods):
@@ -496,6 +497,11 @@ def _title(figure: Figure, what: str, cases: Sequence[Case]) -> None:
     whole = f"{what}; {setting}"
     text = whole if len(whole) <= letters else "\n".join(textwrap.fill(part, letters) for part in (what, setting))
     figure.suptitle(text, fontsize=11)
+
+
+def _legend_inches(lines: int) -> float:
+    """Return how high a figure must be to have a legend of so many lines beside its one panel, below the title."""
+    return 0.19 * lines + 1.0
 
 
 def _legend_below(figure: Figure, lines: dict[str, Any]) -> None:

@@ -170,7 +170,7 @@ def study_of(folder, n_models, n_methods):
     return Study(store(folder, fronts))
 
 
-SIZES = [(1, 2), (1, 12), pytest.param((6, 12), marks=pytest.mark.slow)]
+SIZES = [(1, 2), (1, 26), pytest.param((6, 12), marks=pytest.mark.slow)]
 
 
 @pytest.fixture(scope="module", params=SIZES, ids=lambda n: f"{n[0]} models, {n[1]} methods")
