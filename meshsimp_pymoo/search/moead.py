@@ -196,11 +196,8 @@ class TchebycheffMOEAD(MOEAD):
         out = self.problem.evaluate(
             child.X, return_values_of=evaluator.evaluate_values_of, return_as_dictionary=True, algorithm=self
         )
-        for name, value in out.items():
-            child.set(name, value)
+        child.set_by_dict(**out, n_gen=self.n_iter, n_iter=self.n_iter)
         child.evaluated.update(out)
-        child.set("n_gen", self.n_iter)
-        child.set("n_iter", self.n_iter)
         evaluator.n_eval += 1
         self._advance(child)
 
@@ -247,6 +244,7 @@ class TchebycheffMOEAD(MOEAD):
         if self.normalised:
             extent = objectives(self.pop).max(axis=0) - self.ideal
             self.scale = np.where(extent > 0, extent, 1.0)
+        self.moves = ()
         if self._draws_ahead():
             self.from_second = self.mating.crossover.draw(n, self.problem.n_var, rng)
             self.shifts = self.mating.mutation.draw(self.problem, n, rng)
@@ -274,24 +272,25 @@ class TchebycheffMOEAD(MOEAD):
 
         Parameters
         ----------
-        F : (n, 2) float array
+        F : (..., n, 2) float array
             Objectives.
         subproblems : (n,) int array or int
             One sub-problem for each row, or one for all.
 
         Returns
         -------
-        (n,) float array
+        (..., n) float array
             max_j w_j |f_j - z_j| / s_j.
         """
         # the paper prints min_j, which Zhang and Li, its source, have not
         weighted = np.abs(F - self.ideal) * (self.ref_dirs[subproblems] / self.scale)
-        return np.maximum(weighted[:, 0], weighted[:, 1])
+        return np.maximum(weighted[..., 0], weighted[..., 1])
 
     def _replace(self, k: int, off: Any) -> None:
         neighbors = self.neighbors[k]
-        current = self.tchebycheff(objectives(self.pop[neighbors]), neighbors)
-        offered = self.tchebycheff(off.F[None, :], neighbors)
+        F = np.empty((2, len(neighbors), 2))
+        F[0], F[1] = objectives(self.pop[neighbors]), off.F
+        current, offered = self.tchebycheff(F, neighbors)
         self.pop[neighbors[offered <= current]] = off
 
     def _set_optimum(self) -> None:
