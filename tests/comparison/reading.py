@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.comparison.findings import CLAIMS, DOES_NOT_HOLD, HOLDS, UNDECIDED, findings, papers_cases, times
-from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, PROCEDURES, Case, Start, Study
+from meshsimp_pymoo.comparison.study import PROCEDURES, Case, Start, Study
 from meshsimp_pymoo.indicators import merged_front
+from meshsimp_pymoo.search.greedy import thinning
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,6 +29,12 @@ PAPER_EPSILON = ((1.016, 1.019), (1.045, 0.991), (1.061, 1.104), (1.039, 1.256),
 
 # (preset, triangles, error) of the solutions of M1 that the paper prints: the ends of two merged fronts.
 PAPER_M1 = (("nsga2_v2", 387, 3829.92), ("nsga2_v2", 276, 4061.76), ("moead", 401, 3808), ("moead", 297, 4033))
+
+# The tools in the tables, of each the variants that matter.
+TOOLS = (
+    "MeshLab quadric", "MeshLab quadric, unit size", "MeshLab quadric, border kept", "MeshLab clustering",
+    "meshoptimizer, border locked", "fast-simplification, border kept",
+)  # fmt: skip
 
 SHORT = {
     "hvr": "HVR", "epsilon_optimal": "ε*", "epsilon": "ε", "coverage": "C", "cardinality": "", "extent": "",
@@ -131,34 +138,34 @@ def over_classic(case: Case, rival: str, front: FloatArray) -> list[float]:
 
 
 def against_others(study: Study) -> Iterator[str]:
-    """Error of NSGA-II v1 over that of other tools' meshes of as many triangles."""
+    """Error of NSGA-II v1 over that of tools' meshes of as many triangles; and of thinning by the charged error."""
     rows = []
     for problem in study.problems:
-        row = [problem.name]
         searched, nearest = (study.cases[problem.name, BUDGET, scoring] for scoring in (SEARCHED, "nearest"))
-        names = [name for name in CLASSIC_NAMES.values() if any(name in c.runs for c in study.cases.values())]
-        for rival in names:
-            shown = []
-            for case in (searched, nearest):
-                runs = case.runs["NSGA-II v1"].values()
-                ratios = [over_classic(case, rival, front) for front in runs] if rival in case.runs else []
-                shown.append(f"{np.median(np.concatenate(ratios)):.2f}" if ratios else "–")
-            row.append(" / ".join(shown))
+        row = [problem.name]
+        for rival in TOOLS:
+            shown = [
+                float(np.median([over_classic(case, rival, front) for front in case.runs["NSGA-II v1"].values()]))
+                for case in (searched, nearest)
+            ]
+            row.append(pair(*shown))
+        thinned = thinning(study.surface(problem, "nearest"))
+        front = np.column_stack([thinned.error, thinned.triangles])
+        row.append(f"{np.median(over_classic(nearest, 'MeshLab quadric, unit size', front)):.2f}")
         rows.append(row)
-    yield from table(["model", *names], rows)
+    yield from table(["model", *TOOLS, "thinning() over quadric, unit size"], rows)
 
 
 def abandoned(study: Study) -> Iterator[str]:
-    methods = [name for name in (*study.methods, *CLASSIC_NAMES.values()) if "normalised" not in name]
+    methods = ("NSGA-II v1", "NSGA-II v2", "MOEA/D", "GA v1", *TOOLS, "adaptive thinning")
     rows = []
     for problem in study.problems:
         case = study.cases[problem.name, BUDGET, "nearest"]
         row = [problem.name]
         for method in methods:
-            runs = [run for sources in case.sources.get(method, {}).values() for run in sources]
+            runs = [run for sources in case.sources[method].values() for run in sources]
             uncovered = [run.arrays["uncovered"][run.arrays["F"][:, 1] >= 0.49 * problem.triangles] for run in runs]
-            values = np.concatenate(uncovered) if uncovered else np.array([])
-            row.append(f"{100 * values.mean() / problem.vertices:.1f}" if len(values) else "–")
+            row.append(f"{100 * np.concatenate(uncovered).mean() / problem.vertices:.1f}")
         rows.append(row)
     yield from table(["model", *methods], rows)
 

@@ -243,7 +243,7 @@ algorithms:
     parameters: {pop_size: 30}
     operators: {crossover: half_plane}
 seeds: [1, 2]
-budgets: [{generations: 4}, {evaluations: 300}]
+budgets: [{generations: 4}, {evaluations: 300}, {moves: 20000}]
 """
 
 
