@@ -183,6 +183,10 @@ def hypervolume_ratio(
     return _volume(own, low, scale, reference) / whole
 
 
+# Less than any quotient of objectives that are not 0.
+TINY = 1e-300
+
+
 def epsilon(A: ArrayLike, B: ArrayLike, *, shift: ArrayLike = 0.0) -> float:
     """Return the multiplicative epsilon indicator I(A, B): the factor by which A must improve to cover B.
 
@@ -244,13 +248,23 @@ def epsilon(A: ArrayLike, B: ArrayLike, *, shift: ArrayLike = 0.0) -> float:
     a, b = front_a + added, front_b + added
     if a.all() and b.all():
         return float(moocore.epsilon_mult(a, ref=b))
-    # moocore refuses zeros, so the definition itself; fronts are short (one solution per triangle count)
+    # moocore refuses zeros: one in A is as good as any tiny number, solutions of B with one are for the definition, and so
+    # are all where A has a solution of nothing but zeros
+    reachable = b.all(axis=1) & a.any(axis=1).all()
+    factor = _epsilon_by_definition(a, b[~reachable])
+    if reachable.any():
+        factor = max(factor, float(moocore.epsilon_mult(np.where(a == 0, TINY, a), ref=b[reachable])))
+    return factor
+
+
+def _epsilon_by_definition(a: FloatArray, b: FloatArray) -> float:
+    """Return the factor by which ``a`` must improve to cover ``b``, zeros taken literally; 0 if there is no b."""
     with np.errstate(divide="ignore", invalid="ignore"):
         factor = a[:, None, :] / b[None, :, :]
     factor[np.isnan(factor)] = 0.0  # 0 <= I * 0 holds for every I
     factor = factor.max(axis=2)
     factor[np.ix_(~a.any(axis=1), ~b.any(axis=1))] = 1.0
-    return float(factor.min(axis=0).max())
+    return float(factor.min(axis=0).max(initial=0.0))
 
 
 def coverage(A: ArrayLike, B: ArrayLike) -> float:

@@ -354,8 +354,8 @@ def commands(tmp_path_factory):
 def same_bytes(folder):
     """Return what does not depend on the time that anything took."""
     found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
-    varies = ("run.json", "times.csv", "times.md", "report.html")
-    kept = {name: path.read_bytes() for name, path in found.items() if name not in varies}
+    varies = ("run.json", "times.csv", "times.md", "report.html", "convergence_seconds.png")
+    kept = {name: path.read_bytes() for name, path in found.items() if path.name not in varies}
     for name in [name for name in kept if name.startswith("runs/") and name.endswith(".json")]:
         record = json.loads(kept[name])
         kept[name] = tuple(record[key] for key in ("generations", "evaluations", "arrays_sha256", "description"))

@@ -89,24 +89,6 @@ def test_the_enumerated_models_are_reported(quality, capsys):
     assert "of 1 models" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("offset", [-7, 0, 5])
-def test_the_largest_mesh_that_fits_is_found_whatever_the_parameter_means(quality, offset):
-    calls = []
-
-    def make(target):
-        calls.append(target)
-        count = max(20, 2 * ((target * 3) // 4) + offset)
-        return np.zeros((3, 3)), np.zeros((count, 3), int)
-
-    (_, faces), _, fits = quality.largest_at_most(make, 1001, 5000)
-    assert fits
-    assert 1001 - max(quality.NEAR, quality.NEAR_SHARE * 1001) <= len(faces) <= 1001
-    assert len(calls) <= quality.TRIES
-    (_, faces), _, fits = quality.largest_at_most(make, 10, 5000)
-    assert not fits
-    assert len(faces) == 20
-
-
 def test_a_front_gives_the_least_error_among_meshes_that_are_small_enough(quality):
     curve = quality.Curve(np.array([5.0, 1.0, 3.0, 3.0]), np.array([2, 9, 6, 4]), lambda k: k, 0.0)
     assert [curve.best(size) for size in (1, 2, 5, 8, 9)] == [None, 0, 3, 3, 1]
