@@ -248,8 +248,8 @@ def epsilon(A: ArrayLike, B: ArrayLike, *, shift: ArrayLike = 0.0) -> float:
     a, b = front_a + added, front_b + added
     if a.all() and b.all():
         return float(moocore.epsilon_mult(a, ref=b))
-    # moocore refuses zeros: one in A is as good as any tiny number, solutions of B with one are for the definition, and so
-    # are all where A has a solution of nothing but zeros
+    # moocore refuses zeros: one in A is as good as any tiny number, solutions of B with one are for the definition, and
+    # so are all where A has a solution of nothing but zeros
     reachable = b.all(axis=1) & a.any(axis=1).all()
     factor = _epsilon_by_definition(a, b[~reachable])
     if reachable.any():

@@ -10,8 +10,8 @@
     OUT/times.csv, times.md                      measured seconds, kept apart: never the same twice
     OUT/report.html                              all of it on one page that needs no other file
 
-Tables and findings are the same bytes for the same runs, and so are figures but for convergence_seconds.png. Each folder is made complete beside the old one, and
-then takes its place.
+Tables and findings are the same bytes for the same runs, and so are figures but for convergence_seconds.png. Each
+folder is made complete beside the old one, and then takes its place.
 """
 
 from __future__ import annotations

@@ -406,8 +406,8 @@ def spoil_swapped(path: Path) -> Path:
 @pytest.mark.parametrize(
     "spoil",
     [
-        spoil_truncated, spoil_record, spoil_number, spoil_arrays, spoil_rewritten, spoil_missing, spoil_empty,
-        spoil_swapped,
+        spoil_truncated, spoil_arrays, spoil_missing, spoil_swapped,
+        *(pytest.param(how, marks=pytest.mark.slow) for how in (spoil_record, spoil_number, spoil_rewritten, spoil_empty)),
     ],
 )  # fmt: skip
 def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored, reference):
