@@ -13,9 +13,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 import trimesh
-from pymoo.algorithms.soo.nonconvex.random_search import RandomSearch
 from pymoo.core.problem import ElementwiseEvaluationFunction, ElementwiseProblem, Problem
-from pymoo.util.display.single import SingleObjectiveOutput
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.errors import meant
@@ -224,7 +222,7 @@ class MeshProblem(ElementwiseProblem):
         So are algorithms of one objective, where there are more: pymoo's evaluator tells which one asks.
         """
         algorithm = kwargs.get("algorithm")
-        if self.n_obj > 1 and minimises_one_number(algorithm):
+        if algorithm is not None and self.n_obj > 1 and minimises_one_number(algorithm):
             name = type(algorithm).__name__
             raise TypeError(
                 f"{name} minimises one number, and this problem has {self.n_obj} objectives; give {name} "
@@ -402,6 +400,9 @@ def minimises_one_number(algorithm: Any) -> bool:
 
     pymoo marks them in no other way. `WeightedGA` prints something else, and `RandomSearch` keeps fronts all the same.
     """
+    from pymoo.algorithms.soo.nonconvex.random_search import RandomSearch
+    from pymoo.util.display.single import SingleObjectiveOutput
+
     return isinstance(getattr(algorithm, "output", None), SingleObjectiveOutput) and not isinstance(
         algorithm, RandomSearch
     )

@@ -25,3 +25,10 @@ def test_what_does_not_fit_is_said_with_both_sizes(monkeypatch):
     memory.check_free(3.0 * 2**30, "a.npy: its samples", "take a part")
     with pytest.raises(ModelError, match=r"^a.npy: its samples need about 4.5 GiB, and 3.0 GiB are free; take a part$"):
         memory.check_free(4.5 * 2**30, "a.npy: its samples", "take a part")
+
+
+def test_for_what_is_always_there_nobody_is_asked(monkeypatch):
+    monkeypatch.setattr(memory, "free_memory", lambda: (0.0, 0.0))
+    memory.check_free(memory.NEVER_ASKED, "a.npy: its samples", "take a part")
+    with pytest.raises(ModelError, match=r"need about 1 MiB"):
+        memory.check_free(memory.NEVER_ASKED + 1, "a.npy: its samples", "take a part")

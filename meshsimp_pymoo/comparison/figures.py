@@ -22,7 +22,7 @@ from meshsimp_pymoo.comparison.analysis import TRADE_OFFS, anytime, attainment_s
 from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.statistics import ALPHA, performance_profile
 from meshsimp_pymoo.comparison.store import StoredRun, classic_mesh
-from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study, ranked
+from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study, on_all_models, ranked
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plain_numbers, plot_error, plot_mesh
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -130,7 +130,7 @@ def box_figure(study: Study, cases: Sequence[Case], indicator: str) -> Figure:
     figure, panels = _grid(len(cases), 4.6, 3.6)
     for panel, case in zip(panels, cases, strict=False):
         methods = list(case.runs)
-        values = [np.asarray(getattr(case.scores[m], indicator), dtype=float) for m in methods]
+        values = [case.unary(m, indicator) for m in methods]
         several = [k for k, runs in enumerate(values) if len(runs) > 1]
         if several:
             boxes = panel.boxplot(
@@ -361,7 +361,7 @@ def profiled(cases: Sequence[Case]) -> tuple[list[str], FloatArray]:
         Smaller is better. The only run of a method without chance stands in every row of its model; a seed that
         some method has not done has no row.
     """
-    methods = [method for method in cases[0].runs if all(method in case.runs for case in cases)]
+    methods = on_all_models(cases)
     rows: list[list[float]] = []
     for case in cases:
         found = {m: dict(zip(case.scores[m].seeds.tolist(), case.scores[m].epsilon, strict=True)) for m in methods}

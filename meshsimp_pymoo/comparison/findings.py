@@ -40,6 +40,7 @@ __all__ = [
     "HOLDS",
     "TIME_CLAIMS",
     "UNDECIDED",
+    "UNLIKE",
     "Claim",
     "Comparisons",
     "Finding",
@@ -50,6 +51,9 @@ __all__ = [
 ]
 
 HOLDS, DOES_NOT_HOLD, UNDECIDED = "holds", "does not hold", "not decided here"
+
+# Fronts that took so many times the evaluations of another are no equal work.
+UNLIKE = 1.25
 
 # The two classic methods of the paper; other baselines are no part of its findings.
 _first, _second = (name for name, baseline in BASELINES.items() if baseline.in_paper)
@@ -554,14 +558,16 @@ def _background(claim: Claim, start: Start, cases: Sequence[Case]) -> Iterator[s
     """Say what in the data stands behind a finding."""
     pairs, _ = _methods(start, claim, cases)
     methods = [m for m in dict.fromkeys(m for pair in pairs for m in pair) if m in start.roles.values()]
-    costs = []
+    costs, work = [], []
     for m in methods:
         there = [case for case in cases if m in case.runs]
         evaluations = np.mean([case.evaluations(m).mean() for case in there])
         sizes = np.mean([case.scores[m].cardinality.mean() for case in there])
+        work.append(evaluations)
         costs.append(f"{m} {evaluations:,.0f} evaluations for {sizes:.3g} solutions")
     if costs:
-        yield f"A front: {', '.join(costs)}."
+        unlike = "; no equal work" if max(work) > UNLIKE * min(work) else ""
+        yield f"A front: {', '.join(costs)}{unlike}."
     if claim.key in ("multi_over_classic", "single_over_classic"):
         yield from _uncovered(cases)
     if claim.key == "nsga2_and_moead":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence, Sized
 from typing import Any
 
-from meshsimp_pymoo.comparison.findings import CLAIMS, TIME_CLAIMS, Claim, Finding, times
+from meshsimp_pymoo.comparison.findings import CLAIMS, TIME_CLAIMS, UNLIKE, Claim, Finding, times
 from meshsimp_pymoo.comparison.study import INDICATORS, PROCEDURES, SCORINGS, Study
 from meshsimp_pymoo.comparison.tables import Table, markdown_text, ranking
 from meshsimp_pymoo.formats.table import listed
@@ -17,11 +17,11 @@ HOW = (
     "How a verdict comes about: every pair of methods that start alike is compared at the level of 0.05. *Run "
     "against run* takes every run on every model (rank sums; signs against a method without chance), with Holm's "
     "correction over the models. *Merged fronts* are those of the paper's section 4.3: the runs of a method as "
-    "one front, of the weighted-sum GA its eleven weights of one seed, so that both have made about as many "
-    "evaluations; there is one number for each model, and the signed-rank test over the models. *Better* holds if"
-    " it is so significantly in more than half of the comparisons and the reverse in none, and does not hold if "
-    "the reverse is significant anywhere. *No different* holds if nothing is significant though it could be. All "
-    "else is not decided here. The tables hold every comparison."
+    "one front, of the weighted-sum GA its eleven weights of one seed, so that at equal generations ten runs have"
+    " made about as many evaluations; there is one number for each model, and the signed-rank test over the "
+    "models. *Better* holds if it is so significantly in more than half of the comparisons and the reverse in "
+    "none, and does not hold if the reverse is significant anywhere. *No different* holds if nothing is "
+    "significant though it could be. All else is not decided here. The tables hold every comparison."
 )
 SCORED = (
     "*Error as searched* is the paper's reading: a vertex that no triangle covers costs nothing. Meshes of other tools "
@@ -179,10 +179,6 @@ def reservations(study: Study) -> list[str]:
         differing = sorted({k for v in study.versions for k in v if any(v.get(k) != o.get(k) for o in study.versions)})
         lines.append(f"the runs were made with different versions of {listed(differing)}")
     return lines + _unlike(study)
-
-
-# Fronts that took so many times the evaluations of another are no equal work.
-UNLIKE = 1.25
 
 
 def _unlike(study: Study) -> list[str]:

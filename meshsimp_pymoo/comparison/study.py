@@ -597,6 +597,11 @@ class Study:
         return Case(problem, budget, scoring, runs, sources, tuple(classic))
 
 
+def on_all_models(cases: Sequence[Case]) -> list[str]:
+    """Return the methods that have runs on every model, in their order."""
+    return [method for method in cases[0].runs if all(method in case.runs for case in cases)]
+
+
 def ranked(cases: Sequence[Case]) -> tuple[list[str], Friedman]:
     """Rank methods on every model by the median hypervolume ratio of their runs; Friedman's test over the models.
 
@@ -617,7 +622,7 @@ def ranked(cases: Sequence[Case]) -> tuple[list[str], Friedman]:
     ValueError
         If they are fewer than two.
     """
-    methods = [method for method in cases[0].runs if all(method in case.runs for case in cases)]
+    methods = on_all_models(cases)
     medians = np.array([[np.median(case.scores[method].hvr) for method in methods] for case in cases])
     return methods, friedman(medians)
 

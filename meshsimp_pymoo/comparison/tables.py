@@ -32,7 +32,16 @@ import numpy as np
 
 from meshsimp_pymoo.comparison.analysis import PairTable, selected_solutions
 from meshsimp_pymoo.comparison.statistics import Summary, magnitude, signed_rank, summarise
-from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, EPSILON_SHIFT, INDICATORS, SCORINGS, Case, Study, ranked
+from meshsimp_pymoo.comparison.study import (
+    CLASSIC_NAMES,
+    EPSILON_SHIFT,
+    INDICATORS,
+    SCORINGS,
+    Case,
+    Study,
+    on_all_models,
+    ranked,
+)
 from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = [
@@ -200,7 +209,7 @@ def ranking(study: Study, budget: str, scoring: str) -> Table:
     ranks: dict[str, float] = {}
     alike: set[str] = set()
     said = "no two methods on all models"
-    if sum(all(method in values for values in medians) for method in medians[0]) > 1:
+    if len(on_all_models(cases)) > 1:
         methods, found = ranked(cases)
         ranks = dict(zip(methods, map(float, found.mean_ranks), strict=True))
         best = int(np.argmin(found.mean_ranks))

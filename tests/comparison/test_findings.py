@@ -109,7 +109,10 @@ def test_merged_runs_may_win_where_single_ones_lose(tmp_path):
     assert "N1 and G1: 1 against" in merged.reason
     assert "ahead on 6 and behind on 0 models, p = 0.0312" in merged.reason  # 2 / 2 ** 6
     # eight runs of 900 evaluations together, against two searches of 900 for every front of the GA
-    assert merged.background == "A front: N1 7,200 evaluations for 8 solutions, G1 1,800 evaluations for 8 solutions."
+    assert (
+        merged.background
+        == "A front: N1 7,200 evaluations for 8 solutions, G1 1,800 evaluations for 8 solutions; no equal work."
+    )
 
 
 def test_methods_are_compared_with_those_that_start_alike(tmp_path):
