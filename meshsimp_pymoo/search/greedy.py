@@ -27,6 +27,7 @@ from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.moves import (
     cells_around,
+    effort,
     exchange,
     is_site,
     n_cells,
@@ -200,6 +201,10 @@ def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:
     return surface.pinned.copy() if pinned is None else surface.pinned | pinned
 
 
+# A site of more cells than this is a hub; it is costed again after this share of them has seen a removal.
+HUB = 48
+PATIENCE = 0.125
+
 # ------------------------------------------------------------------------------------------------- a heap of keys
 
 
@@ -241,6 +246,13 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
     at[v] = k
 
 
+@inner
+def _cost_again(g: Any, live: Any, v: int, key: np.ndarray, patience: np.ndarray) -> None:
+    key[v], _ = try_exchange(g, live, v, -1, np.inf)
+    cells = effort(g, live)
+    patience[v] = np.int64(PATIENCE * cells) if cells > HUB else 0
+
+
 @entry
 def thin(
     ground: Any,
@@ -254,6 +266,10 @@ def thin(
     triangles: np.ndarray,
 ) -> int:
     """Remove the vertex that adds the least cost while that is at most ``limit`` and triangles exceed ``least``.
+
+    What is removed has been costed exactly at that moment. Only a site of more than ``HUB`` cells may cost less than
+    is known, and go later than it could: it is costed again when it comes to the top of the heap, or ``PATIENCE`` of
+    its cells have seen a removal, as doing so after each would take the square of its cells.
 
     Parameters
     ----------
@@ -276,12 +292,14 @@ def thin(
     key = np.empty(n_all, np.float64)
     heap = np.empty(n_all, np.int32)
     at = np.empty(n_all, np.int32)
+    # How many removals beside a hub are left before it is costed again; below 0 once there was one.
+    patience = np.zeros(n_all, np.int32)
     n = 0
     for v in range(n_all):
         key[v] = np.inf
         at[v] = -1
         if is_site(g, live, v) and not fixed[v]:
-            key[v], _ = try_exchange(g, live, v, -1, np.inf)
+            _cost_again(g, live, v, key, patience)
             heap[n] = v
             at[v] = n
             n += 1
@@ -291,8 +309,14 @@ def thin(
     triangles[0] = n_triangles(g, live)
     n_removed = 0
     around = np.empty(2 * n_all + 8, np.int64)
-    while n > 0 and key[heap[0]] < np.inf and key[heap[0]] <= limit and triangles[n_removed] > least:
+    while n > 0 and triangles[n_removed] > least:
         v = heap[0]
+        if patience[v] < 0:
+            _cost_again(g, live, v, key, patience)
+            _sift_down(heap, at, key, 0, n)
+            continue
+        if not key[v] < np.inf or key[v] > limit:
+            break
         n -= 1
         heap[0] = heap[n]
         at[heap[0]] = 0
@@ -314,8 +338,12 @@ def thin(
             w = around[k]
             if at[w] < 0:
                 continue
+            if patience[w] != 0:
+                patience[w] = -(abs(patience[w]) - 1)
+                if patience[w] != 0:
+                    continue
             old = key[w]
-            key[w], _ = try_exchange(g, live, w, -1, np.inf)
+            _cost_again(g, live, w, key, patience)
             if key[w] < old:
                 _sift_up(heap, at, key, at[w])
             else:

@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.surface.books import RUN
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
@@ -29,6 +31,7 @@ class Ground(NamedTuple):
     start: np.ndarray
     items: np.ndarray
     faces: np.ndarray
+    boxes: np.ndarray  # (2 N / RUN, 4) of the vertices in each node of the tree over runs of them, see bare
     nearest: bool  # whether an uncovered vertex costs its distance
     weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
     weighed: bool  # whether the cost of a vertex in a sum is not d_p itself, but what weighed_cost makes of it
@@ -57,6 +60,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         start=footprint.start,
         items=footprint.items,
         faces=footprint.faces,
+        boxes=boxes_of_runs(xy, RUN),
         nearest=rules.outside == "nearest",
         weight=weight,
         weighed=squared or len(weight) > 0,

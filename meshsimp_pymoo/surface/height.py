@@ -11,9 +11,10 @@ import numpy as np
 from scipy import sparse
 
 from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.surface.books import Live, make_live
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.ground import Ground, make_ground
-from meshsimp_pymoo.surface.live import Live, build, make_live
+from meshsimp_pymoo.surface.live import build
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.pins import pinned_vertices

@@ -9,18 +9,10 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, IntArray, require_bool
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.triangulation import RECORD
+from meshsimp_pymoo.surface.books import EMITTED, END, N_EMITTED, PEAK, make_live
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.live import (
-    EMITTED,
-    END,
-    N_EMITTED,
-    PEAK,
-    build,
-    exchange_once,
-    make_live,
-    try_exchange_once,
-)
+from meshsimp_pymoo.surface.live import build, exchange_once, try_exchange_once
 from meshsimp_pymoo.surface.surface import error_of, movable_ground
 
 

@@ -126,6 +126,11 @@ def sites_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     return int(_unanswered())
 
 
+def effort(ground: Any, books: Any) -> int:
+    """Return how many cells at site v the last `try_exchange` has found: what trying it again takes."""
+    return int(_unanswered())
+
+
 def n_cells(ground: Any, books: Any) -> int:
     """Return the number of cells there have been: all numbers are below."""
     return int(_unanswered())

@@ -25,8 +25,8 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.live import END
 from meshsimp_pymoo.surface.model import OpenModel, placed_model
 from meshsimp_pymoo.surface.rules import Rules
 

@@ -318,6 +318,12 @@ def _is_site(ground: Round, books: Kept, v: int) -> bool:
     return books.site[v]
 
 
+@answers(moves.effort, Round)
+@njit(nogil=True)
+def _effort(ground: Round, books: Kept) -> int:
+    return 2
+
+
 @answers(moves.is_taken, Round)
 @njit(nogil=True)
 def _is_taken(ground: Round, books: Kept, w: int) -> bool:
