@@ -88,6 +88,8 @@ class Live(NamedTuple):
     star_side: np.ndarray  # (N,)
     star_inserted: np.ndarray  # (N,)
     nodes: np.ndarray  # (64,) of the tree, to be looked at
+    distances: np.ndarray  # (64,) how far they are
+    candidates: np.ndarray  # (24,) segments that can be nearest to vertices that lie together
     gone: np.ndarray  # (2 MOST_TOUCHED,) triangles that a tentative change takes away
     forms: np.ndarray  # (2 MOST_TOUCHED, 13) sides and planes of those that would come, see trial
     shown: np.ndarray  # (2 MOST_TOUCHED,) whether each of them would be emitted
@@ -144,6 +146,8 @@ def make_live(n_vertices: int) -> Live:
         star_side=np.empty(n, np.int32),
         star_inserted=np.empty(n, np.uint8),
         nodes=np.empty(64, np.int64),
+        distances=np.empty(64, np.float64),
+        candidates=np.empty(24, np.uint32),
         gone=np.empty(2 * MOST_TOUCHED, np.int64),
         forms=np.empty((2 * MOST_TOUCHED, 13), np.float64),
         shown=np.empty(2 * MOST_TOUCHED, np.uint8),

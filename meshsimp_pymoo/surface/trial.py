@@ -16,8 +16,10 @@ from meshsimp_pymoo.surface.bare import (
     corners_of,
     farthest,
     is_segment,
+    list_candidates,
     may_reach,
-    nearest,
+    middle_of,
+    nearest_of,
     rank,
     rank_of,
     slot,
@@ -394,7 +396,7 @@ def _nearest_coming(g: Ground, live: Live, n_coming: int, i: int, own: int, gap:
 
 
 @inner
-def _cost_if_homeless(g: Ground, live: Live, n_coming: int, i: int, guess: int) -> tuple[float, int]:
+def _cost_if_homeless(g: Ground, live: Live, n_coming: int, n_candidates: int, i: int, guess: int) -> tuple[float, int]:
     """Return the cost of bare vertex i by the nearest of the segments that stay or come, and the nearest that stays.
 
     ``guess`` is one that stays, or NONE.
@@ -411,7 +413,7 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, i: int, guess: int) 
             h = guess
             gap = d
     bound = gap
-    h, gap = nearest(g, live, x, y, h, gap)
+    h, gap = nearest_of(g, live, n_candidates, x, y, h, gap)
     if h != NONE and near >= 0 and gap == bound:
         # As near as one that comes, unless it is nearer.
         d = squared_gap(g.xy, coming[near, 0], coming[near, 1], x, y)
@@ -582,8 +584,14 @@ def _at_outline(
                     n_homeless += 1
                 i = np.int64(live.bare_after[i])
         guess = np.int64(NONE)
+        known = np.inf
+        if n_homeless > 0:
+            x, y, _ = middle_of(xy, homeless, n_homeless)
+            for k in range(n_coming):
+                known = min(known, squared_gap(xy, live.coming[k, 0], live.coming[k, 1], x, y))
+        n_candidates = list_candidates(g, live, homeless, n_homeless, known)
         for k in range(n_homeless):
-            d, guess = _cost_if_homeless(g, live, n_coming, homeless[k], guess)
+            d, guess = _cost_if_homeless(g, live, n_coming, n_candidates, homeless[k], guess)
             change += d
         d, n_tried = _drawn_near(g, live, n_coming, n_tried)
         change += d
