@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from importlib import metadata
+from itertools import cycle
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -104,8 +105,11 @@ def test_the_front_is_what_a_pymoo_user_gets(tmp_path):
 
 @pytest.mark.parametrize(
     ("algorithm", "budget"),
-    [("memetic", ("--generations", "2")), ("memetic", ("--moves", "20000"))]
-    + [(name, budget) for name in ALGORITHMS[1:] for budget in (("--generations", "4"), ("--evaluations", "40"))],
+    [
+        ("memetic", ("--generations", "2")),
+        ("memetic", ("--moves", "20000")),
+        *zip(ALGORITHMS[1:], cycle([("--generations", "4"), ("--evaluations", "40")]), strict=False),
+    ],
 )
 def test_one_seed_gives_the_same_bytes_with_one_and_two_threads(tmp_path, monkeypatch, algorithm, budget):
     written = []

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from counts import tried
 from drawing import overlaps
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.population import Population
@@ -476,8 +475,9 @@ def in_a_child(config: str, out: str, begun: str) -> None:
 
 
 @pytest.mark.skipif("forkserver" not in multiprocessing.get_all_start_methods(), reason="needs a fork server")
-@tried("most", 3)
-def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(config, tmp_path, reference, most):
+@pytest.mark.slow
+def test_killed_at_random_moments_and_resumed_the_tables_are_the_same_bytes(config, tmp_path, reference):
+    most = 60
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["meshsimp_pymoo.comparison.runner", "meshsimp_pymoo.comparison.report"])
     rng = random.Random(5)
@@ -538,6 +538,7 @@ def test_killed_with_its_processes_at_work_it_leaves_none_behind_and_goes_on(con
     assert results(out) == results(reference)
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
     distributed = pytest.importorskip("distributed")
     with (
@@ -551,6 +552,7 @@ def test_a_dask_cluster_leaves_the_same_tables(config, tmp_path, reference):
 
 def test_a_process_that_dies_is_answered_in_one_line(config, tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "_work_on", die)
+    monkeypatch.setattr("meshsimp_pymoo.workers.TRIES", 1)  # each starts two processes
     with pytest.raises(ResultError, match=r"a process ended unexpectedly .* the same command does the rest"):
         run_experiment(config, tmp_path / "out", jobs=2)
 

@@ -23,8 +23,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the limits of m
 
 # Deaths of the worker after which nothing more is tried.
 DEATHS = 5
-# Cases of the files that expand, and how many of them the usual suite tries.
-EXPANDING, USUAL = 10_000, 500
+# Cases of the files that expand that ``-m slow`` tries.
+EXPANDING = 10_000
 
 
 def run_worker(kind: str, seed: int, first: int, end: int, folder: Path) -> tuple[list[dict], dict | None, str]:
@@ -38,8 +38,7 @@ def run_worker(kind: str, seed: int, first: int, end: int, folder: Path) -> tupl
 
 @pytest.mark.parametrize("kind", mutations.KINDS)
 def test_every_damaged_input_ends_in_a_result_or_in_one_line(kind, tmp_path, request):
-    cases = request.config.getoption("--fuzz-cases")
-    check_cases(kind, max(cases, USUAL) if kind == "expanding" else cases, tmp_path, request)
+    check_cases(kind, request.config.getoption("--fuzz-cases"), tmp_path, request)
 
 
 @pytest.mark.slow

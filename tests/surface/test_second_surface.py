@@ -368,7 +368,11 @@ ALGORITHMS = {
 }
 
 
-@pytest.mark.parametrize("name", ALGORITHMS)
+@pytest.mark.parametrize(
+    "name",
+    # pymoo compiles for AGE-MOEA, each time
+    [pytest.param(name, marks=pytest.mark.slow if name == "AGEMOEA" else ()) for name in ALGORITHMS],
+)
 def test_without_moves_every_algorithm_that_only_evaluates_runs(unmovable, name, tmp_path):
     result = minimize(unmovable, ALGORITHMS[name](), ("n_gen", 5), seed=1)
     X, F = np.atleast_2d(result.X), np.atleast_2d(result.F)
