@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -39,6 +38,7 @@ from meshsimp_pymoo.surface.moves import (
     worst_in,
 )
 from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
+from meshsimp_pymoo.workers import on_threads
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,12 @@ class NestedFront:
 
 
 def thinning(
-    surface: Surface, pinned: BoolArray | None = None, *, kept: BoolArray | None = None, least: int = 0
+    surface: Surface,
+    pinned: BoolArray | None = None,
+    *,
+    kept: BoolArray | None = None,
+    least: int = 0,
+    stop: BoolArray | None = None,
 ) -> NestedFront:
     """Remove the vertex whose removal adds the least error, until only the pinned ones are left.
 
@@ -99,10 +104,13 @@ def thinning(
         The subset to start from; all vertices by default (of several at one position, the first).
     least : int
         Stop once there are this many triangles or fewer.
+    stop : (1,) bool array, optional
+        Another thread that sets it ends the thinning soon after, with the front as far as it came.
 
     Returns
     -------
     NestedFront
+        Where it was stopped, the larger subsets of the whole one: nothing else differs.
 
     Raises
     ------
@@ -114,11 +122,17 @@ def thinning(
     ground = movable_ground(surface, "thinning and insertion")
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
-    with surface.books(np.ones(n_all, bool) if kept is None else kept | fixed, fixed=fixed) as books:
-        sites, _, _ = snapshot(ground, books, n_all)
-        n = int((sites & ~fixed).sum())
-        removed, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
-        n_removed = thin(ground, books, n_all, fixed, least, np.inf, removed, error, triangles)
+    flag = np.zeros(1, np.bool_) if stop is None else stop
+
+    def work(kept: BoolArray | None) -> tuple[Any, ...]:
+        with surface.books(np.ones(n_all, bool) if kept is None else kept | fixed, fixed=fixed) as books:
+            sites, _, _ = snapshot(ground, books, n_all)
+            n = int((sites & ~fixed).sum())
+            removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
+            n_removed = thin(ground, books, n_all, fixed, least, np.inf, flag, removed, error, triangles)
+        return sites, removed, error, triangles, n_removed
+
+    ((sites, removed, error, triangles, n_removed),) = on_threads(work, [kept], stop=flag)
     sites[removed[:n_removed]] = False
     return NestedFront(
         np.flatnonzero(sites),
@@ -129,19 +143,13 @@ def thinning(
     )
 
 
-def thinned(surface: Surface) -> NestedFront:
-    """Return the thinning of a surface, computed once as long as the surface is there."""
-    front = _THINNED.get(surface)
-    if front is None:
-        front = _THINNED[surface] = thinning(surface)
-    return front
-
-
-_THINNED: WeakKeyDictionary[Any, NestedFront] = WeakKeyDictionary()
-
-
 def greedy_insertion(
-    surface: Surface, pinned: BoolArray | None = None, *, choose: str = "point", most: int | None = None
+    surface: Surface,
+    pinned: BoolArray | None = None,
+    *,
+    choose: str = "point",
+    most: int | None = None,
+    stop: BoolArray | None = None,
 ) -> NestedFront:
     """Insert the worst vertex, starting from the pinned ones.
 
@@ -155,6 +163,8 @@ def greedy_insertion(
         The vertex with the largest cost of all, or that of the triangle with the largest sum of costs.
     most : int, optional
         Number of vertices to insert; all by default.
+    stop : (1,) bool array, optional
+        Another thread that sets it ends the insertion soon after, with the front as far as it came.
 
     Returns
     -------
@@ -175,16 +185,22 @@ def greedy_insertion(
         raise ValueError(f"most={most} is no number of vertices; give 0 or more")
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
-    with surface.books(fixed, fixed=fixed) as books:
-        sites = np.flatnonzero(snapshot(ground, books, n_all)[0])
-        n = n_all - len(sites) if most is None else min(most, n_all - len(sites))
-        inserted, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
-        n_inserted = _grow(ground, books, n_all, choose == "point", inserted, error, triangles)
+    flag = np.zeros(1, np.bool_) if stop is None else stop
+
+    def work(by_point: bool) -> tuple[Any, ...]:
+        with surface.books(fixed, fixed=fixed) as books:
+            sites = np.flatnonzero(snapshot(ground, books, n_all)[0])
+            n = n_all - len(sites) if most is None else min(most, n_all - len(sites))
+            inserted, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
+            n_inserted = _grow(ground, books, n_all, by_point, flag, inserted, error, triangles)
+        return sites, inserted, error, triangles, n_inserted
+
+    ((sites, inserted, error, triangles, n_inserted),) = on_threads(work, [choose == "point"], stop=flag)
     return NestedFront(
         sites,
-        inserted[:n_inserted],
+        inserted[:n_inserted].copy(),
         error_of(surface, _not_below_0(error[: n_inserted + 1])),
-        triangles[: n_inserted + 1],
+        triangles[: n_inserted + 1].copy(),
         n_all,
     )
 
@@ -261,6 +277,7 @@ def thin(
     fixed: np.ndarray,
     least: int,
     limit: float,
+    stop: np.ndarray,
     removed: np.ndarray,
     error: np.ndarray,
     triangles: np.ndarray,
@@ -277,6 +294,8 @@ def thin(
         Of a surface of ``n_all`` vertices; the books end at the last mesh.
     fixed : (n_all,) bool array
         Sites that stay.
+    stop : (1,) bool array
+        Ends it where another thread sets it.
     removed : (n,) int array
         Filled with the vertices removed, in their order; n is the number of sites that are not fixed.
     error, triangles : (n + 1,) arrays
@@ -296,6 +315,9 @@ def thin(
     patience = np.zeros(n_all, np.int32)
     n = 0
     for v in range(n_all):
+        if stop[0]:
+            n = 0
+            break
         key[v] = np.inf
         at[v] = -1
         if is_site(g, live, v) and not fixed[v]:
@@ -309,7 +331,7 @@ def thin(
     triangles[0] = n_triangles(g, live)
     n_removed = 0
     around = np.empty(2 * n_all + 8, np.int64)
-    while n > 0 and triangles[n_removed] > least:
+    while n > 0 and triangles[n_removed] > least and not stop[0]:
         v = heap[0]
         if patience[v] < 0:
             _cost_again(g, live, v, key, patience)
@@ -357,6 +379,7 @@ def _grow(
     books: Any,
     n_all: int,
     by_point: bool,
+    stop: np.ndarray,
     inserted: np.ndarray,
     error: np.ndarray,
     triangles: np.ndarray,
@@ -392,7 +415,7 @@ def _grow(
                 n += 1
             _sift_up(heap, at, key, at[r])
             _sift_down(heap, at, key, at[r], n)
-        if n_inserted == len(inserted) or n == 0 or key[heap[0]] == np.inf:
+        if n_inserted == len(inserted) or n == 0 or key[heap[0]] == np.inf or stop[0]:
             return n_inserted
         v = best[heap[0]]
         exchange(g, live, -1, v)
