@@ -194,14 +194,6 @@ def test_the_classic_fronts_follow_the_measure_and_the_weights(method, measure):
     assert (front.error[k] < rival).mean() > 0.6
 
 
-def test_a_maximum_is_no_sum_and_is_refused():
-    for call in (thinning, greedy_insertion):
-        with pytest.raises(ValueError, match="lower a sum over the vertices, and 'max_error' is none"):
-            call(surface(MODELS["grid"], measure="max_error"))
-    with pytest.raises(ValueError, match="lower a sum over the vertices, and 'max_error' is none"):
-        LiveTriangulation(surface(MODELS["grid"], measure="max_error"), np.ones(81, bool))
-
-
 def test_what_was_tried_before_leaves_nothing_behind_in_what_is_tried_next():
     """Not even where a site of three triangles goes, so that one triangle takes all its vertices."""
     model = MODELS["terrain"]
