@@ -28,7 +28,6 @@ from meshsimp_pymoo import (
     LiveTriangulation,
     MeshProblem,
     NeighbourShift,
-    NestedSubsets,
     Options,
     PinnedCorners,
     RandomSubset,
