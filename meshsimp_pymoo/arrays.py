@@ -76,3 +76,14 @@ class Rows:
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> AnyArray:
         return np.asarray(self._make(np.arange(self._count)), dtype=dtype)
+
+
+def spread(n: int) -> list[int]:
+    """Return the numbers below n in an order in which the first so many are spread over all, as far as they go.
+
+    >>> spread(6)
+    [0, 4, 2, 1, 5, 3]
+    """
+    bits = max(n - 1, 1).bit_length()
+    # van der Corput's sequence in base 2
+    return [place for k in range(1 << bits) if (place := int(f"{k:0{bits}b}"[::-1], 2)) < n]

@@ -49,6 +49,10 @@ class ModelWarning(UserWarning):
     """The input is usable, but something in it was dropped or is doubtful."""
 
 
+class SearchWarning(UserWarning):
+    """A search could not begin as it does with more time; what it finds is right, but there is less of it."""
+
+
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return which of the known words was meant, most likely; None if none is near.
 

@@ -34,10 +34,10 @@ from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
-from meshsimp_pymoo.search.budgets import moves_of
+from meshsimp_pymoo.search.budgets import moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
-from meshsimp_pymoo.search.greedy import thinned
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
+from meshsimp_pymoo.search.starting import begun, thinned
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
@@ -296,16 +296,15 @@ class Front(Sequence[FrontSolution]):
             If none of them is a mesh that meets the constraints.
         """
         rows = np.atleast_2d(np.asarray(kept))
-        if ends:
-            rows = np.vstack([rows, np.ones(problem.n_var, dtype=bool), problem.pinned])
-        table = problem.evaluate_subsets(rows)
-        usable = np.array([_is_feasible(problem, row) for row in table])
-        if not usable.any():
+        known = [np.ones((1, problem.n_var), dtype=bool), problem.pinned[None]] if ends else []
+        table = np.vstack([problem.evaluate_subsets(some) for some in (rows, *known)])
+        usable = np.flatnonzero([_is_feasible(problem, row) for row in table])
+        if not len(usable):
             raise LookupError(
-                f"{problem.model.name}: none of {len(rows)} subsets of its vertices is a mesh that meets the "
+                f"{problem.model.name}: none of {len(table)} subsets of its vertices is a mesh that meets the "
                 "constraints; search longer, or loosen max_triangles and max_error"
             )
-        rows, table = rows[usable] | problem.pinned, table[usable]
+        table = table[usable]
         quality = [problem.as_quality(row) for row in table]
         F = _objectives(quality, problem.objectives)
         best = {row.tobytes() for row in non_dominated(F)}
@@ -315,7 +314,10 @@ class Front(Sequence[FrontSolution]):
             if key in best:
                 first.setdefault(key, int(row))
         chosen = list(first.values())
-        return cls([quality[row] for row in chosen], rows[chosen], problem=problem)
+        solutions = np.empty((len(chosen), problem.n_var), dtype=bool)
+        for solution, row in zip(solutions, usable[chosen], strict=True):
+            np.logical_or(rows[row] if row < len(rows) else known[row - len(rows)][0], problem.pinned, out=solution)
+        return cls([quality[row] for row in chosen], solutions, problem=problem)
 
     @classmethod
     def from_result(cls, result: Any, *, ends: bool = True) -> Front:
@@ -577,6 +579,7 @@ class Front(Sequence[FrontSolution]):
         pictures: bool = True,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
+        until: float | None = None,
     ) -> Path:
         """Write the front as ``meshsimp simplify`` does: numbers, the record and meshes; then pictures and the page.
 
@@ -603,6 +606,8 @@ class Front(Sequence[FrontSolution]):
             With the page on which to look at the solutions and choose one.
         run : mapping, optional
             What else to record in run.json.
+        until : float, optional
+            Meshes that would not be written by ``perf_counter() = until`` are left out.
 
         Raises
         ------
@@ -633,6 +638,7 @@ class Front(Sequence[FrontSolution]):
             series=self.series,
             run=record,
             overwrite=overwrite,
+            until=until,
         )
         if pictures:
             Front.load(folder, model=surface).draw(page=page)
@@ -812,7 +818,7 @@ def _say_limits() -> None:
 _say_limits()
 
 
-def starting_front(problem: MeshProblem, algorithm: Any) -> dict[str, FloatArray]:
+def starting_front(problem: MeshProblem, algorithm: Any, *, interrupted: bool = False) -> dict[str, FloatArray]:
     """Return the front that a search started from, by name, if its first population is one of adaptive thinning.
 
     Parameters
@@ -821,6 +827,8 @@ def starting_front(problem: MeshProblem, algorithm: Any) -> dict[str, FloatArray
         What was searched, with two objectives.
     algorithm : pymoo Algorithm, or None
         The search.
+    interrupted : bool
+        Whether only what is known of it already is wanted.
 
     Returns
     -------
@@ -831,7 +839,10 @@ def starting_front(problem: MeshProblem, algorithm: Any) -> dict[str, FloatArray
     sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
     if not isinstance(sampling, NestedSubsets) or problem.n_obj != 2:
         return {}
-    F = thinned(problem.surface).F
+    start = begun(problem.surface) if interrupted else thinned(problem.surface, seconds_given(algorithm))
+    if start is None:
+        return {}
+    F = np.column_stack([start.error, start.triangles])
     F = non_dominated(F[F[:, 1] > 0])
     F = F[np.argsort(F[:, 1])]
     wanted = np.geomspace(F[0, 1], F[-1, 1], START_POINTS)

@@ -43,7 +43,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray, spread
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
     new_folder,
@@ -75,6 +75,8 @@ REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were f
 SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", *COUNTED)
 MOST_COUNTED = 2**53  # no mesh has so many triangles
+# What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
+SECONDS_A_CORNER = 5e-7
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 PICTURES = ("front.png", "report.html")  # made once all else is in place
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
@@ -208,6 +210,7 @@ def write_front(
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
     overwrite: bool = False,
+    until: float | None = None,
 ) -> Path:
     """Write a front, its meshes and the record of its run to a new folder, all or nothing, without pictures.
 
@@ -247,6 +250,8 @@ def write_front(
         What to record in run.json beside the package versions and the model.
     overwrite : bool
         Replace results that exist.
+    until : float, optional
+        Meshes that would not be written by ``perf_counter() = until`` are left out, but for that of ``chosen``.
 
     Returns
     -------
@@ -286,34 +291,46 @@ def write_front(
     target = folder.resolve()
     with new_folder(folder, replace=overwrite) as partial:
         digits = max(3, len(str(len(order) - 1)))
-        rows, single = [], 0.0
+        files: dict[int, tuple[str, list[str]]] = {}
+        single, pace = 0.0, SECONDS_A_CORNER
         if with_mesh:
             (partial / "meshes").mkdir()
             if refit is not None:
                 (partial / "refitted").mkdir()
-        for solution, row in enumerate(order):
-            path, fitted = "", ["", ""]
-            if faces is not None and (solution in with_mesh or row == chosen):
-                triangles = faces(int(row))
-                arrays = mesh_arrays(model, triangles)
-                single = max(single, single_precision_shift(arrays[0], surface.view.scale))
+        todo = sorted(with_mesh.union([] if chosen is None else np.flatnonzero(order == chosen).tolist()))
+        if until is not None:  # as many as there is time for, spread over the front
+            todo = [todo[k] for k in spread(len(todo))]
+        for solution in todo:
+            row, path, fitted = order[solution], "", ["", ""]
+            begun, size = time.perf_counter(), model.n_vertices + quality[row].triangles
+            if until is not None and row != chosen and begun + pace * size > until:
+                continue
+            assert faces is not None
+            triangles = faces(int(row))
+            arrays = mesh_arrays(model, triangles)
+            single = max(single, single_precision_shift(arrays[0], surface.view.scale))
+            if solution in with_mesh:
+                path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
+                write_mesh(partial / path, *arrays, **look)
+            if row == chosen and cut is not None:
+                (partial / "chosen").mkdir()
+                for name, part in cut(triangles):
+                    write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
+            elif row == chosen:
+                write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
+            better = None if refit is None else refit(int(row))
+            if better is not None:
+                raised = (better.vertices, *arrays[1:])
+                fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                 if solution in with_mesh:
-                    path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
-                    write_mesh(partial / path, *arrays, **look)
-                if row == chosen and cut is not None:
-                    (partial / "chosen").mkdir()
-                    for name, part in cut(triangles):
-                        write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
-                elif row == chosen:
-                    write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
-                better = None if refit is None else refit(int(row))
-                if better is not None:
-                    raised = (better.vertices, *arrays[1:])
-                    fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
-                    if solution in with_mesh:
-                        write_mesh(partial / fitted[1], *raised, **look)
-                    if row == chosen:
-                        write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **look)
+                    write_mesh(partial / fitted[1], *raised, **look)
+                if row == chosen:
+                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **look)
+            files[solution] = path, fitted
+            pace = max(pace, (time.perf_counter() - begun) / size)
+        rows = []
+        for solution, row in enumerate(order):
+            path, fitted = files.get(solution, ("", ["", ""]))
             numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
             rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
         warn_of_shift(kind, model.name, surface.diagonal, single)

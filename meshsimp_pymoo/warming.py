@@ -94,8 +94,8 @@ def _thinning() -> None:
     from meshsimp_pymoo.search.greedy import thin
 
     surface = _square()
-    n, rows, numbers = surface.n_vertices, np.zeros(9, np.int64), np.zeros(9)
-    _compile_for(thin, *_records(surface), n, surface.pinned, 0, np.inf, rows, numbers, rows)
+    n, rows, numbers = surface.n_vertices, np.zeros(9, np.int32), np.zeros(9)
+    _compile_for(thin, *_records(surface), n, surface.pinned, 0, np.inf, np.zeros(1, np.bool_), rows, numbers, rows)
 
 
 def _moves() -> None:
@@ -107,7 +107,7 @@ def _moves() -> None:
     records, n, rows, state = _records(surface), surface.n_vertices, np.zeros(9, np.int64), np.zeros(1, np.uint64)
     graph, shares, stop = (surface.border, *surface.neighbours), tuple(map(float, USUAL_MOVES)), np.zeros(1, np.bool_)
     _compile_for(anneal, *records, n, rows, n, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows, rows)
-    _compile_for(fit_size, *records, n, surface.pinned, True, 8, state)
+    _compile_for(fit_size, *records, n, surface.pinned, True, 8, state, stop)
 
 
 def _insertion() -> None:

@@ -24,9 +24,20 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, Thr
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Generic, Protocol, TypeVar
 
+from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.errors import reason_of, way_to_install
 
-__all__ = ["DaskEngine", "Engine", "EngineError", "Processes", "Reserve", "Serial", "open_engine", "thread_pool"]
+__all__ = [
+    "DaskEngine",
+    "Engine",
+    "EngineError",
+    "Processes",
+    "Reserve",
+    "Serial",
+    "on_threads",
+    "open_engine",
+    "thread_pool",
+]
 
 # How often a task is tried whose worker dies.
 TRIES = 3
@@ -44,6 +55,7 @@ HELD = (signal.SIGINT,)
 Work = Callable[[Any, Any], Any]
 
 Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 class Reserve(Generic[Item]):
@@ -76,14 +88,61 @@ class Reserve(Generic[Item]):
 
 
 _executors: dict[int, ThreadPoolExecutor] = {}
+# What a thread knows of itself: whether it is one of ours.
+_own = threading.local()
 
 
 def thread_pool(n_threads: int | None = None) -> ThreadPoolExecutor:
     """Return one pool of threads a process and size, so that the threads are started once."""
     n_threads = n_threads or os.cpu_count() or 1
     if n_threads not in _executors:
-        _executors[n_threads] = ThreadPoolExecutor(n_threads, thread_name_prefix="meshsimp")
+        _executors[n_threads] = ThreadPoolExecutor(
+            n_threads, thread_name_prefix="meshsimp", initializer=setattr, initargs=(_own, "is_worker", True)
+        )
     return _executors[n_threads]
+
+
+def on_threads(
+    work: Callable[[Item], Result],
+    items: Iterable[Item],
+    *,
+    n_threads: int | None = None,
+    stop: BoolArray | None = None,
+) -> list[Result]:
+    """Return what ``work`` gives for each item, done by threads while this one waits for them.
+
+    Python acts upon Ctrl-C when the main thread comes back to it, and from a compiled loop that is when the loop has
+    ended; so a loop that takes long is not for the main thread. On Ctrl-C, or if the work fails, ``stop`` is set, what
+    is not begun is left, and the exception is raised when all that was begun has come back.
+
+    Parameters
+    ----------
+    work : callable
+        Called once for each item. Inside of it this function does its items in the thread that it is called in, one
+        after the other: who waited there might wait for himself.
+    items : iterable
+        What there is to do.
+    n_threads : int, optional
+        Threads to share it among; as many as there are cores by default.
+    stop : (1,) bool array, optional
+        A flag that the work looks at; see `search.budgets.stopping`.
+    """
+    todo = list(items)
+    alone = len(todo) == 1 or n_threads == 1
+    if getattr(_own, "is_worker", False) or (alone and threading.current_thread() is not threading.main_thread()):
+        return [work(item) for item in todo]
+    futures: list[Future[Result]] = []
+    try:
+        pool = thread_pool(n_threads)
+        futures.extend(pool.submit(work, item) for item in todo)
+        return [future.result() for future in futures]
+    except BaseException:
+        if stop is not None:
+            stop[:] = True
+        for future in futures:
+            future.cancel()
+        wait(futures)
+        raise
 
 
 def _forget_threads() -> None:

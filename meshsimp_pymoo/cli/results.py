@@ -31,9 +31,13 @@ from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.search.checkpoint import difference
-from meshsimp_pymoo.storage import PICTURES, claim_output, read_front
+from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import known_units, reference_system
+
+# How long results take at most after Ctrl-C, about, and what drawing takes for each vertex of the model [s].
+WAIT_SECONDS = 4.0
+DRAWING_SECONDS = 1.5e-5
 
 # What of a record the summary says again.
 SAID = ("evaluations", "moves", "seconds", "compile_seconds", "seed", "mesh_origin")
@@ -70,10 +74,11 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
     output, folder = request.output, request.output.folder
     front = Front.load(folder, model=surface)
     undrawn = is_interrupted()
+    slow = bool(front.run.get("interrupted")) and DRAWING_SECONDS * surface.n_vertices > WAIT_SECONDS
     with answering(*DRAWING):
         try:
             stop_if_interrupted()
-            if not undrawn:
+            if not (undrawn or slow):
                 with shown.stage("writing", "drawing"), place_for_matplotlib(folder):
                     front.draw(page=output.page, missing=True)
         except KeyboardInterrupt:
@@ -82,8 +87,17 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
     _summarise(front, output)
     if front.run.get("interrupted"):
         say(f"interrupted after {front.run['generations']} generations; {folder} holds the front so far")
+    asked = even_selection(len(front), output.meshes)
+    left_out = sum(front.stored_mesh(row) is None for row in asked)
+    if left_out:
+        say(
+            f"{left_out} of {len(asked)} meshes are left out, so that you need not wait; make one by meshsimp pick "
+            f"{as_argument(folder)} --triangles N -o FILE, with a number of front.csv"
+        )
     if undrawn:
         say(f"interrupted while it was drawn; {folder} holds the results: meshsimp report {as_argument(folder)}")
+    elif slow:
+        say(f"pictures are left out, so that you need not wait; make them by meshsimp report {as_argument(folder)}")
     if front.run.get("interrupted") or undrawn:
         return INTERRUPTED
     missed = "" if front.run["chosen"] is not None else request.wish.of(front)[1]

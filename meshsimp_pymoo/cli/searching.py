@@ -10,13 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
 
+from meshsimp_pymoo.arrays import spread
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
-from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures
+from meshsimp_pymoo.cli.results import WAIT_SECONDS, hand_over, hand_over_stored, lacks_pictures
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
     INTERRUPTED,
@@ -34,7 +36,7 @@ from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, listed
 from meshsimp_pymoo.front import Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
-from meshsimp_pymoo.search.budgets import Moves, WholeGenerations, moves_of, spread
+from meshsimp_pymoo.search.budgets import Moves, WholeGenerations, moves_of
 from meshsimp_pymoo.search.checkpoint import (
     CheckpointError,
     Checkpoints,
@@ -43,8 +45,10 @@ from meshsimp_pymoo.search.checkpoint import (
     read_checkpoint,
     restore,
 )
-from meshsimp_pymoo.search.memetic import sweep_generations
+from meshsimp_pymoo.search.memetic import FEWEST, measurable, sweep_generations
+from meshsimp_pymoo.search.operators import NestedSubsets
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
+from meshsimp_pymoo.search.starting import begun
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import (
     CHECKPOINT,
@@ -54,12 +58,13 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
-from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.warming import SEARCH
 
 # Of the time that is given, the share kept for the best heights of the meshes.
 REFIT_SHARE = 0.3
+# Of that time, the share for measuring what a search was to start from.
+MEASURED_SHARE = 0.3
 # What writing takes about: for any model, and times the root of its vertices [s].
 WRITING_SECONDS = (1.4, 0.02)
 
@@ -91,15 +96,6 @@ def _simplify(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
-    measure = OBJECTIVES[request.rules.measure]
-    if PRESETS[search.algorithm].sums_only and not measure.is_sum:
-        others = [name for name, preset in PRESETS.items() if preset.whole_front and not preset.sums_only]
-        sums = [known.minimised for known in OBJECTIVES.values() if known.is_sum]
-        raise UsageError(
-            f"--measure {measure.minimised} is not for the {search.algorithm} search, which thins and moves vertices "
-            f"by sums over the vertices; use --algorithm {' or '.join(others)} with it, or --measure "
-            f"{' or '.join(sums)}"
-        )
     with compiling((*SEARCH, "scores") if output.refit else SEARCH, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
@@ -171,7 +167,8 @@ class _Found:
     evaluations: int
     moves: int | None
     seconds: float
-    interrupted: bool
+    #: When it was interrupted, until when whoever did that is to wait, by ``time.perf_counter``.
+    until: float | None
 
 
 def budget(search: Search) -> dict[str, float]:
@@ -208,6 +205,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
     """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
     timed = keeper.request.search.time is not None
     found, generations, interrupted = None, 0, False
+    until = None
     try:
         with answering("stopping: the front so far is written next"), shown.stage("searching", "searching") as show:
             algorithm, before = keeper.begin()
@@ -223,20 +221,32 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             keeper.keep(last=True)
             stop_if_interrupted()
     except KeyboardInterrupt:
-        interrupted = True
-    if found is None:
+        interrupted, until = True, time.perf_counter() + WAIT_SECONDS
+        if found is None and (start_so_far := begun(problem.surface)) is not None:
+            say(f"the search had not begun yet; the front is of {start_so_far}, of its start")
+    X = np.asarray(found.get("X"), dtype=bool) if found is not None else _subsets_begun(problem, algorithm)
+    if X is None:
         return None
     seconds = before + time.perf_counter() - start
     try:
         # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
-        front = Front.from_subsets(problem, np.asarray(found.get("X"), dtype=bool), ends=True)
+        front = Front.from_subsets(problem, X, ends=True)
     except LookupError:
         raise UsageError(
             f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "
             "inside its outline; search longer, or pass --footprint hull"
         ) from None
-    front.series |= starting_front(problem, algorithm)
-    return _Found(front, generations, algorithm.evaluator.n_eval, moves_of(algorithm), seconds, interrupted)
+    front.series |= starting_front(problem, algorithm, interrupted=interrupted)
+    return _Found(front, generations, algorithm.evaluator.n_eval, moves_of(algorithm), seconds, until)
+
+
+def _subsets_begun(problem: MeshProblem, algorithm: Any) -> NDArray[np.bool_] | None:
+    """Return subsets of what there is of a search's start, as many as can be measured soon; None if there is none."""
+    sampling, start = getattr(algorithm.initialization, "sampling", None), begun(problem.surface)
+    if start is None or not isinstance(sampling, NestedSubsets):
+        return None
+    n = min(max(measurable(problem, MEASURED_SHARE * WAIT_SECONDS), FEWEST), algorithm.pop_size)
+    return np.array([start.kept(int(row)) for row in np.unique(sampling.rows(start, n))])
 
 
 class Keeper:
@@ -354,7 +364,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
             "seconds": round(found.seconds, 3),
             **{name: round(seconds, 3) for name, seconds in keeper.before.items()},
             **({} if fitted is None else {"refit_seconds": round(shown.seconds["refitting"], 3)}),
-            "interrupted": found.interrupted,
+            "interrupted": found.until is not None,
         }
         with shown.stage("writing", "writing"):
             front.save(
@@ -367,6 +377,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
                 refit=fitted or output.refit,
                 pictures=False,
                 run=run,
+                until=found.until,
             )
     except (ResultError, KeyboardInterrupt) as stop:
         if not (keeper.is_kept and keeper.path.exists()):
@@ -384,9 +395,11 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
     order = [rows[k] for k in spread(len(rows))]
     if chosen is not None:
         order = [chosen.solution, *(row for row in order if row != chosen.solution)]
-    until = None
-    if limit is not None:  # who interrupts a search does not want to wait for what it has not used
-        until = time.perf_counter() + (REFIT_SHARE * limit if found.interrupted else limit - found.seconds)
+    until, begun_at = None, time.perf_counter()
+    if found.until is not None:  # who interrupts a search does not want to wait
+        until = begun_at + REFIT_SHARE * max(found.until - begun_at, 0.0)
+    elif limit is not None:
+        until = begun_at + limit - found.seconds
     fitted: dict[int, Refitted] = {}
     longest = 0.0
     with shown.stage("refitting", "refitting") as show:

@@ -19,17 +19,6 @@ from meshsimp_pymoo.settings import Whole
 End = TypeVar("End", bound=Termination)
 
 
-def spread(n: int) -> list[int]:
-    """Return the numbers below n in an order in which the first so many are spread over all, as far as they go.
-
-    >>> spread(6)
-    [0, 4, 2, 1, 5, 3]
-    """
-    bits = max(n - 1, 1).bit_length()
-    # van der Corput's sequence in base 2
-    return [place for k in range(1 << bits) if (place := int(f"{k:0{bits}b}"[::-1], 2)) < n]
-
-
 class Moves(Termination):
     """Ends a :func:`~meshsimp_pymoo.memetic` when its annealing has made so many moves, and lets it plan with them.
 
@@ -115,6 +104,12 @@ class WholeGenerations(TimeBasedTermination):
         return 1.0 if elapsed + self._longest > self.max_time else elapsed / self.max_time
 
 
+def seconds_given(algorithm: Any) -> float | None:
+    """Return the seconds that a run has as a whole; None: it has no limit."""
+    limit = part_of(getattr(algorithm, "termination", None), TimeBasedTermination)
+    return None if limit is None else float(limit.max_time)
+
+
 @contextmanager
 def compiling_left_out(algorithm: Any) -> Iterator[None]:
     """Set the clock of a pymoo algorithm back by the time in which functions are compiled in here."""
@@ -129,7 +124,13 @@ def compiling_left_out(algorithm: Any) -> Iterator[None]:
 
 @contextmanager
 def stopping(stop: BoolArray, seconds: float | None) -> Iterator[None]:
-    """Set ``stop[0]`` after so many seconds in here, those of compiling left out; None: never."""
+    """Set ``stop[0]`` after so many seconds in here, those of compiling left out; None: never.
+
+    >>> stop = np.zeros(1, bool)
+    >>> with stopping(stop, 0.0):
+    ...     while not stop[0]:
+    ...         time.sleep(0.001)
+    """
     if seconds is None:
         yield
         return

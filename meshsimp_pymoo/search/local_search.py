@@ -29,7 +29,7 @@ from meshsimp_pymoo.surface.moves import (
     urgency,
 )
 from meshsimp_pymoo.surface.surface import Surface, movable_ground
-from meshsimp_pymoo.workers import thread_pool
+from meshsimp_pymoo.workers import on_threads
 
 
 class MoveShares(NamedTuple):
@@ -203,13 +203,20 @@ def anneal(
 
 @entry
 def fit_size(
-    ground: Any, books: Any, n: int, fixed: np.ndarray, by_triangles: bool, wanted: int, state: np.ndarray
+    ground: Any,
+    books: Any,
+    n: int,
+    fixed: np.ndarray,
+    by_triangles: bool,
+    wanted: int,
+    state: np.ndarray,
+    stop: np.ndarray,
 ) -> None:
     """Drop or add vertices, each the best of a few drawn, to ``wanted`` triangles or sites, or just below."""
     g = borrowed(ground)
     live = borrowed(books)
     failures = 0
-    while failures < FIT_FAILURES:
+    while failures < FIT_FAILURES and not stop[0]:
         size = n_triangles(g, live) if by_triangles else n_sites(g, live)
         if size == wanted:
             break
@@ -245,11 +252,11 @@ def fit_size(
             failures += 1
 
 
-def _thin_to(ground: Any, books: Any, pinned: BoolArray, triangles: int) -> None:
+def _thin_to(ground: Any, books: Any, pinned: BoolArray, triangles: int, stop: BoolArray) -> None:
     """Remove the vertices that add the least error until there are at most so many triangles."""
     n = len(pinned) + 1
-    removed, error, counts = np.empty(n, np.int64), np.empty(n), np.empty(n, np.int64)
-    thin(ground, books, len(pinned), pinned, triangles, np.inf, removed, error, counts)
+    removed, error, counts = np.empty(n, np.int32), np.empty(n), np.empty(n, np.int32)
+    thin(ground, books, len(pinned), pinned, triangles, np.inf, np.inf, stop, removed, error, counts)
 
 
 def relocate(
@@ -291,7 +298,7 @@ def relocate(
     shares : MoveShares
         How often each kind of move is tried.
     stop : (1,) bool array, optional
-        The moves end soon after another thread has set it.
+        It ends soon after another thread has set it, wherever it is: before the subset was brought to its size, too.
     made : (1,) int64 array, optional
         Takes the number of moves that were made: fewer than ``moves`` where they were stopped.
 
@@ -305,48 +312,56 @@ def relocate(
     TypeError
         If this is a model, not a surface.
     ValueError
-        If the surface's measure is no sum, or it has no compiled moves.
+        If the surface has no compiled moves.
     """
     ground = movable_ground(surface, "thinning and relocation")
     n, pinned = surface.n_vertices, surface.pinned
     state = np.array([seed], np.uint64)
     made = np.empty(1, np.int64) if made is None else made
     made[0] = moves
-    with surface.books(kept | pinned) as books:
-        if size is not None:
-            fit_size(ground, books, n, pinned, False, size, state)
-        if triangles is not None:
-            if snapshot(ground, books, n)[2] > triangles:
-                _thin_to(ground, books, pinned, triangles)
-            fit_size(ground, books, n, pinned, True, triangles, state)
-        result: BoolArray
-        result, total, n_now = snapshot(ground, books, n)
-        rows = np.flatnonzero(result & ~pinned)
-        if moves > 0 and np.isfinite(total):
-            movable = np.empty(n, np.int64)
-            movable[: len(rows)] = rows
-            best = np.empty(n, np.int64)
-            n_best = anneal(
-                ground,
-                books,
-                n,
-                movable,
-                len(rows),
-                surface.border,
-                *surface.neighbours,
-                moves,
-                temperature * max(float(total), 0.0) / max(len(rows), 1),
-                cooling,
-                int(n_now) if triangles is None else triangles,
-                tuple(map(float, shares)),
-                state,
-                np.zeros(1, np.bool_) if stop is None else stop,
-                made,
-                best,
-            )
-            result &= pinned
-            result[best[:n_best]] = True
-    return result
+    flag = np.zeros(1, np.bool_) if stop is None else stop
+
+    def work(kept: BoolArray) -> BoolArray:
+        if flag[0]:
+            made[0] = 0
+            return kept | pinned
+        with surface.books(kept | pinned) as books:
+            if size is not None:
+                fit_size(ground, books, n, pinned, False, size, state, flag)
+            if triangles is not None:
+                if snapshot(ground, books, n)[2] > triangles:
+                    _thin_to(ground, books, pinned, triangles, flag)
+                fit_size(ground, books, n, pinned, True, triangles, state, flag)
+            result: BoolArray
+            result, total, n_now = snapshot(ground, books, n)
+            rows = np.flatnonzero(result & ~pinned)
+            if moves > 0 and np.isfinite(total):
+                movable = np.empty(n, np.int64)
+                movable[: len(rows)] = rows
+                best = np.empty(n, np.int64)
+                n_best = anneal(
+                    ground,
+                    books,
+                    n,
+                    movable,
+                    len(rows),
+                    surface.border,
+                    *surface.neighbours,
+                    moves,
+                    temperature * max(float(total), 0.0) / max(len(rows), 1),
+                    cooling,
+                    int(n_now) if triangles is None else triangles,
+                    tuple(map(float, shares)),
+                    state,
+                    flag,
+                    made,
+                    best,
+                )
+                result &= pinned
+                result[best[:n_best]] = True
+        return result
+
+    return on_threads(work, [kept], stop=flag)[0]
 
 
 def relocate_all(
@@ -397,10 +412,6 @@ def relocate_all(
             **how,
         )
 
-    try:
-        with stopping(stop, seconds):
-            rows = list(thread_pool().map(one, range(len(X))))
-    except BaseException:  # Ctrl-C: the other threads are not to keep the process alive
-        stop[0] = True
-        raise
+    with stopping(stop, seconds):
+        rows = on_threads(one, range(len(X)), stop=stop)
     return np.array(rows) if rows else X.copy()

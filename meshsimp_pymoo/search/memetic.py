@@ -22,17 +22,18 @@ from pymoo.core.mating import Mating
 from pymoo.core.population import Population
 from pymoo.core.survival import Survival
 from pymoo.termination.max_eval import MaximumFunctionCallTermination
-from pymoo.termination.max_time import TimeBasedTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 from pymoo.util.optimum import filter_optimum
 
-from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, spread
-from meshsimp_pymoo.search.greedy import NestedFront, thinned, thinning
+from meshsimp_pymoo.arrays import spread
+from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
+from meshsimp_pymoo.search.greedy import NestedFront, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
+from meshsimp_pymoo.search.starting import Start, thinned
 from meshsimp_pymoo.surface.surface import Surface, movable_ground
-from meshsimp_pymoo.workers import thread_pool
+from meshsimp_pymoo.workers import on_threads
 
 # Rungs that get a child in the same generation.
 CHAINS = 16
@@ -49,8 +50,11 @@ MOVES_PER_VERTEX = (20.0, 1000.0)
 FIRST_SHARE = 0.12
 SLOWEST = 4000.0
 SECONDS_A_MOVE = 2e-6
-# What measuring a subset takes for each vertex of the model, about [s].
-SECONDS_A_VERTEX = 4e-8
+# What measuring a subset takes for each vertex of the model, about [s]; and the share of the time that measuring the
+# first population may take, which has so many individuals all the same.
+SECONDS_A_VERTEX = 8e-8
+FIRST_MEASURED = 0.15
+FEWEST = 8
 # Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs; but
 # never more than the second share.
 LAST_SHARE = 0.03
@@ -234,10 +238,9 @@ class DownTheLadder(Mating):
 
 def time_limit(algorithm: Any) -> tuple[float, float, float] | None:
     """Return the seconds a run has, those left for its sweeps, and those kept for its end; None: it has no limit."""
-    limit = part_of(getattr(algorithm, "termination", None), TimeBasedTermination)
-    if limit is None:
+    whole = seconds_given(algorithm)
+    if whole is None:
         return None
-    whole = float(limit.max_time)
     last = min(max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6), MOST_SHARE * whole)
     return whole, whole - last - (time.time() - algorithm.start_time), last
 
@@ -263,6 +266,12 @@ class MemeticSearch(GeneticAlgorithm):
             raise ValueError(f"memetic() is for two objectives and the problem has {problem.n_obj}; use nsga3()")
         movable_ground(surface_of(problem, self), "the memetic search and its thinning")
         super()._setup(problem, **kwargs)
+
+    def _initialize_infill(self) -> Population:
+        seconds, n = seconds_given(self), self.pop_size
+        if seconds is not None:
+            n = min(n, max(measurable(self.problem, FIRST_MEASURED * seconds), FEWEST))
+        return self.initialization.do(self.problem, n, algorithm=self, random_state=self.random_state)
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
         ladder = self.survival
@@ -320,7 +329,7 @@ class MemeticSearch(GeneticAlgorithm):
             pop.get("F"),
             most=self.survival.rungs[-1],
             seconds=seconds,
-            threads=getattr(self.problem.elementwise_runner, "n_threads", 1),
+            measured=None if seconds is None else measurable(self.problem, seconds / 2.0),
         )
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
@@ -330,6 +339,12 @@ class MemeticSearch(GeneticAlgorithm):
             self.opt = filter_optimum(Population.merge(self.opt, extra), least_infeasible=True)
 
 
+def measurable(problem: Any, seconds: float) -> int:
+    """Return about how many subsets can be measured in this time."""
+    threads = getattr(problem.elementwise_runner, "n_threads", 1)
+    return int(threads * seconds / (SECONDS_A_VERTEX * problem.n_var))
+
+
 def between_the_rungs(
     surface: Surface,
     X: NDArray[np.bool_],
@@ -337,36 +352,23 @@ def between_the_rungs(
     *,
     most: float,
     seconds: float | None = None,
-    threads: int = 1,
+    measured: int | None = None,
 ) -> NDArray[np.bool_]:
     """Return subsets with numbers of triangles between those of X (P, N), by thinning each down to the next smaller.
 
-    With ``seconds`` no more than can be found and measured on so many threads by then, spread over the ladder.
+    With ``seconds`` no more than can be found in half of that, spread over the ladder; and about ``measured`` at most.
 
     Beyond the most accurate of them, where keeping all vertices is not the best (a scan whose outline is not covered),
     those of the thinned model that are better, of at most ``most`` triangles.
     """
     order = np.argsort(F[:, 1], kind="stable")
-    whole = thinned(surface)
+    whole = thinned(surface, seconds)
     most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
-    end = np.inf
-    if seconds is not None:
-        # half of the time is for finding them, half for measuring what is found
-        end = time.perf_counter() + seconds / 2.0
-        measured = threads * seconds / 2.0 / (SECONDS_A_VERTEX * X.shape[1])
-        most_rows = min(most_rows, max(int(measured / len(X)), 1))
-    longest = 0.0
+    if measured is not None:
+        most_rows = min(most_rows, max(measured // len(X), 1))
+    stop = np.zeros(1, np.bool_)
 
-    def one(k: int) -> list[NDArray[np.bool_]]:
-        nonlocal longest
-        begun = time.perf_counter()
-        if begun + longest > end:
-            return []
-        rows = fill(k)
-        longest = max(longest, time.perf_counter() - begun)
-        return rows
-
-    def fill(k: int) -> list[NDArray[np.bool_]]:
+    def fill(k: int) -> list[NDArray[np.uint8]]:
         low, high = F[order[k - 1], 1], F[order[k], 1]
         ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
         by_thinning = _best_of(whole, high)[0]
@@ -374,33 +376,38 @@ def between_the_rungs(
         n_rows = min(max(int(np.log(max(ratio, 1.0)) / step), 1), BETWEEN, most_rows)
         wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
         wanted = wanted[(wanted > low) & (wanted < high)]
-        if not len(wanted):
+        if stop[0] or not len(wanted):
             return []
-        fronts = [whole]
+        fronts: list[Start | NestedFront] = [whole]
         if F[order[k], 0] < by_thinning:
             # The rung is better than the thinned model: so may be what it is thinned to.
-            fronts.append(thinning(surface, kept=X[order[k]], least=int(low)))
+            fronts.append(thinning(surface, kept=X[order[k]], least=int(low), stop=stop))
         rows = []
         for size in wanted:
             best = min((_best_of(front, size) for front in fronts), key=lambda choice: choice[0])
             if best[0] < F[order[k - 1], 0]:
-                rows.append(best[1].kept(best[2]))
+                rows.append(np.packbits(best[1].kept(best[2])))
         return rows
 
     gaps = np.arange(1, len(order))
     if seconds is not None:
         gaps = gaps[spread(len(gaps))]
-    found = [kept for rows in thread_pool().map(one, gaps.tolist()) for kept in rows]
+    with stopping(stop, None if seconds is None else seconds / 2.0):
+        found = [packed for rows in on_threads(fill, gaps.tolist(), stop=stop) for packed in rows]
     better = np.flatnonzero((whole.error < F[:, 0].min()) & (whole.triangles <= most))
     if len(better):
         best = better[np.argmin(whole.error[better])]
         better = better[better <= best]
-        found += [whole.kept(int(k)) for k in better[np.linspace(0, len(better) - 1, BETWEEN).astype(int)]]
-    return np.array(found).reshape(-1, X.shape[1]).astype(bool)
+        chosen = better[np.linspace(0, len(better) - 1, BETWEEN).astype(int)]
+        found += [np.packbits(whole.kept(int(k))) for k in chosen]
+    between = np.empty((len(found), X.shape[1]), np.bool_)
+    for row, packed in zip(between, found, strict=True):
+        row[:] = np.unpackbits(packed, count=len(row))
+    return between
 
 
-def _best_of(front: NestedFront, most: float) -> tuple[float, NestedFront, int]:
-    """Return the least error of a nested front's meshes of at most so many triangles, the front and the mesh's row."""
+def _best_of(front: Start | NestedFront, most: float) -> tuple[float, Start | NestedFront, int]:
+    """Return the least error of a front's meshes of at most so many triangles, the front and the mesh's row."""
     rows = np.flatnonzero((front.triangles > 0) & (front.triangles <= most))
     if not len(rows):
         return np.inf, front, 0
@@ -417,10 +424,10 @@ def memetic(
 ) -> MemeticSearch:
     """Return the seeded memetic algorithm: thinning, then annealing down a ladder of sizes.
 
-    It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error"). By
-    default it ends after one sweep of the ladder, some tens of seconds for thousands of vertices; with
-    :class:`~meshsimp_pymoo.Moves` or a termination by time it takes as many moves as fit. Evaluations do not measure
-    it: each child of a generation is one, however many moves it took.
+    It lowers the problem's measure of the error: a sum, or the maximum, which thinning goes by and annealing lowers
+    through the sum of the eighth powers. By default it ends after one sweep of the ladder, some tens of seconds for
+    thousands of vertices; with :class:`~meshsimp_pymoo.Moves` or a termination by time it takes as many moves as fit.
+    Evaluations do not measure it: each child of a generation is one, however many moves it took.
 
     Parameters
     ----------

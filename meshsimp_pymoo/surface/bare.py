@@ -33,7 +33,7 @@ from meshsimp_pymoo.surface.books import (
     SEGMENT,
     Live,
 )
-from meshsimp_pymoo.surface.costs import bare_cost
+from meshsimp_pymoo.surface.costs import bare_deviation, enter_peak, noted_cost
 from meshsimp_pymoo.surface.evaluate import REACH
 from meshsimp_pymoo.surface.ground import Ground
 
@@ -424,6 +424,8 @@ def forget_bare(live: Live, i: int) -> None:
     live.bare[i] = COVERED
     live.tally[N_BARE] -= 1
     live.amount[BARE_ERROR] -= live.cost[i]
+    if len(live.peaks) > 0:
+        enter_peak(live, len(live.kind) + i, 0.0)
     _stir(live, i)
 
 
@@ -456,7 +458,10 @@ def _house(g: Ground, live: Live, i: int, h: int, gap: float) -> None:
         if after >= 0:
             live.bare_before[after] = i
         a, b, c = corners_of(live.mesh, h)
-        cost = bare_cost(g, a, b, c, i, gap)
+        d = bare_deviation(g, a, b, c, i, gap)
+        cost = noted_cost(g, live, d, i)
+        if len(live.peaks) > 0:
+            enter_peak(live, len(live.kind) + i, d if len(g.weight) == 0 or g.weight[i] > 0.0 else 0.0)
     live.amount[BARE_ERROR] += cost - live.cost[i]
     live.cost[i] = cost
 

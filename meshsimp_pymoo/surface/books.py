@@ -38,7 +38,12 @@ MOST_TOUCHED = 48
     N_LOOKED_AT,
 ) = range(12)
 # Entries of ``amount``: running sums, and the largest both together have been since they were last added up anew.
-COVERED_ERROR, BARE_ERROR, PEAK = range(3)
+# The last is the largest deviation that the operation tried or done last has met, where costs are weighed.
+COVERED_ERROR, BARE_ERROR, PEAK, LARGEST = range(4)
+
+
+# Where nobody asks for the maximum.
+NO_PEAKS = np.empty(0, np.float64)
 
 
 class Live(NamedTuple):
@@ -99,6 +104,7 @@ class Live(NamedTuple):
     saved: np.ndarray  # (10 MOST_TOUCHED,) what the records held before
     tally: np.ndarray  # numbers of things, see the names above
     amount: np.ndarray  # errors, see the names above
+    peaks: np.ndarray  # (6 N,) tree of the largest deviations in each triangle and of each bare vertex, or (0,)
 
 
 def make_live(n_vertices: int) -> Live:
@@ -156,5 +162,11 @@ def make_live(n_vertices: int) -> Live:
         coming=np.empty((8 * MOST_TOUCHED, 3), np.int64),
         saved=np.empty(10 * MOST_TOUCHED, np.uint32),
         tally=np.zeros(12, np.int64),
-        amount=np.zeros(3, np.float64),
+        amount=np.zeros(4, np.float64),
+        peaks=NO_PEAKS,
     )
+
+
+def with_peaks(live: Live) -> Live:
+    """Return the books with room for the largest deviation of each place: triangles, then bare vertices."""
+    return live._replace(peaks=np.zeros(2 * (len(live.kind) + len(live.bare))))

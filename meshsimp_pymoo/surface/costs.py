@@ -7,6 +7,7 @@ import numpy as np
 from meshsimp_pymoo.compiling.functions import inner
 from meshsimp_pymoo.plane.emission import is_sliver, sum_of_three
 from meshsimp_pymoo.plane.footprint import inside
+from meshsimp_pymoo.surface.books import LARGEST, Live
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE, REACH
 from meshsimp_pymoo.surface.ground import Ground
 
@@ -14,9 +15,41 @@ from meshsimp_pymoo.surface.ground import Ground
 @inner
 def weighed_cost(g: Ground, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, if that is not d itself (``g.weighed``)."""
-    if g.squared:
+    beyond = max(d - g.bound, 0.0)
+    if g.power > 1:
+        d *= g.scale
         d *= d
-    return d * g.weight[i] if len(g.weight) > 0 else d
+        if g.power == 8:
+            d *= d
+            d *= d
+    if len(g.weight) > 0:
+        d *= g.weight[i]
+        beyond = beyond if g.weight[i] > 0.0 else 0.0
+    return g.own * d + beyond
+
+
+@inner
+def noted_cost(g: Ground, live: Live, d: float, i: int) -> float:
+    """Return what vertex i adds to the total where d_p = d, and note d if it is the largest so far (``LARGEST``)."""
+    if not g.weighed:
+        return d
+    if d > live.amount[LARGEST] and (len(g.weight) == 0 or g.weight[i] > 0.0):
+        live.amount[LARGEST] = d
+    return weighed_cost(g, d, i)
+
+
+@inner
+def enter_peak(live: Live, place: int, d: float) -> None:
+    """Write the largest deviation of a place into the tree of ``peaks``, up to where nothing changes."""
+    peaks = live.peaks
+    node = len(peaks) // 2 + place
+    peaks[node] = d
+    while node > 1:
+        node >>= 1
+        most = max(peaks[2 * node], peaks[2 * node + 1])
+        if peaks[node] == most:
+            return
+        peaks[node] = most
 
 
 @inner(inline=True)
@@ -37,8 +70,8 @@ def deviation_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) 
 
 
 @inner
-def bare_cost(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> float:
-    """Cost of a vertex i that no triangle covers; nearest is the side a-b of (a, b, c), at the squared distance gap."""
+def bare_deviation(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> float:
+    """d_p of a vertex i that no triangle covers; nearest is the side a-b of (a, b, c), at the squared distance gap."""
     xy = g.xy
     z = g.z
     ux = xy[2 * b] - xy[2 * a]
@@ -60,7 +93,7 @@ def bare_cost(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> float:
         ey = u * uy - dy
         dz = (1.0 - u) * z[a] + u * z[b] - z[i]
         d = np.sqrt((ex * ex + ey * ey) * g.unit * g.unit + dz * dz)
-    return weighed_cost(g, d, i) if g.weighed else d
+    return d
 
 
 @inner(inline=True)

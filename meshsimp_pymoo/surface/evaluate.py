@@ -28,7 +28,7 @@ from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.plane.triangulation import RECORD, locate, triangulate
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, REGIONS, SQUARES, TRIANGLES, UNCOVERED, VERTICES
-from meshsimp_pymoo.workers import Reserve, thread_pool
+from meshsimp_pymoo.workers import Reserve, on_threads
 
 # A vertex counts as covered up to this far outside a triangle, in barycentric coordinates: rounding of rotated borders.
 COVER_TOLERANCE = 1e-9
@@ -41,6 +41,9 @@ NO_SITE = 0xFFFFFFFF
 NO_DEVIATION = np.empty(0, np.float64)
 NO_COVER = np.empty(0, np.bool_)
 
+
+# Entries of subsets that are evaluated in one go: about a tenth of a second.
+AT_ONCE = 2_000_000
 
 Workspace = tuple[np.ndarray, ...]
 
@@ -364,12 +367,13 @@ def evaluate_subsets(
         with workspaces.one() as workspace:
             _evaluate(ground, workspace, rows[part], table[part], NO_DEVIATION, NO_COVER)
 
-    if n_threads <= 1 or len(rows) < 2 * n_threads:
+    if rows.size <= AT_ONCE and (n_threads <= 1 or len(rows) < 2 * n_threads):
         evaluate(slice(0, len(rows)))
         return table
-    # Several parts a thread, since subsets differ in size.
-    cuts = np.linspace(0, len(rows), min(4 * n_threads, len(rows)) + 1).astype(int)
-    list(thread_pool(n_threads).map(evaluate, [slice(a, b) for a, b in itertools.pairwise(cuts)]))
+    # Several parts a thread, since subsets differ in size; and no part so long that Ctrl-C is not heard.
+    n_parts = min(max(4 * n_threads, -(-rows.size // AT_ONCE)), len(rows))
+    cuts = np.linspace(0, len(rows), n_parts + 1).astype(int)
+    on_threads(evaluate, [slice(a, b) for a, b in itertools.pairwise(cuts)], n_threads=max(n_threads, 1))
     return table
 
 

@@ -36,7 +36,11 @@ class Ground(NamedTuple):
     nearest: bool  # whether an uncovered vertex costs its distance
     weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
     weighed: bool  # whether the cost of a vertex in a sum is not d_p itself, but what weighed_cost makes of it
-    squared: bool  # whether the cost is the square of d_p
+    power: int  # to which d_p counts in it: 1, 2 or 8
+    scale: float  # what d_p is multiplied by before
+    own: float  # what the cost by the measure is multiplied by
+    bound: float  # what d_p exceeds this by is added
+    by_peak: bool  # whether the books know the largest d_p, and the error is that
 
 
 def make_ground(model: OpenModel, rules: Rules) -> Ground:
@@ -46,7 +50,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
     area, lift = exact_ranges(xy)
     footprint = model.footprint
     weight = np.empty(0) if model.weights is None else model.weights
-    squared = OBJECTIVES[rules.measure].squared
+    power = OBJECTIVES[rules.measure].power
     return Ground(
         xy=xy.ravel(),
         z=np.ascontiguousarray(model.points[:, 2]),
@@ -65,6 +69,10 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         boxes=boxes_of_runs(xy, RUN),
         nearest=rules.outside == "nearest",
         weight=weight,
-        weighed=squared or len(weight) > 0,
-        squared=squared,
+        weighed=power > 1 or len(weight) > 0,
+        power=power,
+        scale=1.0 / model.diagonal if power == 8 else 1.0,
+        own=1.0,
+        bound=np.inf,
+        by_peak=not OBJECTIVES[rules.measure].is_sum,
     )

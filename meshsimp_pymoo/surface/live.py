@@ -29,6 +29,7 @@ from meshsimp_pymoo.surface.books import (
     END,
     IN_REGION,
     INSIDE,
+    LARGEST,
     N_EMITTED,
     N_FREE,
     N_LOOKED_AT,
@@ -44,7 +45,7 @@ from meshsimp_pymoo.surface.books import (
     VISITED,
     Live,
 )
-from meshsimp_pymoo.surface.costs import deviation_in, is_inside, is_thin, weighed_cost
+from meshsimp_pymoo.surface.costs import deviation_in, enter_peak, is_inside, is_thin, noted_cost, weighed_cost
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.moves import answers
 from meshsimp_pymoo.surface.trial import is_solid, tried
@@ -93,6 +94,8 @@ def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
         if emitted:
             live.amount[COVERED_ERROR] -= live.subtotal[r]
             live.subtotal[r] = 0.0
+            if len(live.peaks) > 0:
+                enter_peak(live, r, 0.0)
             count[N_EMITTED] -= 1
             for k in range(3):
                 v = mesh[t + k]
@@ -268,7 +271,7 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         if kind[r] & EMITTED:
             d = deviation_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
             if weighed:
-                d = weighed_cost(g, d, i)
+                d = noted_cost(g, live, d, i)
             subtotal[r] += d
             amount[COVERED_ERROR] += d
         else:
@@ -280,6 +283,9 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
                 note_bare(live, v)
             else:
                 forget_bare(live, v)
+    if len(live.peaks) > 0:
+        for q in range(count[N_REGION]):
+            enter_peak(live, region[q] >> 3, peak_in(g, live, region[q]))
     count[N_REGION] = 0
     count[N_POOL] = 0
     count[N_TOUCHED] = 0
@@ -291,6 +297,19 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         amount[PEAK] = whole
     elif whole < RETAKEN_BELOW * amount[PEAK]:
         _retake(live, len(g.z))
+
+
+@inner
+def peak_in(g: Ground, live: Live, t: int) -> float:
+    """Return the largest deviation in an emitted triangle, of vertices whose weight is not 0; 0 in others."""
+    mesh = live.mesh
+    peak = 0.0
+    i = live.head[t >> 3] if live.kind[t >> 3] & EMITTED else -1
+    while i >= 0:
+        if len(g.weight) == 0 or g.weight[i] > 0.0:
+            peak = max(peak, deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i))
+        i = live.following[i]
+    return peak
 
 
 @inner
@@ -437,6 +456,7 @@ def exchange(g: Ground, live: Live, v: int, w: int) -> bool:
 
     The position of w must be free. Cheaper than the two operations where vertices are bare.
     """
+    live.amount[LARGEST] = 0.0
     if w < 0:  # a case of its own: thinning takes a fifth longer where the last argument below is not a constant
         return v < 0 or _remove(g, live, v, False)
     if v >= 0 and not _remove(g, live, v, True):
@@ -457,8 +477,10 @@ def _done_and_undone(g: Ground, live: Live, v: int, w: int) -> tuple[float, int]
         return np.inf, 0
     change = _total(live) - before
     n = live.tally[N_EMITTED] - n
+    largest = amount[LARGEST]
     amount[PEAK] = 0.0
     exchange(g, live, w, v)
+    amount[LARGEST] = largest
     # the sums are what they were, without the rounding of having come and gone
     amount[COVERED_ERROR] = covered
     amount[BARE_ERROR] = bare
@@ -508,6 +530,7 @@ def _build(
     count[N_REGION] = end >> 3
     live.kind[:] = 0
     clear_bare(live, len(g.z))
+    live.peaks[:] = 0.0
     # All triangles are the region; the vertices are placed by walking along the curve, faster than by looking at all.
     _settle(g, live, True)
     t = 0
@@ -521,9 +544,7 @@ def _build(
         live.following[i] = live.head[r]
         live.head[r] = i
         if live.kind[r] & EMITTED:
-            d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
-            if g.weighed:
-                d = weighed_cost(g, d, i)
+            d = noted_cost(g, live, deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i), i)
             live.subtotal[r] += d
             live.amount[COVERED_ERROR] += d
         else:
@@ -532,6 +553,9 @@ def _build(
         if live.used[sites[k]] == 0:
             note_bare(live, sites[k])
     settle_bare(g, live)
+    if len(live.peaks) > 0:
+        for r in range(end >> 3):
+            enter_peak(live, r, peak_in(g, live, r * RECORD))
     live.amount[PEAK] = live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
     return True
 
@@ -544,6 +568,21 @@ def _build(
 def total_cost(g: Ground, live: Live) -> float:
     """Sum of the costs; inf where there is no mesh."""
     return _total(live)
+
+
+@answers(moves.error_now, Ground)
+@inner(inline=True)
+def error_now(g: Ground, live: Live) -> float:
+    """Sum of the costs, or the largest deviation where the books know it; inf where there is no mesh."""
+    return live.peaks[1] if len(live.peaks) > 0 and live.tally[N_EMITTED] > 0 else _total(live)
+
+
+@answers(moves.ranked, Ground)
+@inner(inline=True)
+def _ranked(g: Ground, live: Live, change: float) -> tuple[float, float]:
+    if len(live.peaks) > 0:
+        return (live.amount[LARGEST], change) if change < np.inf else (change, 0.0)
+    return change, live.amount[LARGEST] if g.bound < np.inf else 0.0
 
 
 @answers(moves.n_triangles, Ground)
@@ -646,10 +685,12 @@ def _worst_in(g: Ground, live: Live, cell: int) -> tuple[int, float, float]:
         if _at_a_corner(g.xy, mesh, t, i):
             i = live.following[i]
             continue
-        d = live.cost[i]
+        d = live.cost[i] if len(live.peaks) == 0 else live.peaks[len(live.peaks) // 2 + len(live.kind) + i]
         if emitted:
             d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
-            if g.weighed:
+            if len(live.peaks) > 0:
+                d = d if len(g.weight) == 0 or g.weight[i] > 0.0 else 0.0
+            elif g.weighed:
                 d = weighed_cost(g, d, i)
         elif live.tally[N_EMITTED] == 0:
             d = 1.0  # there is no mesh yet; any vertex will do

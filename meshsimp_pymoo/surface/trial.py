@@ -30,6 +30,7 @@ from meshsimp_pymoo.surface.books import (
     COVERED,
     EMITTED,
     HOUSED,
+    LARGEST,
     MOST_TOUCHED,
     N_BARE,
     N_EMITTED,
@@ -43,7 +44,7 @@ from meshsimp_pymoo.surface.books import (
     TRIED,
     Live,
 )
-from meshsimp_pymoo.surface.costs import bare_cost, is_inside, is_thin, weighed_cost
+from meshsimp_pymoo.surface.costs import bare_deviation, is_inside, is_thin, noted_cost
 from meshsimp_pymoo.surface.ground import Ground
 
 # Columns of ``forms``: three sides and the plane, three numbers each, and whether the triangle is emitted.
@@ -181,6 +182,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
     change = 0.0
     at_outline = False
     live.tally[N_LOOKED_AT] = 0
+    live.amount[LARGEST] = 0.0
     if v >= 0:
         n_star = triangles_around(mesh, live.place[v], v, cavity, live.rim, live.ring)
         live.tally[N_LOOKED_AT] = n_star
@@ -267,7 +269,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
                 if most < -ROUNDED_AREA:
                     return unknown
                 d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
-                change += weighed_cost(g, d, i) if weighed else d
+                change += noted_cost(g, live, d, i) if weighed else d
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
         if change > limit:
             return np.inf, 0
@@ -418,12 +420,14 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, n_candidates: int, i
         # As near as one that comes, unless it is nearer.
         d = squared_gap(g.xy, coming[near, 0], coming[near, 1], x, y)
         if d == gap and rank(coming[near, 0], coming[near, 1], coming[near, 2]) < rank_of(live.mesh, h):
-            return bare_cost(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap), h
+            d = bare_deviation(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap)
+            return noted_cost(g, live, d, i), h
     if h != NONE:
         a, b, c = corners_of(live.mesh, h)
-        return bare_cost(g, a, b, c, i, gap), h
+        return noted_cost(g, live, bare_deviation(g, a, b, c, i, gap), i), h
     if near >= 0:
-        return bare_cost(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap), h
+        d = bare_deviation(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap)
+        return noted_cost(g, live, d, i), h
     return 0.0, h
 
 
@@ -456,7 +460,7 @@ def _drawn_near(g: Ground, live: Live, n_coming: int, n_tried: int) -> tuple[flo
                         best, gap = _nearest_coming(g, live, n_coming, i, live.bare_segment[i], gap)
                         if best >= 0:
                             a, b, c = coming[best, 0], coming[best, 1], coming[best, 2]
-                            change += bare_cost(g, a, b, c, i, gap) - live.cost[i]
+                            change += noted_cost(g, live, bare_deviation(g, a, b, c, i, gap), i) - live.cost[i]
                             live.bare[i] = TRIED
                             live.pool[n_tried] = i
                             n_tried += 1
@@ -561,7 +565,7 @@ def _at_outline(
                 best, most = _holder(forms, n_forms, best, x, y)
                 if most >= -ROUNDED_AREA and forms[best, IS_SHOWN] != 0.0:
                     d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
-                    change += weighed_cost(g, d, i) if g.weighed else d
+                    change += noted_cost(g, live, d, i)
                 else:
                     homeless[n_homeless] = i
                     n_homeless += 1

@@ -8,7 +8,6 @@ added up over all samples, band by band, so that memory holds the mesh and a few
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +30,7 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     as_quality,
 )
+from meshsimp_pymoo.workers import on_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +124,7 @@ def measured(grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int
             )
             deviation[low:high] = sizes.ravel()[at[low:high] - row * n_columns]
 
-    if n_threads == 1:
-        do(0)
-    else:
-        with ThreadPoolExecutor(n_threads) as pool:
-            list(pool.map(do, range(n_threads)))
+    on_threads(do, range(n_threads), n_threads=n_threads)
     row = np.full(REGIONS, np.nan)
     row[ERROR], row[SQUARES], row[MAXIMUM] = table[:, 0].sum(), table[:, 1].sum(), table[:, 2].max()
     row[TRIANGLES], row[VERTICES], row[UNCOVERED] = mesh.n_triangles, len(mesh.samples), 0

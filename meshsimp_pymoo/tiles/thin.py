@@ -113,10 +113,12 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     with surface.books(is_site) as live:
         _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
         n = int((is_site & ~fixed).sum())
-        removed, error, triangles = np.empty(n, np.int64), np.empty(n + 1), np.empty(n + 1, np.int64)
+        removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
         limit = FORESIGHT * 2.0 * tile.limit
-        n_removed = thin(ground, live, len(z), fixed, 0, limit, removed, error, triangles)
-    level = hull_levels(triangles[0] - triangles[: n_removed + 1], error[: n_removed + 1])
+        stop = np.zeros(1, np.bool_)
+        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, stop, removed, error, triangles)
+    saved = (triangles[0] - triangles[: n_removed + 1]).astype(np.int64)
+    level = hull_levels(saved, error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
     return number[removed[:n_wanted]], level[:n_wanted]
 

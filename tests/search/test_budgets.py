@@ -8,8 +8,9 @@ import pytest
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo import MeshProblem, memetic, nsga2_v1
+from meshsimp_pymoo.arrays import spread
 from meshsimp_pymoo.compiling import store
-from meshsimp_pymoo.search.budgets import WholeGenerations, compiling_left_out, spread, stopping
+from meshsimp_pymoo.search.budgets import WholeGenerations, compiling_left_out, stopping
 from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.memetic import between_the_rungs
 

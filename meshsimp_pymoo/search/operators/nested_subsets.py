@@ -8,15 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.sampling import Sampling
 
-from meshsimp_pymoo.search.greedy import thinned
+from meshsimp_pymoo.arrays import IntArray
+from meshsimp_pymoo.search.budgets import seconds_given
 from meshsimp_pymoo.search.operators.random_subset import RandomSubset
 from meshsimp_pymoo.search.requirements import pinned_vertices, require_probability, surface_of
+from meshsimp_pymoo.search.starting import Start, thinned
 
 
 class NestedSubsets(Sampling):
     """Subsets of adaptive thinning at sizes spread evenly over the logarithm, mixed with random ones.
 
-    Thinning runs once and gives a subset of every size (see :func:`~meshsimp_pymoo.search.greedy.thinning`).
+    Thinning runs once and gives a subset of every size (see :func:`~meshsimp_pymoo.search.greedy.thinning`). Where a
+    termination by time leaves too little for that, a warning says what it starts from instead.
 
     Parameters
     ----------
@@ -45,21 +48,25 @@ class NestedSubsets(Sampling):
     ) -> NDArray[np.bool_]:
         pinned = pinned_vertices(problem, self)
         n_random = int(self.random_share * n_samples)
-        front = thinned(surface_of(problem, self))
-        rows = np.flatnonzero(front.triangles > 0)
-        if self.triangles is not None:
-            low, high = self.triangles
-            inside = rows[(front.triangles[rows] >= low) & (front.triangles[rows] <= high)]
-            if not len(inside):
-                raise ValueError(
-                    f"thinning has no mesh of {low} to {high} triangles; it goes from {front.triangles[rows].min()} to "
-                    f"{front.triangles[rows].max()}"
-                )
-            rows = inside
-        wanted = np.geomspace(rows[0] + 1, rows[-1] + 1, n_samples - n_random) - 1
+        start = thinned(surface_of(problem, self), seconds_given(kwargs.get("algorithm")))
         X = np.empty((n_samples, len(pinned)), dtype=bool)
-        for kept, k in zip(X, np.clip(np.round(wanted).astype(int), rows[0], rows[-1]), strict=False):
-            kept[:] = front.kept(int(k))
+        for kept, k in zip(X, self.rows(start, n_samples - n_random), strict=False):
+            kept[:] = start.kept(int(k))
         if n_random:
             X[n_samples - n_random :] = RandomSubset()._do(problem, n_random, random_state=random_state)
         return X
+
+    def rows(self, start: Start, n: int) -> IntArray:
+        """Return which n meshes of a start are sampled, spread evenly over the logarithm of their size."""
+        rows = np.flatnonzero(start.triangles > 0)
+        if self.triangles is not None:
+            low, high = self.triangles
+            inside = rows[(start.triangles[rows] >= low) & (start.triangles[rows] <= high)]
+            if not len(inside):
+                raise ValueError(
+                    f"thinning has no mesh of {low} to {high} triangles; it goes from {start.triangles[rows].min()} to "
+                    f"{start.triangles[rows].max()}"
+                )
+            rows = inside
+        wanted = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1
+        return np.clip(np.round(wanted).astype(int), rows[0], rows[-1])

@@ -1,0 +1,168 @@
+"""The front that a seeded search starts from: thinning, or as much of it as fits into the time.
+
+Thinning from all vertices takes some ten microseconds for each. Where that is more than a share of the time there is,
+greedy insertion finds as many vertices as fit, and these are thinned: from 15 to 30 % of the vertices that is within
+some per cent of thinning from all. Where it is stopped on its way, by the clock or by Ctrl-C, it has the large meshes,
+and a quick insertion finds small ones.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.errors import SearchWarning
+from meshsimp_pymoo.search.budgets import stopping
+from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
+from meshsimp_pymoo.surface.surface import Surface
+from meshsimp_pymoo.workers import on_threads
+
+# What removing a vertex takes about where all are removed [s], and the share of the time that may be spent on it.
+SECONDS_A_REMOVAL = 1.2e-5
+START_SHARE = 0.5
+# Of that, what inserting takes, the rest is for thinning what was inserted; and what is kept for both where the
+# thinning from all vertices takes longer than was thought.
+INSERT_SHARE = 0.35
+KEPT_SHARE = 0.3
+# What both may take together after Ctrl-C [s].
+QUICK = 1.2
+
+
+@dataclass(frozen=True)
+class Start:
+    """The meshes of one or more nested fronts, one front above the other.
+
+    Attributes
+    ----------
+    parts : tuple of NestedFront
+        That of the smallest meshes first; no mesh of one has as many triangles as the least of the next.
+    is_whole : bool
+        Whether this is the thinning from all vertices down to the pinned ones.
+    """
+
+    parts: tuple[NestedFront, ...]
+    is_whole: bool
+
+    @classmethod
+    def of(cls, *fronts: NestedFront) -> Start:
+        """Put fronts together that are not whole; of each, the meshes as large as those of a later one are left out."""
+        parts: list[NestedFront] = []
+        least = np.inf
+        for front in reversed(fronts):
+            too_large = np.flatnonzero(front.triangles >= least)
+            n = int(too_large[0]) if len(too_large) else len(front)
+            if n:
+                parts.insert(
+                    0, replace(front, order=front.order[: n - 1], error=front.error[:n], triangles=front.triangles[:n])
+                )
+                least = float(front.triangles[:n].min())
+        return cls(tuple(parts), False)
+
+    @cached_property
+    def error(self) -> FloatArray:
+        """Error of each mesh (K,) [model units]."""
+        return np.concatenate([part.error for part in self.parts])
+
+    @cached_property
+    def triangles(self) -> IntArray:
+        """Triangles of each mesh (K,)."""
+        return np.concatenate([part.triangles for part in self.parts])
+
+    def __len__(self) -> int:
+        return len(self.error)
+
+    def kept(self, k: int) -> BoolArray:
+        """Return subset k as a bool array (N,)."""
+        for part in self.parts:
+            if k < len(part):
+                return part.kept(k)
+            k -= len(part)
+        raise ValueError(f"there is no subset {len(self) + k}; there are {len(self)}")
+
+    def __str__(self) -> str:
+        ranges = [f"{int(part.triangles.min()):,} to {int(part.triangles.max()):,}" for part in self.parts]
+        return f"meshes of {', '.join(ranges)} triangles"
+
+
+_STARTS: WeakKeyDictionary[Any, Start] = WeakKeyDictionary()
+
+
+def begun(surface: Surface) -> Start | None:
+    """Return what there is of the start of a surface: whole, or as far as the last search came; None: nothing."""
+    return _STARTS.get(surface)
+
+
+def thinned(surface: Surface, seconds: float | None = None) -> Start:
+    """Return the thinning of a surface, computed once as long as the surface is there.
+
+    Parameters
+    ----------
+    surface : Surface
+        What is thinned.
+    seconds : float, optional
+        What the search has as a whole: then it is what fits into a share of that, or what is there already.
+
+    Warns
+    -----
+    SearchWarning
+        If it is not whole.
+    """
+    start = begun(surface)
+    if start is not None and (start.is_whole or seconds is not None):
+        return start
+    # the second entry is set by Ctrl-C alone
+    stop = np.zeros(2, np.bool_)
+
+    def work(_: None) -> Start:
+        # kept although Ctrl-C is raised when it comes back
+        start = _STARTS[surface] = _begin(surface, stop, seconds)
+        return start
+
+    (start,) = on_threads(work, [None], stop=stop)
+    if not start.is_whole:
+        warnings.warn(
+            f"{surface.model.name}: {seconds:g} s are too short to thin all {surface.n_vertices:,} vertices; the "
+            f"search starts from {start}",
+            SearchWarning,
+            stacklevel=2,
+        )
+    return start
+
+
+def _begin(surface: Surface, stop: BoolArray, seconds: float | None) -> Start:
+    """Thin from all vertices, or from those that insertion finds, as far as the time goes."""
+    limit = None if seconds is None else START_SHARE * seconds
+    fronts: list[NestedFront] = []
+
+    def timed(seconds: float | None, work: Callable[[], NestedFront]) -> None:
+        stop[0] = False
+        with stopping(stop, seconds):
+            fronts.insert(0, work())
+
+    if limit is None or surface.n_vertices * SECONDS_A_REMOVAL <= limit:
+        timed(limit, lambda: thinning(surface, stop=stop))
+        if not stop[0]:
+            return Start((fronts[0],), True)
+        left = QUICK if limit is None else min(QUICK, KEPT_SHARE * limit)
+    else:
+        left = limit
+    try:
+        timed(INSERT_SHARE * left, lambda: greedy_insertion(surface, choose="triangle", stop=stop))
+    except ValueError:  # the pinned vertices span no triangle: it has nothing to begin with
+        if not fronts:
+            timed(left, lambda: thinning(surface, stop=stop))
+        return Start.of(*fronts)
+    inserted = fronts[0]
+    # with Ctrl-C meanwhile this is not waited for
+    left = min(QUICK, left) if stop[1] else left
+    timed((1.0 - INSERT_SHARE) * left, lambda: thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
+    # thinned meshes are better than those inserted, as far down as they go
+    fronts[0], fronts[1] = fronts[1], fronts[0]
+    return Start.of(*fronts)
