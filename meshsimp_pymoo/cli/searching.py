@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import time
 from collections.abc import Mapping
@@ -112,7 +113,12 @@ def _simplify(request: Request, shown: Stages) -> int:
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
             return INTERRUPTED
-        return _write(found, keeper, shown)
+        ended = _write(found, keeper, shown)
+        # its subsets, and with the checkpoints those of the search, whose objects refer to each other, take more memory
+        # than the model
+        del found, keeper
+        gc.collect()
+        return hand_over(request, problem.surface, shown) if ended is None else ended
 
 
 def _claim(output: Output, search: Search) -> None:
@@ -347,8 +353,8 @@ class Keeper:
 # ---------------------------------------------------------------------------------------------------------- the results
 
 
-def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
-    """Write what was found, say so, and return the exit code."""
+def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
+    """Write what was found; return the exit code if it could not be, and the checkpoint is in place."""
     request, search, output = keeper.request, keeper.search, keeper.output
     folder, front = output.folder, found.front
     chosen, _ = request.wish.of(front)
@@ -385,7 +391,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
         reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
         say(f"{reason}; the same command goes on from the checkpoint in {folder}")
         return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
-    return hand_over(request, front.surface, shown)
+    return None
 
 
 def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown: Stages) -> dict[int, Refitted]:
