@@ -42,6 +42,8 @@ class Measure(NamedTuple):
         Of a sum: whether each vertex adds the square of its deviation.
     wish : str
         What ``--NAME`` asks for, if a mesh can be chosen by it.
+    searched : str
+        Of a wish for an error: the objective of the same order, which is lowered for it.
     """
 
     of: Callable[[Any, float], Any]
@@ -52,6 +54,7 @@ class Measure(NamedTuple):
     is_sum: bool = False
     squared: bool = False
     wish: str = ""
+    searched: str = ""
 
 
 def _measure(of: Callable[[Any, float], Any], **facts: Any) -> Any:
@@ -108,6 +111,7 @@ class Quality:
         meaning="mean over all original vertices",
         unit=LENGTH,
         wish="the smallest with a mean deviation of at most E [model units]",
+        searched="error",
     )
     rms_error: float = _measure(
         lambda table, weight: _root(table[..., SQUARES] / weight),
@@ -117,6 +121,8 @@ class Quality:
         minimised="rms",
         is_sum=True,
         squared=True,
+        wish="the smallest with a root mean square deviation of at most E [model units]",
+        searched="rms_error",
     )
     max_error: float = _measure(
         lambda table, weight: table[..., MAXIMUM],
@@ -125,6 +131,7 @@ class Quality:
         unit=LENGTH,
         minimised="max",
         wish="the smallest that deviates nowhere by more than E [model units]",
+        searched="max_error",
     )
     uncovered: int = _measure(
         lambda table, weight: table[..., UNCOVERED],

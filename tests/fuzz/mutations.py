@@ -30,7 +30,7 @@ YAML_WORDS = (
     "class", "parameters", "operators", "merged_over", "generations", "evaluations", "seconds", "meshlab", "methods",
     "steps", "down_to_fronts", "crossover", "mutation", "sampling", "repair", "duplicates", "pop_size", "footprint",
     "outside", "nearest", "ignore", "hull", "up", "patch", "front", "spacing", "nodata", "window", "max_edge", "pin",
-    "weights", "objectives", "max_triangles", "max_error", "rms_error", "triangles", "nsga2_v1", "nsga2_v2", "moead",
+    "weights", "objectives", "max_triangles", "max_objective", "max_error", "rms_error", "triangles", "nsga2_v1", "nsga2_v2", "moead",
     "weighted_ga_v1", "w", "oax", "uniform", "neighbour_shift", "pinned_corners", "roof:5", "pyramid:9", "plane:3",
     "null", "true", "no", "~", "-1", "0", "0.5", "1e3", "1.0e+3", ".inf", ".nan", "0x1F", "0o17", "1:30", "2020-01-01",
     "99999999999999999999", "9007199254740993", "&a", "*a", "<<", "!!python/object/apply:os.system", "!!binary", "!x",
