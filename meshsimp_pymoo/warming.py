@@ -75,7 +75,7 @@ def _compile_for(function: Any, *arguments: Any) -> None:
 
 
 def _records(surface: Any) -> tuple[Any, Any]:
-    from meshsimp_pymoo.surface.live import make_live
+    from meshsimp_pymoo.surface.books import make_live
 
     return surface.ground(), make_live(surface.n_vertices)
 

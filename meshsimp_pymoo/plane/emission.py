@@ -13,9 +13,8 @@ SLIVER_HEIGHT = 1e-9
 
 
 @inner
-def is_sliver(xy: np.ndarray, mesh: np.ndarray, t: int, min_height: float) -> bool:
+def is_sliver(xy: np.ndarray, a: int, b: int, c: int, min_height: float) -> bool:
     """Whether a triangle is lower than ``min_height`` over its longest edge; the same for all its rotations."""
-    a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
     while a > b or a > c:
         a, b, c = b, c, a
     ux = xy[2 * b] - xy[2 * a]
@@ -73,7 +72,7 @@ def emit(
             outer = stack[depth]
             for k in range(3):
                 t = mesh[outer + 4 + k] & TRIANGLE
-                if emitted[t // RECORD] == 1 and is_sliver(xy, mesh, t, min_height):
+                if emitted[t // RECORD] == 1 and is_sliver(xy, mesh[t], mesh[t + 1], mesh[t + 2], min_height):
                     emitted[t // RECORD] = 0
                     stack[depth] = t
                     depth += 1

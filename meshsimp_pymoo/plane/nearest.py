@@ -13,6 +13,45 @@ from meshsimp_pymoo.compiling.functions import inner
 
 # Segments in one leaf.
 LEAF = 4
+# What rounding may add to a distance in the unit square, of a point to a segment inside a box.
+ROUNDING = 1e-15
+
+
+def boxes_of_runs(xy: np.ndarray, run: int) -> np.ndarray:
+    """Return the boxes of a tree over runs of points that lie along a curve.
+
+    Parameters
+    ----------
+    xy : (N, 2) float array
+        The points.
+    run : int
+        Points in one leaf.
+
+    Returns
+    -------
+    (2 L, 4) float array
+        Lowest and highest x, then y, of each of L = ceil(N / run) leaves, the last L rows, and of what is above them:
+        row 1 is the root, the children of k are 2 k and 2 k + 1.
+
+    Examples
+    --------
+    >>> boxes_of_runs(np.array([[0.0, 0.5], [0.25, 0.5], [1.0, 0.0]]), 2)[1:].tolist()
+    [[0.0, 1.0, 0.0, 0.5], [0.0, 0.25, 0.5, 0.5], [1.0, 1.0, 0.0, 0.0]]
+    """
+    starts = np.arange(0, len(xy), run)
+    n_leaves = len(starts)
+    boxes = np.zeros((2 * n_leaves, 4))
+    for axis in (0, 1):
+        for side, extreme in ((0, np.minimum), (1, np.maximum)):
+            column = boxes[:, 2 * axis + side]
+            column[n_leaves:] = extreme.reduceat(xy[:, axis], starts)
+            end = n_leaves
+            while end > 1:  # those whose children are known
+                first = (end + 1) // 2
+                children = column[2 * first : 2 * end].reshape(-1, 2)
+                column[first:end] = extreme(children[:, 0], children[:, 1])
+                end = first
+    return boxes
 
 
 @inner
@@ -77,10 +116,20 @@ def _to_segment(xy: np.ndarray, a: int, b: int, x: float, y: float) -> tuple[flo
 
 
 @inner(inline=True)
-def _to_box(boxes: np.ndarray, node: int, x: float, y: float) -> float:
+def to_box(boxes: np.ndarray, node: int, x: float, y: float) -> float:
     """Squared distance from (x, y) to a node's box; a little less, so that rounding hides no segment."""
     dx = max(boxes[node, 0] - x, 0.0, x - boxes[node, 1])
     dy = max(boxes[node, 2] - y, 0.0, y - boxes[node, 3])
+    dx = max(dx - ROUNDING, 0.0)
+    dy = max(dy - ROUNDING, 0.0)
+    return (dx * dx + dy * dy) * (1.0 - 1e-9)
+
+
+@inner(inline=True)
+def between_boxes(boxes: np.ndarray, node: int, low_x: float, high_x: float, low_y: float, high_y: float) -> float:
+    """Squared distance from a node's box to another box; a little less."""
+    dx = max(max(boxes[node, 0] - high_x, low_x - boxes[node, 1]) - ROUNDING, 0.0)
+    dy = max(max(boxes[node, 2] - high_y, low_y - boxes[node, 3]) - ROUNDING, 0.0)
     return (dx * dx + dy * dy) * (1.0 - 1e-9)
 
 
@@ -109,7 +158,7 @@ def nearest_segment(
     while depth > 0:
         depth -= 1
         node = stack[depth]
-        if _to_box(boxes, node, x, y) > best_d:
+        if to_box(boxes, node, x, y) > best_d:
             continue
         if node >= n_leaves:
             first = (node - n_leaves) * LEAF
@@ -123,7 +172,7 @@ def nearest_segment(
         # The nearer child on top.
         near = 2 * node
         far = near + 1
-        if _to_box(boxes, far, x, y) < _to_box(boxes, near, x, y):
+        if to_box(boxes, far, x, y) < to_box(boxes, near, x, y):
             near, far = far, near
         stack[depth] = far
         stack[depth + 1] = near

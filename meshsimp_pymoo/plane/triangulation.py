@@ -197,7 +197,7 @@ def triangulate(
     exact_area: float,
     exact_lift: float,
 ) -> int:
-    """Triangulate the first ``n`` points; return the end of the triangles' records (0 if the points span none).
+    """Triangulate the first ``n`` points or those listed; return the end of the triangles' records (0: there are none).
 
     Parameters
     ----------
@@ -209,9 +209,10 @@ def triangulate(
     first : (m,) int array
         Points to insert before the others (negative: none), such as corners, which spare the others the hull.
     order : (n,) or (0,) int array
-        Order of insertion; empty: as stored. The result is the same triangulation, only slower to find.
-    inserted : (n,) uint8 array
-        Workspace.
+        Order of insertion; empty: as stored. The result is the same triangulation, only slower to find. The points may
+        be some of those in ``xy``: then only the rows listed here are triangulated.
+    inserted : uint8 array
+        Workspace, an entry for each row of ``xy``.
     mesh : (16 n,) uint32 array
         Receives the triangles' records, ghosts included; see the module's text.
     exact_area, exact_lift : float
@@ -222,10 +223,10 @@ def triangulate(
     int
         8 (2 n - 2): the end of the records in ``mesh``; 0 where all points lie on one line.
     """
-    for i in range(n):
-        inserted[i] = 0
     n_first = len(first)
     natural = len(order) == 0
+    for i in range(n):
+        inserted[i if natural else order[i]] = 0
     # The first triangle: the first two points and the first one that is not on their line.
     a = -1
     b = -1

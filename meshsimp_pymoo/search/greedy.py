@@ -26,17 +26,19 @@ from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.surface.moves import (
     cells_around,
+    effort,
+    error_now,
     exchange,
     is_site,
     n_cells,
     n_triangles,
+    ranked,
     sites_around,
     snapshot,
-    total_cost,
     try_exchange,
     worst_in,
 )
-from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
+from meshsimp_pymoo.surface.surface import Surface, cost_of, error_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
 
@@ -88,21 +90,26 @@ def thinning(
     *,
     kept: BoolArray | None = None,
     least: int = 0,
+    most_error: float = np.inf,
     stop: BoolArray | None = None,
 ) -> NestedFront:
     """Remove the vertex whose removal adds the least error, until only the pinned ones are left.
 
+    Where the measure is the maximum, the vertex goes whose removal leaves the least maximum among the vertices around
+    it, and of such vertices the one that adds the least to the sum of the eighth powers.
+
     Parameters
     ----------
     surface : Surface
-        The original mesh of N vertices and its rules, whose measure is what counts: w_p d_p, or w_p times the square of
-        d_p; it is also what the front's ``error`` is in.
+        The original mesh of N vertices and its rules, whose measure is what counts and what the front's ``error`` is in.
     pinned : (N,) bool array, optional
         Vertices never removed, besides those that the surface pins.
     kept : (N,) bool array, optional
         The subset to start from; all vertices by default (of several at one position, the first).
     least : int
         Stop once there are this many triangles or fewer.
+    most_error : float
+        Stop before the error, in the surface's measure, would exceed this [model units].
     stop : (1,) bool array, optional
         Another thread that sets it ends the thinning soon after, with the front as far as it came.
 
@@ -116,19 +123,20 @@ def thinning(
     TypeError
         If this is a model, not a surface.
     ValueError
-        If the surface's measure is no sum, or it has no compiled moves.
+        If the surface has no compiled moves.
     """
     ground = movable_ground(surface, "thinning and insertion")
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
     flag = np.zeros(1, np.bool_) if stop is None else stop
+    most = cost_of(surface, most_error)
 
     def work(kept: BoolArray | None) -> tuple[Any, ...]:
         with surface.books(np.ones(n_all, bool) if kept is None else kept | fixed, fixed=fixed) as books:
             sites, _, _ = snapshot(ground, books, n_all)
             n = int((sites & ~fixed).sum())
             removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-            n_removed = thin(ground, books, n_all, fixed, least, np.inf, flag, removed, error, triangles)
+            n_removed = thin(ground, books, n_all, fixed, least, np.inf, most, flag, removed, error, triangles)
         return sites, removed, error, triangles, n_removed
 
     ((sites, removed, error, triangles, n_removed),) = on_threads(work, [kept], stop=flag)
@@ -148,6 +156,7 @@ def greedy_insertion(
     *,
     choose: str = "point",
     most: int | None = None,
+    least_error: float = 0.0,
     stop: BoolArray | None = None,
 ) -> NestedFront:
     """Insert the worst vertex, starting from the pinned ones.
@@ -162,6 +171,8 @@ def greedy_insertion(
         The vertex with the largest cost of all, or that of the triangle with the largest sum of costs.
     most : int, optional
         Number of vertices to insert; all by default.
+    least_error : float
+        Stop once the error, in the surface's measure, is at most this [model units].
     stop : (1,) bool array, optional
         Another thread that sets it ends the insertion soon after, with the front as far as it came.
 
@@ -175,7 +186,7 @@ def greedy_insertion(
     TypeError
         If this is a model, not a surface.
     ValueError
-        If an argument makes no sense, the surface's measure is no sum, or it has no compiled moves.
+        If an argument makes no sense, or the surface has no compiled moves.
     """
     ground = movable_ground(surface, "thinning and insertion")
     if choose not in ("point", "triangle"):
@@ -185,13 +196,15 @@ def greedy_insertion(
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
     flag = np.zeros(1, np.bool_) if stop is None else stop
+    # 0 means to the end: where nothing deviates there is nothing to insert, and rounding may leave a little
+    least = cost_of(surface, least_error) if least_error > 0.0 else -np.inf
 
     def work(by_point: bool) -> tuple[Any, ...]:
         with surface.books(fixed, fixed=fixed) as books:
             sites = np.flatnonzero(snapshot(ground, books, n_all)[0])
             n = n_all - len(sites) if most is None else min(most, n_all - len(sites))
             inserted, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-            n_inserted = _grow(ground, books, n_all, by_point, flag, inserted, error, triangles)
+            n_inserted = _grow(ground, books, n_all, by_point, least, flag, inserted, error, triangles)
         return sites, inserted, error, triangles, n_inserted
 
     ((sites, inserted, error, triangles, n_inserted),) = on_threads(work, [choose == "point"], stop=flag)
@@ -216,13 +229,21 @@ def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:
     return surface.pinned.copy() if pinned is None else surface.pinned | pinned
 
 
+# A site of more cells than this is a hub; it is costed again after this share of them has seen a removal.
+HUB = 48
+PATIENCE = 0.125
+
 # ------------------------------------------------------------------------------------------------- a heap of keys
 
 
 @inner(inline=True)
 def _before(key: np.ndarray, a: int, b: int) -> bool:
-    """Order of the heap: by key, then by index, so that ties do not depend on history."""
-    return key[a] < key[b] or (key[a] == key[b] and a < b)
+    """Order of the heap: by both keys, then by index, so that ties do not depend on history."""
+    if key[2 * a] != key[2 * b]:
+        return key[2 * a] < key[2 * b]
+    if key[2 * a + 1] != key[2 * b + 1]:
+        return key[2 * a + 1] < key[2 * b + 1]
+    return a < b
 
 
 @inner
@@ -257,6 +278,14 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
     at[v] = k
 
 
+@inner
+def _cost_again(g: Any, live: Any, v: int, key: np.ndarray, patience: np.ndarray) -> None:
+    change, _ = try_exchange(g, live, v, -1, np.inf)
+    cells = effort(g, live)
+    key[2 * v], key[2 * v + 1] = ranked(g, live, change)
+    patience[v] = np.int64(PATIENCE * cells) if cells > HUB else 0
+
+
 @entry
 def thin(
     ground: Any,
@@ -265,12 +294,17 @@ def thin(
     fixed: np.ndarray,
     least: int,
     limit: float,
+    most: float,
     stop: np.ndarray,
     removed: np.ndarray,
     error: np.ndarray,
     triangles: np.ndarray,
 ) -> int:
-    """Remove the vertex that adds the least cost while that is at most ``limit`` and triangles exceed ``least``.
+    """Remove the vertex that adds the least while that is at most ``limit`` and triangles exceed ``least``.
+
+    What is removed has been costed exactly at that moment. Only a site of more than ``HUB`` cells may cost less than
+    is known, and go later than it could: it is costed again when it comes to the top of the heap, or ``PATIENCE`` of
+    its cells have seen a removal, as doing so after each would take the square of its cells.
 
     Parameters
     ----------
@@ -278,12 +312,14 @@ def thin(
         Of a surface of ``n_all`` vertices; the books end at the last mesh.
     fixed : (n_all,) bool array
         Sites that stay.
+    most : float
+        It ends before the error, as `moves.error_now` has it, exceeds this.
     stop : (1,) bool array
         Ends it where another thread sets it.
     removed : (n,) int array
         Filled with the vertices removed, in their order; n is the number of sites that are not fixed.
     error, triangles : (n + 1,) arrays
-        Filled with the cost and the number of triangles before the first removal and after each.
+        Filled with the error and the number of triangles before the first removal and after each.
 
     Returns
     -------
@@ -292,31 +328,36 @@ def thin(
     """
     g = borrowed(ground)
     live = borrowed(books)
-    key = np.empty(n_all, np.float64)
+    key = np.empty(2 * n_all, np.float64)  # two of each, see moves.ranked
     heap = np.empty(n_all, np.int32)
     at = np.empty(n_all, np.int32)
+    # How many removals beside a hub are left before it is costed again; below 0 once there was one.
+    patience = np.zeros(n_all, np.int32)
     n = 0
     for v in range(n_all):
         if stop[0]:
             n = 0
             break
-        key[v] = np.inf
         at[v] = -1
         if is_site(g, live, v) and not fixed[v]:
-            key[v], _ = try_exchange(g, live, v, -1, np.inf)
+            _cost_again(g, live, v, key, patience)
             heap[n] = v
             at[v] = n
             n += 1
     for k in range(n // 2 - 1, -1, -1):
         _sift_down(heap, at, key, k, n)
-    error[0] = total_cost(g, live)
+    error[0] = error_now(g, live)
     triangles[0] = n_triangles(g, live)
     n_removed = 0
     around = np.empty(2 * n_all + 8, np.int64)
-    while n > 0 and key[heap[0]] < np.inf and key[heap[0]] <= limit and triangles[n_removed] > least:
-        if stop[0]:
-            break
+    while n > 0 and triangles[n_removed] > least and not stop[0]:
         v = heap[0]
+        if patience[v] < 0:
+            _cost_again(g, live, v, key, patience)
+            _sift_down(heap, at, key, 0, n)
+            continue
+        if not key[2 * v] < np.inf or key[2 * v] > limit:
+            break
         n -= 1
         heap[0] = heap[n]
         at[heap[0]] = 0
@@ -328,8 +369,12 @@ def thin(
             continue
         removed[n_removed] = v
         n_removed += 1
-        error[n_removed] = total_cost(g, live)
+        error[n_removed] = error_now(g, live)
         triangles[n_removed] = n_triangles(g, live)
+        if error[n_removed] > most:
+            exchange(g, live, -1, v)
+            n_removed -= 1
+            break
         if triangles[n_removed] == 0:
             # The last mesh was the smallest one there is.
             n_removed -= 1
@@ -338,12 +383,13 @@ def thin(
             w = around[k]
             if at[w] < 0:
                 continue
-            old = key[w]
-            key[w], _ = try_exchange(g, live, w, -1, np.inf)
-            if key[w] < old:
-                _sift_up(heap, at, key, at[w])
-            else:
-                _sift_down(heap, at, key, at[w], n)
+            if patience[w] != 0:
+                patience[w] = -(abs(patience[w]) - 1)
+                if patience[w] != 0:
+                    continue
+            _cost_again(g, live, w, key, patience)
+            _sift_up(heap, at, key, at[w])
+            _sift_down(heap, at, key, at[w], n)
     return n_removed
 
 
@@ -353,21 +399,24 @@ def _grow(
     books: Any,
     n_all: int,
     by_point: bool,
+    least: float,
     stop: np.ndarray,
     inserted: np.ndarray,
     error: np.ndarray,
     triangles: np.ndarray,
 ) -> int:
-    """Insert the worst vertex of all, or of the worst cell; fill what :func:`thin` fills and return their number."""
+    """Insert the worst vertex of all, or of the worst cell, until the error is at most ``least``.
+
+    Fills what :func:`thin` fills and returns their number.
+    """
     g = borrowed(ground)
     live = borrowed(books)
     most_cells = 2 * n_all + 8
-    key = np.empty(most_cells, np.float64)  # minus what makes a cell urgent
+    key = np.zeros(2 * most_cells, np.float64)  # minus what makes a cell urgent, and 0
     best = np.empty(most_cells, np.int32)
     heap = np.empty(most_cells, np.int32)
     at = np.empty(most_cells, np.int32)
     for r in range(most_cells):
-        key[r] = np.inf
         best[r] = -1
         at[r] = -1
     n = 0
@@ -375,26 +424,36 @@ def _grow(
     n_changed = n_cells(g, live)
     for r in range(n_changed):
         changed[r] = r
-    error[0] = total_cost(g, live)
+    error[0] = error_now(g, live)
     triangles[0] = n_triangles(g, live)
     n_inserted = 0
+    is_fresh = True  # whether all cells are costed anew: what no triangle covers changes with an outline far away
     while True:
         for k in range(n_changed):
             r = changed[k]
             best[r], most, whole = worst_in(g, live, r)
-            key[r] = -(most if by_point else whole) if best[r] >= 0 else np.inf
+            key[2 * r] = -(most if by_point else whole) if best[r] >= 0 else np.inf
             if at[r] < 0:
                 heap[n] = r
                 at[r] = n
                 n += 1
             _sift_up(heap, at, key, at[r])
             _sift_down(heap, at, key, at[r], n)
-        if n_inserted == len(inserted) or n == 0 or key[heap[0]] == np.inf or stop[0]:
+        if n_inserted == len(inserted) or n == 0 or stop[0] or error[n_inserted] <= least:
             return n_inserted
+        if key[2 * heap[0]] == np.inf:
+            if is_fresh:
+                return n_inserted
+            n_changed = n_cells(g, live)
+            for r in range(n_changed):
+                changed[r] = r
+            is_fresh = True
+            continue
+        is_fresh = False
         v = best[heap[0]]
         exchange(g, live, -1, v)
         inserted[n_inserted] = v
         n_inserted += 1
-        error[n_inserted] = total_cost(g, live)
+        error[n_inserted] = error_now(g, live)
         triangles[n_inserted] = n_triangles(g, live)
         n_changed = cells_around(g, live, v, changed)

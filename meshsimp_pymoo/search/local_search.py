@@ -256,7 +256,7 @@ def _thin_to(ground: Any, books: Any, pinned: BoolArray, triangles: int, stop: B
     """Remove the vertices that add the least error until there are at most so many triangles."""
     n = len(pinned) + 1
     removed, error, counts = np.empty(n, np.int32), np.empty(n), np.empty(n, np.int32)
-    thin(ground, books, len(pinned), pinned, triangles, np.inf, stop, removed, error, counts)
+    thin(ground, books, len(pinned), pinned, triangles, np.inf, np.inf, stop, removed, error, counts)
 
 
 def relocate(
@@ -312,7 +312,7 @@ def relocate(
     TypeError
         If this is a model, not a surface.
     ValueError
-        If the surface's measure is no sum, or it has no compiled moves.
+        If the surface has no compiled moves.
     """
     ground = movable_ground(surface, "thinning and relocation")
     n, pinned = surface.n_vertices, surface.pinned

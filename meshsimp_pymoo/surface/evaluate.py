@@ -32,6 +32,8 @@ from meshsimp_pymoo.workers import Reserve, on_threads
 
 # A vertex counts as covered up to this far outside a triangle, in barycentric coordinates: rounding of rotated borders.
 COVER_TOLERANCE = 1e-9
+# How far from the triangle that is at most, in the unit square: three tolerances of what a corner is from the centroid.
+REACH = 3e-9
 
 NO_SITE = 0xFFFFFFFF
 
@@ -146,7 +148,8 @@ def _measure_bare(
         wb = (px * vy - py * vx) / area
         wc = (py * ux - px * uy) / area
         wa = 1.0 - wb - wc
-        is_covered = wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
+        is_near = d2 <= REACH * REACH
+        is_covered = is_near and wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
         if is_covered:
             # Within rounding of the border, as on the sides of a turned rectangle.
             d = abs(wa * site_z[a] + wb * site_z[b] + wc * site_z[c] - z[i])

@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.surface.books import RUN
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
@@ -29,10 +31,15 @@ class Ground(NamedTuple):
     start: np.ndarray
     items: np.ndarray
     faces: np.ndarray
+    boxes: np.ndarray  # (2 N / RUN, 4) of the vertices in each node of the tree over runs of them, see bare
     nearest: bool  # whether an uncovered vertex costs its distance
     weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
     weighed: bool  # whether the cost of a vertex in a sum is not d_p itself, but what weighed_cost makes of it
-    squared: bool  # whether the cost is the square of d_p
+    power: int  # to which d_p counts in it: 1, 2 or 8
+    scale: float  # what d_p is multiplied by before
+    own: float  # what the cost by the measure is multiplied by
+    bound: float  # what d_p exceeds this by is added
+    by_peak: bool  # whether the books know the largest d_p, and the error is that
 
 
 def make_ground(model: OpenModel, rules: Rules) -> Ground:
@@ -42,7 +49,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
     area, lift = exact_ranges(xy)
     footprint = model.footprint
     weight = np.empty(0) if model.weights is None else model.weights
-    squared = OBJECTIVES[rules.measure].squared
+    power = OBJECTIVES[rules.measure].power
     return Ground(
         xy=xy.ravel(),
         z=np.ascontiguousarray(model.points[:, 2]),
@@ -57,8 +64,13 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         start=footprint.start,
         items=footprint.items,
         faces=footprint.faces,
+        boxes=boxes_of_runs(xy, RUN),
         nearest=rules.outside == "nearest",
         weight=weight,
-        weighed=squared or len(weight) > 0,
-        squared=squared,
+        weighed=power > 1 or len(weight) > 0,
+        power=power,
+        scale=1.0 / model.diagonal if power == 8 else 1.0,
+        own=1.0,
+        bound=np.inf,
+        by_peak=not OBJECTIVES[rules.measure].is_sum,
     )

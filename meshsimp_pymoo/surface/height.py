@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property, partial
@@ -11,9 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.surface.books import Live, make_live, with_peaks
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.ground import Ground, make_ground
-from meshsimp_pymoo.surface.live import Live, build, make_live
+from meshsimp_pymoo.surface.live import build
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.pins import pinned_vertices
@@ -111,11 +113,27 @@ class HeightSurface:
         """Return the model's arrays and the rules for compiled functions."""
         return self._ground
 
+    def bounded(self, most: float, *, own: float = 0.0) -> HeightSurface:
+        """Return this surface with another cost of moves: what deviations exceed ``most`` by, and a share of its own.
+
+        Raises
+        ------
+        ValueError
+            If ``most`` is negative or no number.
+        """
+        if not most >= 0:
+            raise ValueError(f"most = {most} is no deviation of at least 0")
+        other = copy.copy(self)
+        other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
+        return other
+
     @contextmanager
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Live]:
         """Lend the live triangulation of a subset; of several kept vertices at one place, a fixed one is the site."""
-        with self._books.one() as live:
-            build(self._ground, live, self.sites(kept, fixed), self.model.name)
+        with self._books.one() as lent:
+            ground = self._ground
+            live = with_peaks(lent) if ground.by_peak else lent
+            build(ground, live, self.sites(kept, fixed), self.model.name)
             yield live
 
     def sites(self, kept: BoolArray, fixed: BoolArray | None = None) -> IntArray:

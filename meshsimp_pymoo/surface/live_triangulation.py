@@ -9,18 +9,10 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, IntArray, require_bool
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.triangulation import RECORD
+from meshsimp_pymoo.surface.books import EMITTED, END, N_EMITTED, PEAK, make_live, with_peaks
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.live import (
-    EMITTED,
-    END,
-    N_EMITTED,
-    PEAK,
-    build,
-    exchange_once,
-    make_live,
-    try_exchange_once,
-)
+from meshsimp_pymoo.surface.live import build, exchange_once, try_exchange_once
 from meshsimp_pymoo.surface.surface import error_of, movable_ground
 
 
@@ -37,7 +29,7 @@ class LiveTriangulation:
     Raises
     ------
     ValueError
-        If ``kept`` has the wrong shape or spans no triangle, or the measure is no sum.
+        If ``kept`` has the wrong shape or spans no triangle.
 
     Examples
     --------
@@ -59,7 +51,8 @@ class LiveTriangulation:
         kept = require_bool(kept, f"a subset of {model.name} is a bool array")
         if kept.shape != (model.n_vertices,):
             raise ValueError(f"a subset of {model.name} has shape ({model.n_vertices},), not {kept.shape}")
-        self.live = make_live(model.n_vertices)
+        live = make_live(model.n_vertices)
+        self.live = with_peaks(live) if self.ground.by_peak else live
         self._kept = kept.copy()
         # Of several vertices at one position the first kept one is the site; `_group` numbers the positions.
         self._has_twins = self.ground.has_twins
@@ -128,32 +121,42 @@ class LiveTriangulation:
         v = self._index(vertex, kept=False)
         if self._site_at(v) is not None:
             return self._tried(lambda: self.insert(v), lambda: self.remove(v))
-        return self._measured(*try_exchange_once(self.ground, self.live, -1, v))
+        return self._try_exchange(-1, v)
 
     def try_remove(self, vertex: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if the vertex were dropped (inf: it cannot)."""
         v = self._index(vertex, kept=True)
         if self._has_twins:
             return self._tried(lambda: self.remove(v), lambda: self.insert(v))
-        return self._measured(*try_exchange_once(self.ground, self.live, v, -1))
+        return self._try_exchange(v, -1)
 
     def try_move(self, vertex: int, to: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if one vertex were dropped for another."""
         if self._has_twins:
             return self._tried(lambda: self.move(vertex, to), lambda: self.move(to, vertex))
         v, w = self._index(vertex, kept=True), self._index(to, kept=False)
-        return self._measured(*try_exchange_once(self.ground, self.live, v, w))
+        return self._try_exchange(v, w)
 
     def _total(self) -> float:
-        """Return the sum of the costs."""
+        """Return the sum of the costs, or the largest deviation."""
+        if not self.triangles:
+            return np.inf
+        if self.ground.by_peak:
+            return float(self.live.peaks[1])
         # what rounding may leave below 0 is nothing
-        return max(float(self.live.amount[:PEAK].sum()), 0.0) if self.triangles else np.inf
+        return max(float(self.live.amount[:PEAK].sum()), 0.0)
 
-    def _measured(self, change: float, triangles: int) -> tuple[float, int]:
-        """Turn a change of the sum of costs into one of the error."""
-        if self.ground.squared:
-            change = error_of(self.surface, self._total() + change) - self.error
-        return float(change), int(triangles)
+    def _try_exchange(self, v: int, w: int) -> tuple[float, int]:
+        """Return the change of the error and of the number of triangles if v went and w came; -1: none."""
+        if self.ground.by_peak:  # the largest deviation of all is known once it is done
+            before, n = self.error, self.triangles
+            if not exchange_once(self.ground, self.live, v, w):
+                return np.inf, 0
+            found = self.error - before, self.triangles - n
+            exchange_once(self.ground, self.live, w, v)
+            return found
+        change, triangles = try_exchange_once(self.ground, self.live, v, w)
+        return float(error_of(self.surface, self._total() + change) - self.error), int(triangles)
 
     def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
         before, triangles = self.error, self.triangles

@@ -36,10 +36,11 @@ class Measure(NamedTuple):
         Its unit; empty for a number of things.
     minimised : str
         What ``--measure`` calls it, if it can be an objective.
+    power : int
+        Of an objective: moves of vertices lower the sum of the deviations to this power, weighted. That of the eighth
+        powers stands for the maximum: the largest outweigh all others.
     is_sum : bool
-        Whether its order is that of a sum over the vertices, so that thinning and moves of vertices can lower it.
-    squared : bool
-        Of a sum: whether each vertex adds the square of its deviation.
+        Whether its order is that of this sum; thinning goes by the maximum itself where it is not.
     wish : str
         What ``--NAME`` asks for, if a mesh can be chosen by it.
     searched : str
@@ -51,8 +52,8 @@ class Measure(NamedTuple):
     meaning: str
     unit: str = ""
     minimised: str = ""
+    power: int = 1
     is_sum: bool = False
-    squared: bool = False
     wish: str = ""
     searched: str = ""
 
@@ -120,7 +121,7 @@ class Quality:
         unit=LENGTH,
         minimised="rms",
         is_sum=True,
-        squared=True,
+        power=2,
         wish="the smallest with a root mean square deviation of at most E [model units]",
         searched="rms_error",
     )
@@ -130,6 +131,7 @@ class Quality:
         meaning="the largest at any original vertex",
         unit=LENGTH,
         minimised="max",
+        power=8,
         wish="the smallest that deviates nowhere by more than E [model units]",
         searched="max_error",
     )
@@ -182,13 +184,7 @@ def checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def require_measure(measure: str, *, summed_for: str = "") -> None:
-    """Raise a ValueError if this is no objective's measure or, for somebody who adds up, none that is a sum."""
+def require_measure(measure: str) -> None:
+    """Raise a ValueError if this is no objective's measure."""
     if measure not in OBJECTIVES:
         raise ValueError(f"measure={measure!r} is unknown; choose one of {', '.join(map(repr, OBJECTIVES))}")
-    if summed_for and not OBJECTIVES[measure].is_sum:
-        sums = " or ".join(repr(name) for name, known in OBJECTIVES.items() if known.is_sum)
-        raise ValueError(
-            f"{summed_for} lower a sum over the vertices, and {measure!r} is none; use {sums}, or an algorithm that "
-            "only evaluates, such as nsga2_v1()"
-        )

@@ -83,6 +83,20 @@ def total_cost(ground: Any, books: Any) -> float:
     return float(_unanswered())
 
 
+def error_now(ground: Any, books: Any) -> float:
+    """Return what the measure says: the sum of the costs, or the largest deviation; infinite where there is no mesh."""
+    return float(_unanswered())
+
+
+def ranked(ground: Any, books: Any, change: float) -> tuple[float, float]:
+    """Return the rank of a removal whose `try_exchange`, the last one, has found this change: lowest first, and ties.
+
+    The change where the measure is a sum; the largest deviation that the removal leaves, then the change, where it is
+    the maximum.
+    """
+    return _unanswered()
+
+
 def n_triangles(ground: Any, books: Any) -> int:
     """Return the number of triangles of the mesh."""
     return int(_unanswered())
@@ -123,6 +137,11 @@ def exchange(ground: Any, books: Any, v: int, w: int) -> bool:
 
 def sites_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     """List the sites whose removal may cost something else once site v is gone; return their number."""
+    return int(_unanswered())
+
+
+def effort(ground: Any, books: Any) -> int:
+    """Return how many cells at site v the last `try_exchange` has found: what trying it again takes."""
     return int(_unanswered())
 
 

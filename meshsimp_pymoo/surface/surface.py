@@ -277,6 +277,14 @@ class Surface(Protocol):
         """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
         ...
 
+    def bounded(self, most: float, *, own: float = 0.0) -> Surface:
+        """Return this surface for moves that bring all deviations down to ``most`` [model units].
+
+        Their cost is the sum of what the deviations exceed it by, of vertices whose weight is not 0, and ``own`` times
+        what they cost here. All else is as here.
+        """
+        ...
+
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> AbstractContextManager[Any]:
         """Lend the record of the triangulation of a subset, to be changed by moves until the context ends.
 
@@ -326,10 +334,9 @@ def movable_ground(surface: Surface, who: str) -> Any:
     TypeError
         If this is no surface but a model, which has no rules.
     ValueError
-        If it has no ground, or its measure is no sum.
+        If it has no ground.
     """
     require_rules(surface, who)
-    require_measure(surface.rules.measure, summed_for=who)
     ground = surface.ground()
     if ground is None:
         raise ValueError(
@@ -340,8 +347,12 @@ def movable_ground(surface: Surface, who: str) -> Any:
 
 
 def error_of(surface: Surface, cost: Any) -> Any:
-    """Return the error for sums of costs: the sum itself, or the root of their weighted mean where they are squares."""
+    """Return the error for what `surface.moves.error_now` says: the root of the weighted mean where it adds squares."""
     # Sums that live can end a little below 0, where nothing deviates.
-    if OBJECTIVES[surface.rules.measure].squared:
-        return np.sqrt(np.maximum(cost, 0.0) / surface.total_weight)
-    return cost
+    cost = np.maximum(cost, 0.0)
+    return np.sqrt(cost / surface.total_weight) if OBJECTIVES[surface.rules.measure].power == 2 else cost
+
+
+def cost_of(surface: Surface, error: float) -> float:
+    """Return what `surface.moves.error_now` says where the error is this."""
+    return error * error * surface.total_weight if OBJECTIVES[surface.rules.measure].power == 2 else error

@@ -25,8 +25,8 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.live import END
 from meshsimp_pymoo.surface.model import OpenModel, placed_model
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -115,7 +115,7 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
         n = int((is_site & ~fixed).sum())
         removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
         limit = FORESIGHT * 2.0 * tile.limit
-        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.zeros(1, np.bool_), removed, error, triangles)
+        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, np.zeros(1, np.bool_), removed, error, triangles)
     saved = (triangles[0] - triangles[: n_removed + 1]).astype(np.int64)
     level = hull_levels(saved, error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, tile.limit, side="right"))

@@ -7,6 +7,7 @@ are pinned. Nothing here is quick: every question looks at the whole circle.
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import itertools
 from collections.abc import Iterator
@@ -69,6 +70,7 @@ class Circle:
     def __init__(self, model: Curve, rules: Rules | None = None) -> None:
         self.model = model
         self.rules = rules or Rules()
+        self._ground: Round | None = None
         self.pinned: BoolArray = np.zeros(model.n_vertices, bool)
         self.pinned[[0, model.n_vertices // 3, 2 * model.n_vertices // 3]] = True
 
@@ -173,12 +175,20 @@ class Circle:
 
     def ground(self) -> Any | None:
         """Return the points and the measure."""
-        return Round(np.ascontiguousarray(self.places.ravel()), OBJECTIVES[self.rules.measure].squared)
+        if self._ground is not None:
+            return self._ground
+        return Round(np.ascontiguousarray(self.places.ravel()), OBJECTIVES[self.rules.measure].power, OBJECTIVES[self.rules.measure].is_sum)
+
+    def bounded(self, most: float, *, own: float = 0.0) -> Surface:
+        """Return the circle for moves that bring all distances down to the most."""
+        other = copy.copy(self)
+        other._ground = self.ground()._replace(bound=float(most), own=float(own), is_sum=True)
+        return other
 
     @contextmanager
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Any]:
         """Lend a record of the kept points; all are at places of their own."""
-        books = Kept(kept.copy(), np.zeros(1))
+        books = Kept(kept.copy(), np.zeros(2))
         books.total[0] = _cost_of(self.ground(), books.site)
         yield books
 
@@ -226,14 +236,17 @@ class Round(NamedTuple):
     """What does not change."""
 
     xy: np.ndarray  # (2 N,) the points
-    squared: bool  # whether the cost is the square of the distance
+    power: int  # to which the distance counts in the cost
+    is_sum: bool  # whether the measure is the sum of the costs, not the largest distance
+    bound: float = np.inf  # what distances exceed this by is added
+    own: float = 1.0  # what the cost by the measure is multiplied by
 
 
 class Kept(NamedTuple):
     """What changes."""
 
     site: np.ndarray  # (N,) whether a point is kept
-    total: np.ndarray  # (1,) the sum of the costs
+    total: np.ndarray  # (2,) the sum of the costs, and the largest distance that the last trial has found in the end
 
 
 @njit
@@ -273,7 +286,7 @@ def _deviations(xy: np.ndarray, site: np.ndarray) -> np.ndarray:
 @njit(nogil=True)
 def _cost(ground: Round, site: np.ndarray, i: int) -> float:
     d = _deviation(ground.xy, site, i)
-    return d * d if ground.squared else d
+    return ground.own * d**ground.power + max(d - ground.bound, 0.0)
 
 
 @njit(nogil=True)
@@ -300,6 +313,22 @@ def _total_cost(ground: Round, books: Kept) -> float:
     return books.total[0]
 
 
+@answers(moves.error_now, Round)
+@njit(nogil=True)
+def _error_now(ground: Round, books: Kept) -> float:
+    if ground.is_sum or books.site.sum() < 3:
+        return books.total[0]
+    return max([_deviation(ground.xy, books.site, i) for i in range(len(books.site))])
+
+
+@answers(moves.ranked, Round)
+@njit(nogil=True)
+def _ranked(ground: Round, books: Kept, change: float) -> tuple[float, float]:
+    if ground.is_sum or change == np.inf:
+        return change, 0.0
+    return books.total[1], change
+
+
 @answers(moves.n_triangles, Round)
 @njit(nogil=True)
 def _n_triangles(ground: Round, books: Kept) -> int:
@@ -316,6 +345,12 @@ def _n_sites(ground: Round, books: Kept) -> int:
 @njit(nogil=True)
 def _is_site(ground: Round, books: Kept, v: int) -> bool:
     return books.site[v]
+
+
+@answers(moves.effort, Round)
+@njit(nogil=True)
+def _effort(ground: Round, books: Kept) -> int:
+    return 2
 
 
 @answers(moves.is_taken, Round)
@@ -346,6 +381,8 @@ def _urgency(ground: Round, books: Kept, v: int) -> float:
 def _try_exchange(ground: Round, books: Kept, v: int, w: int, limit: float) -> tuple[float, int]:
     _swap(books.site, v, w)
     change = _cost_of(ground, books.site) - books.total[0]
+    if books.site.sum() >= 3:
+        books.total[1] = max([_deviation(ground.xy, books.site, i) for i in range(len(books.site))])
     _swap(books.site, w, v)
     return change, (1 if w >= 0 else 0) - (1 if v >= 0 else 0)
 

@@ -1,0 +1,80 @@
+"""Whatever is inserted, removed and moved on models that are nasty: tried as done, done as from scratch."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from counts import tried
+from nasty import SOURCES, nasty_model
+from samples import surface
+
+from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
+
+RULES = list(itertools.product(FOOTPRINTS, OUTSIDES))
+# Moves between two looks from scratch, and between two wished sizes.
+LOOK, STRETCH = 20, 40
+
+
+def walk(live, moves, rng):
+    """Make random moves towards one size after another; yield after some of them what was tried and what came of it."""
+    model = live.model
+    fixed = np.zeros(model.n_vertices, bool)
+    fixed[model.corners] = True
+    wished = 0.5
+    for step in range(moves):
+        if step % STRETCH == 0:
+            wished = rng.random() ** 2
+        kept = live.kept
+        movable, places = np.flatnonzero(kept & ~fixed), np.flatnonzero(~kept)
+        grow = rng.random() < (0.65 if kept.mean() < wished else 0.35)
+        before = live.error, live.triangles
+        if len(movable) and len(places) and rng.random() < 0.4:
+            v, w = int(rng.choice(movable)), int(rng.choice(places))
+            expected = live.try_move(v, w)
+            live.move(v, w)
+        elif (grow or not len(movable)) and len(places):
+            v = int(rng.choice(places))
+            expected = live.try_insert(v)
+            live.insert(v)
+        else:
+            v = int(rng.choice(movable))
+            expected = live.try_remove(v)
+            live.remove(v)
+        yield step, before, expected
+
+
+@tried("moves", 90)
+@pytest.mark.parametrize("name", sorted(SOURCES))
+def test_what_is_tried_is_what_is_done_and_what_is_done_is_as_from_scratch(name, moves):
+    model = nasty_model(name)
+    weights = np.ones(model.n_vertices) if model.weights is None else model.weights
+    # A height in a triangle as low as the slivers drawn is worth that many digits less.
+    rounding = (1e-9 if name == "slivers" else 1e-11) * weights.sum() * model.diagonal
+    for k, (footprint, outside) in enumerate(RULES):
+        rng = np.random.default_rng(k)
+        rated = surface(model, footprint=footprint, outside=outside)
+        kept = rng.random(model.n_vertices) < rng.random()
+        kept[model.corners] = True
+        live = LiveTriangulation(rated, kept)
+        for step, (error, triangles), expected in walk(live, moves, rng):
+            if triangles and live.triangles:
+                assert expected[1] == live.triangles - triangles
+                assert expected[0] == pytest.approx(live.error - error, rel=1e-9, abs=rounding)
+            if step % LOOK == LOOK - 1 and live.triangles:
+                scratch = rated.simplify(live.kept)
+                np.testing.assert_array_equal(live.faces, scratch.faces)
+                assert live.error == pytest.approx(scratch.quality.error, rel=1e-9, abs=rounding)
+
+
+def test_the_models_are_as_many_as_they_should_be_and_most_have_bare_vertices():
+    assert len(SOURCES) == 28
+    n_bare = 0
+    for name in SOURCES:
+        model = nasty_model(name)
+        kept = np.zeros(model.n_vertices, bool)
+        kept[model.corners] = kept[::4] = True
+        n_bare += surface(model).simplify(kept).quality.uncovered > 0
+    assert n_bare > 20
