@@ -18,13 +18,14 @@ import operator
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
+from pymoo.optimize import minimize
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import Missed, ModelError, ResultError, way_to_install
@@ -34,11 +35,12 @@ from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
-from meshsimp_pymoo.search.budgets import moves_of, seconds_given
+from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import begun, thinned
-from meshsimp_pymoo.search.wishes import shortfall
+from meshsimp_pymoo.search.targeted import targeted
+from meshsimp_pymoo.search.wishes import USUAL_BUDGET, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
@@ -62,7 +64,7 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
-__all__ = ["Front", "FrontSolution", "starting_front"]
+__all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
@@ -511,7 +513,8 @@ class Front(Sequence[FrontSolution]):
         Parameters
         ----------
         triangles : int
-            The most accurate solution of at most that many triangles, as far as the other limits let it. Tiles leave a mesh of nearly any size, so that
+            The most accurate solution of at most that many triangles, as far as the other limits let it. Tiles leave
+            a mesh of nearly any size, so that
             the solution of one of their fronts may be a new one: then its ``front`` is this one with it.
         LIMITS : float
             Without ``triangles`` the smallest solution with at most that much of a measure; see
@@ -906,6 +909,82 @@ def starting_front(problem: MeshProblem, algorithm: Any, *, interrupted: bool = 
     wanted = np.geomspace(F[0, 1], F[-1, 1], START_POINTS)
     rows = np.searchsorted(F[:, 1], wanted, side="right") - 1
     return {START: F[np.unique(np.maximum(rows, 0))]}
+
+
+def simplify_to(
+    problem: MeshProblem | Any,
+    *,
+    triangles: int | None = None,
+    max_error: float | None = None,
+    mean_error: float | None = None,
+    rms_error: float | None = None,
+    time: float | None = None,
+    moves: int | None = None,
+    seed: int = 1,
+) -> FrontSolution:
+    """Return the mesh that is wished for: the best of so many triangles, or the smallest that is accurate enough.
+
+    It is found at once and then improved; see :func:`~meshsimp_pymoo.targeted`. Without a budget ten million moves are
+    made, which is some ten seconds; the same moves and seed give the same mesh.
+
+    Parameters
+    ----------
+    problem : MeshProblem, or what it takes as its model
+        What is simplified. A wish for an error lowers that error, so a problem of another measure is set up anew with
+        it; one whose measure was chosen, which "error" counts as none, is refused.
+    triangles : int, optional
+        The most triangles: then the most accurate such mesh by the problem's measure.
+    max_error, mean_error, rms_error : float, optional
+        The most that any original vertex may deviate by, the mean of these, and their root mean square [model units].
+        Where several limits are given all of them hold.
+    time : float, optional
+        Seconds to search for; what is found then depends on the machine.
+    moves : int, optional
+        Moves of vertices to try instead.
+    seed : int
+        Of the random moves.
+
+    Returns
+    -------
+    FrontSolution
+        Its ``mesh`` is the mesh, its ``front`` the others that were found around it.
+
+    Raises
+    ------
+    Missed
+        A LookupError, if none is good enough; ``nearest`` is what comes nearest.
+    TypeError
+        If nothing is wished for.
+    ValueError
+        If a limit makes no sense, or the problem minimises another measure than is wished for.
+
+    Examples
+    --------
+    >>> simplify_to("roof:9", triangles=4, moves=1000)
+    <solution 2 of 3: 4 triangles, error 0, mean 0, max 0>
+    >>> simplify_to("roof:9", max_error=0.1, moves=1000).triangles
+    4
+    """
+    limits = checked_limits(
+        {"triangles": triangles, "max_error": max_error, "mean_error": mean_error, "rms_error": rms_error}
+    )
+    if time is not None and moves is not None:
+        raise TypeError(f"time={time} does not go with moves={moves}: each says how long to search; leave one out")
+    if time is not None and not time > 0:
+        raise ValueError(f"time={time} is no time to search for; give seconds")
+    if not isinstance(problem, MeshProblem):
+        problem = MeshProblem(problem, rules=Rules(measure=measure_for(limits)))
+    elif problem.n_obj == 2:
+        measure = problem.objectives[0]
+        # nobody need have asked for what is minimised unless told otherwise
+        wanted = measure_for(limits, None if measure == Rules().measure else measure)
+        if wanted != measure and isinstance(problem.surface, HeightSurface):
+            rules = replace(problem.surface.rules, measure=wanted)
+            options, problem = problem.options, MeshProblem(HeightSurface(problem.surface.model, rules))
+            problem.options = options
+    budget = ("time", time) if time is not None else Moves(USUAL_BUDGET if moves is None else moves)
+    result = minimize(problem, targeted(**limits), budget, seed=seed)  # type: ignore[arg-type]
+    return Front.from_result(result).best(**limits)
 
 
 def _is_feasible(problem: MeshProblem, row: FloatArray) -> bool:

@@ -392,7 +392,7 @@ def _refuse_unknown(kwargs: dict[str, Any]) -> None:
     unknown = sorted(set(kwargs) - set(inspect.signature(Problem).parameters))
     if "max_error" in unknown:
         raise TypeError(
-            "MeshProblem has no argument 'max_error': max_objective= bounds the first objective, and simplify_to(problem, "
+            "MeshProblem has no argument 'max_error'; max_objective= bounds the first objective, simplify_to(model, "
             "max_error=E) finds the smallest mesh that deviates nowhere by more than E"
         )
     if unknown:

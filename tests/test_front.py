@@ -121,7 +121,9 @@ def test_constraints_hold_for_the_ends_too():
 
 
 def test_a_search_that_found_nothing_says_so():
-    result = minimize(MeshProblem("roof:9", max_objective=0.0, max_triangles=2), nsga2_v1(pop_size=8), ("n_gen", 2), seed=1)
+    result = minimize(
+        MeshProblem("roof:9", max_objective=0.0, max_triangles=2), nsga2_v1(pop_size=8), ("n_gen", 2), seed=1
+    )
     with pytest.raises(LookupError, match="roof:9: the search found no solution that meets its constraints; sea"):
         Front.from_result(result)
     with pytest.raises(LookupError, match="roof:9: none of 1 subsets of its vertices is a mesh that meets"):

@@ -170,8 +170,8 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
     ),
     ("{wish}", "--measure {measure}"): (
         _lowers_another,
-        "a wish for an error lowers that error; leave --measure out, or take the mesh out of a front that was searched by "
-        "it (meshsimp pick)",
+        "a wish for an error lowers that error; leave --measure out, or take the mesh out of a front that was searched "
+        "by it (meshsimp pick)",
     ),
 }
 

@@ -149,7 +149,7 @@ def _check_budget(search: Search) -> None:
 
 
 def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None:
-    """Stop before the search if no subset of the vertices is a mesh, or none can meet the target; say if that is likely."""
+    """Stop before the search if no subset of the vertices is a mesh, or none can meet the target; say if none may."""
     table = problem.evaluate_subsets(np.array([np.ones(problem.n_var, dtype=bool), problem.pinned]))
     whole, bare = (problem.as_quality(row) for row in table)
     if whole.triangles == 0:
@@ -171,7 +171,7 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
         # some lie one above the other, or their mesh leaves some uncovered: another subset may be more accurate
         said = listed([f"{MEASURES[name].label} {values[name]:.4g}" for name in missed], "and")
         say(
-            f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest to {wish.options}"
+            f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest"
         )
 
 

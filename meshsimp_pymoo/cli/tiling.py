@@ -38,7 +38,7 @@ KNOWN: dict[type[Any], tuple[str, ...]] = {
 
 
 def wants_tiles(request: Request) -> bool:
-    """Tell whether the model is to be thinned tile by tile: because it was asked for, or it is too big for one piece."""
+    """Tell whether the model is to be thinned tile by tile: because it was asked for, or is too big for one piece."""
     if request.tiling.tile is None:
         count = count_samples(request.model, window=request.options.window)
         return count is not None and count >= TILED_FROM and not fits_in_one_piece(count)

@@ -52,14 +52,19 @@ STEPS = (0.002, 0.24)
 # For a number of triangles: the sizes that are annealed, as shares of it, and their shares of the moves.
 SIZES = (1.0, 1.0, 0.85, 1.18)
 SIZE_MOVES = (1.0, 1.0, 0.25, 0.25)
-# The first generation's share of the budget; where there is none its moves a kept vertex, and the most there are.
-FIRST = {True: 1 / 8, False: 1 / 16}
+# The first generation's share of the budget, which is enough to learn how long a move takes; where there is no budget
+# its moves a kept vertex; and the most that a generation makes.
+FIRST = 1 / 40
 PILOT = 50.0
 SLOWEST = 4000.0
 SECONDS_A_MOVE = 2e-6
 # What is kept for the end, and the most meshes that are added then.
 LAST_SHARE = 0.05
 BETWEEN = 24
+# Temperatures, in units of the error per kept vertex, and the share left in the end: from a thinned mesh, and from one
+# that was annealed slowly at its size.
+FRESH = {"temperature": 0.3, "cooling": 0.03}
+AGAIN = {"temperature": 0.06, "cooling": 0.15}
 # Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
 OWN = 0.05
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
@@ -92,6 +97,7 @@ class TargetedSearch(Algorithm):
         self.eliminate_duplicates = PackedDuplicates()
         self.step = STEP
         self.idle = 0
+        self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
         self.attempted: list[int] = []
@@ -140,14 +146,23 @@ class TargetedSearch(Algorithm):
         if parents is None or sizes is None or not moves.sum():
             self.termination.force_termination = True
             return Population.create()
-        begun = time.perf_counter()
+        begun = self._clock()
         made = moves.copy()
+        again = "triangles" in self.limits and self.is_annealed
         children = relocate_all(
-            self._cost(), parents, moves, self.random_state, triangles=sizes, seconds=left, made=made
+            self._cost(),
+            parents,
+            moves,
+            self.random_state,
+            triangles=sizes,
+            seconds=left,
+            made=made,
+            **(AGAIN if again else FRESH),
         )
+        self.is_annealed = self.moves_done > 0
         if "triangles" not in self.limits and not self.within:
             children = np.array(on_threads(self._squeezed, children))
-        self.seconds += time.perf_counter() - begun
+        self.seconds += self._clock() - begun
         self.moves_done += int(made.sum())
         self.attempted = sizes.tolist()
         offspring = self.eliminate_duplicates.do(Population.new(X=children), self.pop)
@@ -194,7 +209,7 @@ class TargetedSearch(Algorithm):
             merged = Population.merge(self.opt, extra)
             self.opt = _survivors(merged, self.limits, len(merged))
 
-    # -------------------------------------------------------------------------------------------------- the first answer
+    # ------------------------------------------------------------------------------------------------- the first answer
 
     def _direct(self) -> list[NestedFront]:
         """Return nested fronts that reach beyond the wish, if anything does, and down to the smallest mesh."""
@@ -296,19 +311,17 @@ class TargetedSearch(Algorithm):
 
     def _moves(self, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
-        first = FIRST["triangles" in self.limits]
-        budget, left = part_of(self.termination, Moves), self._seconds_left()
-        wholes = []
+        budget, seconds = part_of(self.termination, Moves), self._seconds_left()
+        at_once = "triangles" in self.limits
+        most = [SLOWEST * work]
         if budget is not None:
-            whole = budget.n_max_moves
-            wholes.append(_next_share(self.moves_done, whole, whole - self.moves_done, first))
-        if left is not None:
+            most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))
+        if seconds is not None:
             a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
-            wholes.append(_next_share(self.moves_done, self.moves_done + left / a_move, left / a_move, first))
-        most = SLOWEST * work
-        if not wholes:
-            wholes.append(max(PILOT * work, self.moves_done))
-        whole = int(min(*wholes, most) if len(wholes) > 1 else min(wholes[0], most))
+            most.append(_next_share(self.moves_done, seconds / a_move, at_once))
+        if len(most) == 1:
+            most.append(max(PILOT * work, self.moves_done))
+        whole = int(min(most))
         moves = np.diff(np.round(np.cumsum(weights) / weights.sum() * whole), prepend=0.0)
         return moves.astype(np.int64)
 
@@ -317,13 +330,17 @@ class TargetedSearch(Algorithm):
         given = seconds_given(self)
         if given is None:
             return None
-        return given * (1.0 if whole else 1.0 - LAST_SHARE) - (time.time() - self.start_time)
+        return given * (1.0 if whole else 1.0 - LAST_SHARE) - self._clock()
+
+    def _clock(self) -> float:
+        """Return the seconds since the search began, without those of compiling."""
+        return float(time.time() - self.start_time)
 
 
-def _next_share(done: float, whole: float, left: float, first: float) -> float:
+def _next_share(done: float, left: float, at_once: bool) -> float:
     """Return the part of a budget for the next generation: as much as was done, or all that is left."""
-    planned = max(first * whole, done)
-    return left if left < 1.5 * planned else planned
+    planned = max(FIRST * left, done)
+    return left if left < 1.5 * planned or (at_once and done) else planned
 
 
 def _values(pop: Any, names: Any) -> dict[str, FloatArray]:

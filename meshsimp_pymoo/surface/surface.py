@@ -16,7 +16,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.formats.material import Material
-from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality, require_measure
+from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
 # A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of

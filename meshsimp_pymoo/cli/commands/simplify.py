@@ -121,8 +121,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--measure",
         type=str.lower,
         choices=list(spelled),
-        help=f"error that is made small beside the triangles: {meanings} (default: {next(iter(spelled))}, or that of the "
-        "mesh you want)",
+        help=f"error that is made small beside the triangles: {meanings} (default: {next(iter(spelled))}, or what is "
+        "wished for)",
     )
 
     output = parser.add_argument_group("what is written and shown")
