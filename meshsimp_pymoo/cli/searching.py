@@ -60,7 +60,7 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
-from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
+from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.warming import SEARCH
 
@@ -99,15 +99,6 @@ def _simplify(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
-    measure = OBJECTIVES[request.rules.measure]
-    if PRESETS[search.algorithm].sums_only and not measure.is_sum:
-        others = [name for name, preset in PRESETS.items() if preset.whole_front and not preset.sums_only]
-        sums = [known.minimised for known in OBJECTIVES.values() if known.is_sum]
-        raise UsageError(
-            f"--measure {measure.minimised} is not for the {search.algorithm} search, which thins and moves vertices "
-            f"by sums over the vertices; use --algorithm {' or '.join(others)} with it, or --measure "
-            f"{' or '.join(sums)}"
-        )
     with compiling((*SEARCH, "scores") if output.refit else SEARCH, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)

@@ -101,7 +101,7 @@ def thinning(
     Parameters
     ----------
     surface : Surface
-        The original mesh of N vertices and its rules, whose measure is what counts and what the front's ``error`` is in.
+        The original mesh of N vertices and its rules, whose measure counts; the front's ``error`` is in it.
     pinned : (N,) bool array, optional
         Vertices never removed, besides those that the surface pins.
     kept : (N,) bool array, optional

@@ -36,8 +36,6 @@ class Preset:
         Whether the paper has it.
     whole_front : bool
         Whether one run gives a whole front, and the function needs no other argument; the shell offers only those.
-    sums_only : bool
-        Whether it lowers a sum over the vertices, hence cannot have the maximum as its objective.
     sweeps : bool
         Whether it is done after one sweep of the sizes; the others go on for as long as one lets them.
     evaluations : float
@@ -50,7 +48,6 @@ class Preset:
     about: str
     is_the_papers: bool = True
     whole_front: bool = True
-    sums_only: bool = False
     sweeps: bool = False
     evaluations: float = 1.0
     measured_by: tuple[str, ...] = ("generations", "evaluations")
@@ -68,7 +65,6 @@ PRESETS: dict[str, Preset] = {
         home="search.memetic:memetic",
         about="annealing down a ladder of sizes, from thinned subsets",
         is_the_papers=False,
-        sums_only=True,
         sweeps=True,
         measured_by=("moves",),
     ),
@@ -93,14 +89,12 @@ PRESETS: dict[str, Preset] = {
         about="elitist GA on the error at one number of points, crossover in the plane",
         is_the_papers=False,
         whole_front=False,
-        sums_only=True,
     ),
     "huang_ho": Preset(
         home="search.weighted:huang_ho",
         about="elitist GA on the error at one number of points, crossover OAX over L4",
         is_the_papers=False,
         whole_front=False,
-        sums_only=True,
         evaluations=2.1,
     ),
 }

@@ -24,7 +24,7 @@ from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import REGIONS, as_quality
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
 from meshsimp_pymoo.surface.weld import measured, weld
 
 #: Rules that may be anything: a grid without gaps fills its hull. The others are as they are where nothing is said.
@@ -190,9 +190,16 @@ class GridSurface:
     def ground(self) -> None:
         """Return that meshes are evaluated here, but not moved."""
 
+    def bounded(self, most: float, *, own: float = 0.0) -> Surface:
+        """Refuse, as :meth:`ground` says."""
+        raise self._no_moves()
+
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> AbstractContextManager[Any]:
         """Refuse, as :meth:`ground` says."""
-        raise ModelError(f"{self.model.name}: a grid read by windows has no moves; open it in one piece")
+        raise self._no_moves()
+
+    def _no_moves(self) -> ModelError:
+        return ModelError(f"{self.model.name}: a grid read by windows has no moves; open it in one piece")
 
     def _checked(self, kept: BoolArray) -> BoolArray:
         require_bool(kept, f"a subset of {self.model.name} is a bool array, one entry a sample")

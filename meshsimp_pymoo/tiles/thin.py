@@ -115,7 +115,8 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
         n = int((is_site & ~fixed).sum())
         removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
         limit = FORESIGHT * 2.0 * tile.limit
-        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, np.zeros(1, np.bool_), removed, error, triangles)
+        stop = np.zeros(1, np.bool_)
+        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, stop, removed, error, triangles)
     saved = (triangles[0] - triangles[: n_removed + 1]).astype(np.int64)
     level = hull_levels(saved, error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, tile.limit, side="right"))

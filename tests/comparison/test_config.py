@@ -324,10 +324,6 @@ MISTAKES = {
         {"problem": "{objectives: [error, max_error, triangles]}"},
         ["problem.objectives", "two objectives", "nsga3()"],
     ),
-    "measure that an algorithm cannot lower": (
-        {"problem": "{objectives: [max_error, triangles]}", "algorithms": "[memetic]", "budgets": "[{moves: 9}]"},
-        ["algorithms[0]", "'memetic' cannot be used on the problem 'A'", "lower a sum"],
-    ),
     "weights not in the file": ({"problem": "{weights: sharpness}"}, ["problems[0]", "'sharpness'", "it has: none"]),
     "pin impossible": ({"problem": "{pin: [100000]}"}, ["problems[0]", "100000"]),
     "up impossible": ({"problem": "{up: [0, 0, 0]}"}, ["problem.up", "not all 0"]),

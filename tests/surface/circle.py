@@ -177,7 +177,8 @@ class Circle:
         """Return the points and the measure."""
         if self._ground is not None:
             return self._ground
-        return Round(np.ascontiguousarray(self.places.ravel()), OBJECTIVES[self.rules.measure].power, OBJECTIVES[self.rules.measure].is_sum)
+        measure = OBJECTIVES[self.rules.measure]
+        return Round(np.ascontiguousarray(self.places.ravel()), measure.power, measure.is_sum)
 
     def bounded(self, most: float, *, own: float = 0.0) -> Surface:
         """Return the circle for moves that bring all distances down to the most."""
