@@ -39,8 +39,8 @@ from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import begun, thinned
-from meshsimp_pymoo.search.targeted import targeted
-from meshsimp_pymoo.search.wishes import USUAL_BUDGET, checked_limits, measure_for, shortfall
+from meshsimp_pymoo.search.targeted import TargetedSearch, targeted
+from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
@@ -289,7 +289,7 @@ class Front(Sequence[FrontSolution]):
         kept: npt.ArrayLike,
         *,
         ends: bool = False,
-        within: Mapping[str, float] | None = None,
+        wish: Mapping[str, float] | None = None,
     ) -> Front:
         """Evaluate chromosomes and keep those that no other one beats, each once, and that meet the constraints.
 
@@ -301,9 +301,9 @@ class Front(Sequence[FrontSolution]):
             The vertices that stay, in vector order; pinned ones are added.
         ends : bool
             Add what is known without a search: all vertices, and the pinned ones alone.
-        within : mapping of str to float, optional
-            Limits of further measures, such as ``{"max_error": 2.0}``: where any solution holds them, those that do
-            not are left out.
+        wish : mapping of str to float, optional
+            Limits, by measure. Where any solution holds all of them, those are left out that miss one which is neither
+            of the triangles nor of what is minimised: they would beat it.
 
         Raises
         ------
@@ -320,10 +320,10 @@ class Front(Sequence[FrontSolution]):
                 "constraints; search longer, or loosen max_triangles and max_objective"
             )
         quality = [problem.as_quality(row) for row in table[usable]]
-        if within:
-            holding = [k for k, q in enumerate(quality) if shortfall(asdict(q), within) == 0.0]
-            if holding:
-                usable, quality = usable[holding], [quality[k] for k in holding]
+        others = beside(wish or {}, problem.objectives[0])
+        if others and any(shortfall(asdict(q), wish or {}) == 0.0 for q in quality):
+            holding = [k for k, q in enumerate(quality) if shortfall(asdict(q), others) == 0.0]
+            usable, quality = usable[holding], [quality[k] for k in holding]
         table = table[usable]
         F = _objectives(quality, problem.objectives)
         best = {row.tobytes() for row in non_dominated(F)}
@@ -367,8 +367,8 @@ class Front(Sequence[FrontSolution]):
                 "loosen max_triangles and max_objective"
             )
         algorithm = getattr(result, "algorithm", None)
-        within = getattr(algorithm, "within", None)
-        front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends, within=within)
+        wish = algorithm.limits if isinstance(algorithm, TargetedSearch) else None
+        front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends, wish=wish)
         front.series |= starting_front(problem, algorithm)
         facts = {
             "algorithm": type(algorithm).__name__ if algorithm is not None else None,

@@ -161,9 +161,7 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
     if missed and not quiet:
         # some lie one above the other, or their mesh leaves some uncovered: another subset may be more accurate
         said = listed([f"{MEASURES[name].label} {values[name]:.4g}" for name in missed], "and")
-        say(
-            f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest"
-        )
+        say(f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest")
 
 
 # ----------------------------------------------------------------------------------------------------------- the search
@@ -212,7 +210,7 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
     if kind == "time" and request.output.refit:
         amount *= 1.0 - REFIT_SHARE
     if request.is_targeted:
-        algorithm: Any = targeted(pop_size=search.population, **request.wish.limits)
+        algorithm: Any = targeted(pop_size=search.population, **request.wish.limits)  # type: ignore[arg-type]
     else:
         algorithm = preset.function(pop_size=search.population)
     return algorithm.setup(problem, termination=terminations[kind](amount), seed=search.seed)
@@ -252,7 +250,9 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
     seconds = before + time.perf_counter() - start
     try:
         # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
-        front = Front.from_subsets(problem, X, ends=True, within=getattr(algorithm, "within", None))
+        front = Front.from_subsets(
+            problem, X, ends=True, wish=keeper.request.wish.limits if keeper.request.is_targeted else None
+        )
     except LookupError:
         raise UsageError(
             f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "

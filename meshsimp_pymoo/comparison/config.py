@@ -235,7 +235,7 @@ Different = Annotated[tuple[Thing, ...], Field(min_length=1), AfterValidator(_di
 
 
 # What a key was called before.
-FORMER = {"max_error": "max_objective"}
+FORMER: dict[Any, str] = {"max_error": "max_objective"}
 
 
 class Part(BaseModel):
@@ -257,7 +257,7 @@ class Part(BaseModel):
         for name in given:
             if name not in names:
                 raise _Mistake(
-                    f"unknown key{meant(FORMER.get(name, name), names)}; known here: {', '.join(names)}", name
+                    f"unknown key{meant(FORMER.get(name) or name, names)}; known here: {', '.join(names)}", name
                 )
         found = [name for name in cls.one_of if name in given]
         if cls.one_of and len(found) != 1:

@@ -63,8 +63,8 @@ LAST_SHARE = 0.05
 BETWEEN = 24
 # Temperatures, in units of the error per kept vertex, and the share left in the end: from a thinned mesh, and from one
 # that was annealed slowly at its size.
-FRESH = {"temperature": 0.3, "cooling": 0.03}
-AGAIN = {"temperature": 0.06, "cooling": 0.15}
+FRESH: dict[str, Any] = {"temperature": 0.3, "cooling": 0.03}
+AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
 # Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
 OWN = 0.05
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
@@ -142,10 +142,11 @@ class TargetedSearch(Algorithm):
 
     def _infill(self) -> Population:
         left = self._seconds_left()
-        parents, sizes, moves = self._plan() if left is None or left > 0.0 else (None, None, np.zeros(0))
-        if parents is None or sizes is None or not moves.sum():
+        plan = self._plan() if left is None or left > 0.0 else None
+        if plan is None:
             self.termination.force_termination = True
             return Population.create()
+        parents, sizes, moves = plan
         begun = self._clock()
         made = moves.copy()
         again = "triangles" in self.limits and self.is_annealed
@@ -275,7 +276,7 @@ class TargetedSearch(Algorithm):
         wanted = self._wanted(front)
         return kept if wanted is None else front.kept(wanted)
 
-    def _plan(self) -> tuple[BoolArray | None, IntArray | None, IntArray]:
+    def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
         """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
         T = self.pop.get("F")[:, -1]
         if "triangles" in self.limits:
@@ -291,7 +292,7 @@ class TargetedSearch(Algorithm):
                 sizes = np.minimum(T[order[0]] * (1.0 - self.step * k), T[order[0]] - k)
                 sizes = np.unique(sizes[sizes >= T.min()].astype(int))[::-1]
                 if not len(sizes):
-                    return None, None, np.zeros(0, np.int64)
+                    return None
             else:  # nothing holds yet: at the size of what comes nearest, and at larger ones
                 sizes = np.unique((T[order[0]] * (1.0 + self.step * (k - 1))).astype(int))
             shares = np.ones(len(sizes))
@@ -299,7 +300,8 @@ class TargetedSearch(Algorithm):
         parents = [self._parent(size) for size in sizes]
         kept = self.pop.get("X")[parents]
         work = np.maximum((kept & ~self.problem.pinned).sum(axis=1), 1)
-        return kept, sizes, self._moves(shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        moves = self._moves(shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        return (kept, sizes, moves) if moves.any() else None
 
     def _parent(self, size: int) -> int:
         """Return the individual from which a mesh of so many triangles is annealed."""
