@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.formats.table import written_suffixes
 
     wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
-    said = [wish.options] * bool(wish.limits) + ["--knee"] * args.knee + ["--solution"] * (args.solution is not None)
+    said = ([wish.options] if wish.limits else []) + ["--knee"] * args.knee + ["--solution"] * (args.solution is not None)
     if not said:
         raise UsageError("which solution is wanted? say limits, such as --triangles 500, or --knee, or --solution K")
     if len(said) > 1:
