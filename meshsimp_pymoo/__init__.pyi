@@ -1,11 +1,13 @@
 """The public names, each with its home: type checkers read this file, and so does the package itself."""
 
+from meshsimp_pymoo.errors import Missed as Missed
 from meshsimp_pymoo.errors import ModelError as ModelError
 from meshsimp_pymoo.errors import ModelWarning as ModelWarning
 from meshsimp_pymoo.errors import ResultError as ResultError
 from meshsimp_pymoo.formats.options import Options as Options
 from meshsimp_pymoo.front import Front as Front
 from meshsimp_pymoo.front import FrontSolution as FrontSolution
+from meshsimp_pymoo.front import simplify_to as simplify_to
 from meshsimp_pymoo.indicators import Cardinality as Cardinality
 from meshsimp_pymoo.indicators import Coverage as Coverage
 from meshsimp_pymoo.indicators import HypervolumeRatio as HypervolumeRatio
@@ -36,6 +38,7 @@ from meshsimp_pymoo.search.operators import RegionCrossover as RegionCrossover
 from meshsimp_pymoo.search.operators import Relocation as Relocation
 from meshsimp_pymoo.search.operators import SizeStep as SizeStep
 from meshsimp_pymoo.search.operators import SubsetUniformCrossover as SubsetUniformCrossover
+from meshsimp_pymoo.search.targeted import targeted as targeted
 from meshsimp_pymoo.search.weighted import WeightedSum as WeightedSum
 from meshsimp_pymoo.search.weighted import fujiwara_sawai as fujiwara_sawai
 from meshsimp_pymoo.search.weighted import huang_ho as huang_ho

@@ -8,6 +8,7 @@ import re
 import unicodedata
 import warnings
 from collections.abc import Iterable
+from typing import Any
 
 # Of a foreign exception's text, in a line of ours.
 LONGEST_REASON = 200
@@ -51,6 +52,20 @@ class ModelWarning(UserWarning):
 
 class SearchWarning(UserWarning):
     """A search could not begin as it does with more time; what it finds is right, but there is less of it."""
+
+
+class Missed(LookupError):
+    """No solution is as good as it is wished for; the message says how near they come.
+
+    Attributes
+    ----------
+    nearest : FrontSolution
+        The solution that comes nearest.
+    """
+
+    def __init__(self, message: str, nearest: object) -> None:
+        super().__init__(message)
+        self.nearest: Any = nearest
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:

@@ -18,26 +18,29 @@ import operator
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
+from pymoo.optimize import minimize
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
-from meshsimp_pymoo.errors import ModelError, ResultError, way_to_install
+from meshsimp_pymoo.errors import Missed, ModelError, ResultError, way_to_install
 from meshsimp_pymoo.files import claim_file, draw_into, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
-from meshsimp_pymoo.search.budgets import moves_of, seconds_given
+from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import begun, thinned
+from meshsimp_pymoo.search.targeted import TargetedSearch, targeted
+from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
@@ -61,13 +64,15 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
-__all__ = ["Front", "FrontSolution", "starting_front"]
+__all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
 # What the front that a search started from is called, and how many of its thousands of points are drawn.
 START = "adaptive thinning (start)"
 START_POINTS = 200
+# Between two solutions of a nested front the smallest within a limit is looked for to this share of its triangles.
+HALVED = 0.01
 
 
 if TYPE_CHECKING:
@@ -278,7 +283,14 @@ class Front(Sequence[FrontSolution]):
     # ---------------------------------------------------------------------------------------------- where it comes from
 
     @classmethod
-    def from_subsets(cls, problem: MeshProblem, kept: npt.ArrayLike, *, ends: bool = False) -> Front:
+    def from_subsets(
+        cls,
+        problem: MeshProblem,
+        kept: npt.ArrayLike,
+        *,
+        ends: bool = False,
+        wish: Mapping[str, float] | None = None,
+    ) -> Front:
         """Evaluate chromosomes and keep those that no other one beats, each once, and that meet the constraints.
 
         Parameters
@@ -289,6 +301,9 @@ class Front(Sequence[FrontSolution]):
             The vertices that stay, in vector order; pinned ones are added.
         ends : bool
             Add what is known without a search: all vertices, and the pinned ones alone.
+        wish : mapping of str to float, optional
+            Limits, by measure. Where any solution holds all of them, those are left out that miss one which is neither
+            of the triangles nor of what is minimised: they would beat it.
 
         Raises
         ------
@@ -303,10 +318,14 @@ class Front(Sequence[FrontSolution]):
         if not len(usable):
             raise LookupError(
                 f"{problem.model.name}: none of {len(table)} subsets of its vertices is a mesh that meets the "
-                "constraints; search longer, or loosen max_triangles and max_error"
+                "constraints; search longer, or loosen max_triangles and max_objective"
             )
+        quality = [problem.as_quality(row) for row in table[usable]]
+        others = beside(wish or {}, problem.objectives[0])
+        if others and any(shortfall(asdict(q), wish or {}) == 0.0 for q in quality):
+            holding = [k for k, q in enumerate(quality) if shortfall(asdict(q), others) == 0.0]
+            usable, quality = usable[holding], [quality[k] for k in holding]
         table = table[usable]
-        quality = [problem.as_quality(row) for row in table]
         F = _objectives(quality, problem.objectives)
         best = {row.tobytes() for row in non_dominated(F)}
         first: dict[bytes, int] = {}
@@ -346,10 +365,11 @@ class Front(Sequence[FrontSolution]):
         if result.X is None:
             raise LookupError(
                 f"{problem.model.name}: the search found no solution that meets its constraints; search longer, or "
-                "loosen max_triangles and max_error"
+                "loosen max_triangles and max_objective"
             )
-        front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends)
         algorithm = getattr(result, "algorithm", None)
+        wish = algorithm.limits if isinstance(algorithm, TargetedSearch) else None
+        front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends, wish=wish)
         front.series |= starting_front(problem, algorithm)
         facts = {
             "algorithm": type(algorithm).__name__ if algorithm is not None else None,
@@ -489,44 +509,85 @@ class Front(Sequence[FrontSolution]):
     # --------------------------------------------------------------------------------------------------------- choosing
 
     def best(self, **limit: float | None) -> FrontSolution:
-        """Return the best solution within one limit.
+        """Return the best solution within one or more limits, all of which hold.
 
         Parameters
         ----------
         triangles : int
-            The most accurate solution of at most that many triangles. Tiles leave a mesh of nearly any size, so that
+            The most accurate solution of at most that many triangles, as far as the other limits let it. Tiles leave
+            a mesh of nearly any size, so that
             the solution of one of their fronts may be a new one: then its ``front`` is this one with it.
         LIMITS : float
-            The smallest solution with at most that much of a measure; see
+            Without ``triangles`` the smallest solution with at most that much of a measure; see
             :class:`~meshsimp_pymoo.surface.measures.Quality`.
 
         Raises
         ------
-        LookupError
-            If no solution meets the limit; the message says how near the front comes.
+        Missed
+            A LookupError, if no solution meets the limits; the message says how near the front comes, and its
+            ``nearest`` is the solution that comes nearest.
         TypeError
-            If not exactly one limit is given, or it is none of these.
+            If no limit is given, or it is none of these.
         """
         limits = {name: value for name, value in limit.items() if value is not None}
         if unknown := [name for name in limits if name not in MEASURES]:
             raise TypeError(f"best() knows no limit {unknown[0]!r}; it takes {', '.join(MEASURES)}")
-        if len(limits) != 1:
-            raise TypeError(f"best() takes one limit, such as triangles=500 or max_error=0.1; {len(limits)} are given")
-        ((name, most),) = limits.items()
-        values = np.array([getattr(q, name) for q in self.quality])
-        fitting = np.flatnonzero(values <= most)
-        if not len(fitting):
-            label, least = MEASURES[name].label, values.min()
-            raise LookupError(
-                f"the least {label} of a solution of {self.name} is {least:.6g}, and {most:g} was asked for"
-                if MEASURES[name].unit
-                else f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
-            )
-        if name == "triangles":
-            best = self[int(fitting[np.argmin(self.F[fitting, 0])])]
-            between = None if most < 2 else self._between(int(most))
-            return best if between is None or between.error >= best.error else between
-        return self[int(fitting[0])]
+        if not limits:
+            raise TypeError("best() takes limits, such as triangles=500 or max_error=0.1; none is given")
+        missed = shortfall({name: np.array([getattr(q, name) for q in self.quality]) for name in limits}, limits)
+        fitting = np.flatnonzero(missed == 0.0)
+        if "triangles" in limits:
+            between = None if limits["triangles"] < 2 else self._between(int(limits["triangles"]))
+            if between is not None and shortfall(asdict(between.quality), limits) > 0.0:
+                between = None
+            best = self[int(fitting[np.argmin(self.F[fitting, 0])])] if len(fitting) else between
+            if best is not None:
+                return best if between is None or between.error >= best.error else between
+        elif len(fitting):
+            return self._smaller(int(fitting[0]), limits)
+        raise Missed(self._how_near(limits), self[int(np.argmin(missed))])
+
+    def _smaller(self, row: int, limits: Mapping[str, float]) -> FrontSolution:
+        """Return the smallest solution within limits between one that is and the next smaller one, if there are any."""
+        best = self[row]
+        if not isinstance(self._kept, Nested) or row == 0:
+            return best
+        low = self.quality[row - 1].triangles
+        while best.triangles - low > max(1, HALVED * best.triangles):
+            size = (low + best.triangles) // 2
+            between = self._between(size)
+            if between is None or not low < between.triangles <= size:
+                low = size
+            elif shortfall(asdict(between.quality), limits) == 0.0:
+                best = between
+            else:
+                low = size
+        return best
+
+    def _how_near(self, limits: Mapping[str, float]) -> str:
+        """Say how near the solutions come to limits that none of them meets."""
+        if len(limits) == 1:
+            ((name, most),) = limits.items()
+            label, least = MEASURES[name].label, min(getattr(q, name) for q in self.quality)
+            if MEASURES[name].unit:
+                return f"the least {label} of a solution of {self.name} is {least:.6g}, and {most:g} was asked for"
+            return f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
+        errors = {name: most for name, most in limits.items() if name != "triangles"}
+        said = " and ".join(f"{MEASURES[name].label} {most:g}" for name, most in errors.items())
+        holding = [q.triangles for q in self.quality if shortfall(asdict(q), errors) == 0.0]
+        parts = [f"no solution of {self.name} holds all of what is asked for"]
+        if "triangles" in limits:
+            fitting = [q for q in self.quality if q.triangles <= limits["triangles"]]
+            if fitting:
+                near = min(fitting, key=lambda q: float(shortfall(asdict(q), errors)))
+                values = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
+                parts.append(f"{values} at {near.triangles:,} triangles")
+            parts.append(f"with {said} the smallest found has {min(holding):,}" if holding else f"none has {said}")
+        else:
+            near = min(self.quality, key=lambda q: float(shortfall(asdict(q), errors)))
+            values = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
+            parts.append(f"the nearest has {values} at {near.triangles:,} triangles")
+        return "; ".join(parts)
 
     def knee(self) -> FrontSolution:
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
@@ -849,6 +910,82 @@ def starting_front(problem: MeshProblem, algorithm: Any, *, interrupted: bool = 
     wanted = np.geomspace(F[0, 1], F[-1, 1], START_POINTS)
     rows = np.searchsorted(F[:, 1], wanted, side="right") - 1
     return {START: F[np.unique(np.maximum(rows, 0))]}
+
+
+def simplify_to(
+    problem: MeshProblem | Any,
+    *,
+    triangles: int | None = None,
+    max_error: float | None = None,
+    mean_error: float | None = None,
+    rms_error: float | None = None,
+    time: float | None = None,
+    moves: int | None = None,
+    seed: int = 1,
+) -> FrontSolution:
+    """Return the mesh that is wished for: the best of so many triangles, or the smallest that is accurate enough.
+
+    It is found at once and then improved; see :func:`~meshsimp_pymoo.targeted`. Without a budget ten million moves are
+    made, which is some ten seconds; the same moves and seed give the same mesh.
+
+    Parameters
+    ----------
+    problem : MeshProblem, or what it takes as its model
+        What is simplified. A wish for an error lowers that error, so a problem of another measure is set up anew with
+        it; one whose measure was chosen, which "error" counts as none, is refused.
+    triangles : int, optional
+        The most triangles: then the most accurate such mesh by the problem's measure.
+    max_error, mean_error, rms_error : float, optional
+        The most that any original vertex may deviate by, the mean of these, and their root mean square [model units].
+        Where several limits are given all of them hold.
+    time : float, optional
+        Seconds to search for; what is found then depends on the machine.
+    moves : int, optional
+        Moves of vertices to try instead.
+    seed : int
+        Of the random moves.
+
+    Returns
+    -------
+    FrontSolution
+        Its ``mesh`` is the mesh, its ``front`` the others that were found around it.
+
+    Raises
+    ------
+    Missed
+        A LookupError, if none is good enough; ``nearest`` is what comes nearest.
+    TypeError
+        If nothing is wished for.
+    ValueError
+        If a limit makes no sense, or the problem minimises another measure than is wished for.
+
+    Examples
+    --------
+    >>> simplify_to("roof:9", triangles=4, moves=1000)
+    <solution 2 of 3: 4 triangles, error 0, mean 0, max 0>
+    >>> simplify_to("roof:9", max_error=0.1, moves=1000).triangles
+    4
+    """
+    limits = checked_limits(
+        {"triangles": triangles, "max_error": max_error, "mean_error": mean_error, "rms_error": rms_error}
+    )
+    if time is not None and moves is not None:
+        raise TypeError(f"time={time} does not go with moves={moves}: each says how long to search; leave one out")
+    if time is not None and not time > 0:
+        raise ValueError(f"time={time} is no time to search for; give seconds")
+    if not isinstance(problem, MeshProblem):
+        problem = MeshProblem(problem, rules=Rules(measure=measure_for(limits)))
+    elif problem.n_obj == 2:
+        measure = problem.objectives[0]
+        # nobody need have asked for what is minimised unless told otherwise
+        wanted = measure_for(limits, None if measure == Rules().measure else measure)
+        if wanted != measure and isinstance(problem.surface, HeightSurface):
+            rules = replace(problem.surface.rules, measure=wanted)
+            options, problem = problem.options, MeshProblem(HeightSurface(problem.surface.model, rules))
+            problem.options = options
+    budget = ("time", time) if time is not None else Moves(USUAL_BUDGET if moves is None else moves)
+    result = minimize(problem, targeted(**limits), budget, seed=seed)  # type: ignore[arg-type]
+    return Front.from_result(result).best(**limits)
 
 
 def _is_feasible(problem: MeshProblem, row: FloatArray) -> bool:

@@ -16,6 +16,9 @@ CONTROL_GROUPS = (
 
 # Bytes that are there if a program runs at all: asking takes longer than having them.
 NEVER_ASKED = 1 << 20
+# What a search in one piece takes for each vertex, rounded up, and any process.
+VERTEX_BYTES = 1200
+PROCESS_BYTES = 400 << 20
 
 
 # Of glibc's mallopt: the parameters' numbers, and what they are set to [bytes].
@@ -55,6 +58,11 @@ def check_free(needed: float, what: str, way_out: str) -> None:
     """
     if needed > NEVER_ASKED and needed > (free := min(free_memory())):
         raise ModelError(f"{what} need about {spelled(needed)}, and {spelled(free)} are free; {way_out}")
+
+
+def fits_in_one_piece(n_vertices: int) -> bool:
+    """Tell whether a model of so many vertices can be searched as a whole in the memory that is free."""
+    return PROCESS_BYTES + VERTEX_BYTES * n_vertices <= min(free_memory())
 
 
 def free_memory() -> tuple[float, float]:

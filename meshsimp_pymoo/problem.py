@@ -55,7 +55,7 @@ REPORTED = tuple(name for name in MEASURES if name != "triangles")
 VALUES = frozenset(("F", "G", "H"))
 
 # The constraints: an argument of MeshProblem each, and which objective it limits (the first, the last).
-CONSTRAINTS = {"max_triangles": -1, "max_error": 0}
+CONSTRAINTS = {"max_triangles": -1, "max_objective": 0}
 
 
 class ThreadRunner:
@@ -104,7 +104,7 @@ class MeshProblem(ElementwiseProblem):
         default the measure of the rules, "error" unless they say otherwise, and "triangles".
     max_triangles : int, optional
         Largest number of triangles, as a pymoo constraint.
-    max_error : float, optional
+    max_objective : float, optional
         Largest value of the first objective, as a pymoo constraint [model units].
     n_threads : int, optional
         Threads of the default runner; all cores by default.
@@ -156,7 +156,7 @@ class MeshProblem(ElementwiseProblem):
         rules: Rules | None = None,
         objectives: Sequence[str] | None = None,
         max_triangles: int | None = None,
-        max_error: float | None = None,
+        max_objective: float | None = None,
         n_threads: int | None = None,
         memo: int = MEMO_SIZE,
         regions: int = 0,
@@ -169,8 +169,8 @@ class MeshProblem(ElementwiseProblem):
         _refuse_unknown(kwargs)
         if max_triangles is not None and max_triangles < 1:
             raise ValueError(f"max_triangles={max_triangles} leaves no mesh; give 1 or more")
-        if max_error is not None and not max_error >= 0:
-            raise ValueError(f"max_error={max_error} is no error; give 0 or more")
+        if max_objective is not None and not max_objective >= 0:
+            raise ValueError(f"max_objective={max_objective} is no error; give 0 or more")
         if not 0 <= regions <= MOST_REGIONS:
             raise ValueError(f"regions={regions} is no number of regions; give 0 to {MOST_REGIONS}")
         if hasattr(model, "rules"):
@@ -193,7 +193,7 @@ class MeshProblem(ElementwiseProblem):
             rules = taken(Rules, rules, named | {"measure": self.objectives[0]})
             self.surface = HeightSurface(open_model(model, self.options), rules)
         self.max_triangles = max_triangles
-        self.max_error = max_error
+        self.max_objective = max_objective
         self._memo: OrderedDict[bytes, FloatArray] = OrderedDict()
         self._memo_size = memo
         self.regions = min(regions, self.surface.n_vertices)
@@ -397,6 +397,11 @@ MeshProblem.__signature__ = _signature()
 
 def _refuse_unknown(kwargs: dict[str, Any]) -> None:
     unknown = sorted(set(kwargs) - set(inspect.signature(Problem).parameters))
+    if "max_error" in unknown:
+        raise TypeError(
+            "MeshProblem has no argument 'max_error'; max_objective= bounds the first objective, simplify_to(model, "
+            "max_error=E) finds the smallest mesh that deviates nowhere by more than E"
+        )
     if unknown:
         names = [*inspect.signature(MeshProblem).parameters, *inspect.signature(Problem).parameters]
         raise TypeError(f"MeshProblem has no argument {unknown[0]!r}{meant(unknown[0], names)}")

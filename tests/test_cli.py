@@ -289,7 +289,7 @@ def test_both_ends_of_the_front_are_there_without_a_search_for_them(tmp_path):
         (("--max-error", -1), r"--max-error.*"),
         (("--max-error", "nan"), r"argument --max-error: 'nan' is not a finite number"),
         (("--mean-error", "small"), r"argument --mean-error: 'small' is not a finite number"),
-        (("--triangles", 9, "--pick", "knee"), r"not allowed with argument"),
+        (("--triangles", 9, "--pick", "knee"), r"--triangles does not go with --pick knee: each chooses a mesh"),
     ],
 )
 def test_impossible_targets_are_refused_with_what_is_possible(tmp_path, capsys, options, message):
@@ -775,7 +775,8 @@ def test_pick_without_a_file_says_what_it_would_be(picked, capsys):
     [
         (("--triangles", "1"), 1, r"no solution of face:200 has at most 1 triangles; the least is 2; nothing is w"),
         (("--solution", "9999"), 2, r"has the solutions 0 to \d+; --solution 9999 is none of them"),
-        ((), 2, r"one of the arguments --triangles .* is required \(see meshsimp pick --help\)"),
+        ((), 2, r"which solution is wanted\? say limits, such as --triangles 500, or --knee, or --solution K"),
+        (("--triangles", "9", "--knee"), 2, r"--triangles does not go with --knee: each chooses a mesh; leave one of"),
         (("--knee", "-o", "a.doc"), 2, r"a\.doc: the suffix '\.doc' says no format that can be written; use one"),
     ],
 )
@@ -1114,9 +1115,9 @@ def test_refitted_meshes_stand_beside_the_others_and_the_referee_agrees(tmp_path
     [
         (["--measure", "l2"], "--measure: invalid choice: 'l2' (choose from l1, rms, max); did you mean l1?"),
         (
-            ["--measure", "max", "--algorithm", "memetic"],
-            "--measure max is not for the memetic search, which thins and moves vertices by sums over the vertices; "
-            "use --algorithm nsga2_v1 or nsga2_v2 or moead with it, or --measure l1 or rms",
+            ["--max-error", "1", "--measure", "rms"],
+            "--max-error does not go with --measure rms: a wish for an error lowers that error; leave --measure out, or "
+            "take the mesh out of a front that was searched by it (meshsimp pick)",
         ),
         (["--weights", "sharpness"], "no per-vertex attribute 'sharpness' to weigh by; it has: none"),
     ],

@@ -27,6 +27,7 @@ from meshsimp_pymoo import (
     FrontSolution,
     HalfPlaneCrossover,
     MeshProblem,
+    Missed,
     NeighbourShift,
     NestedSubsets,
     Options,
@@ -113,7 +114,7 @@ def test_any_algorithm_gives_a_front(algorithm):
 
 
 def test_constraints_hold_for_the_ends_too():
-    problem = MeshProblem("roof:5", max_triangles=20, max_error=4.0)
+    problem = MeshProblem("roof:5", max_triangles=20, max_objective=4.0)
     result = minimize(problem, nsga2_v1(pop_size=20), ("n_gen", 15), seed=1)
     front = Front.from_result(result)
     assert front.F[:, 1].max() <= 20
@@ -121,7 +122,9 @@ def test_constraints_hold_for_the_ends_too():
 
 
 def test_a_search_that_found_nothing_says_so():
-    result = minimize(MeshProblem("roof:9", max_error=0.0, max_triangles=2), nsga2_v1(pop_size=8), ("n_gen", 2), seed=1)
+    result = minimize(
+        MeshProblem("roof:9", max_objective=0.0, max_triangles=2), nsga2_v1(pop_size=8), ("n_gen", 2), seed=1
+    )
     with pytest.raises(LookupError, match="roof:9: the search found no solution that meets its constraints; sea"):
         Front.from_result(result)
     with pytest.raises(LookupError, match="roof:9: none of 1 subsets of its vertices is a mesh that meets"):
@@ -224,6 +227,15 @@ def test_best_within_a_measure_is_the_smallest(front, name):
         assert front.best(**{name: limit}) == min(fitting, key=lambda s: s.triangles)
 
 
+def test_of_several_limits_all_hold(front):
+    middle = front[len(front) // 2]
+    found = front.best(triangles=middle.triangles, max_error=middle.max_error, mean_error=middle.mean_error)
+    assert found == middle
+    limits = {"max_error": middle.max_error, "rms_error": front[-2].rms_error}
+    fitting = [s for s in front if s.max_error <= limits["max_error"] and s.rms_error <= limits["rms_error"]]
+    assert front.best(**limits) == fitting[0]
+
+
 def test_a_limit_that_nothing_meets_says_how_near_the_front_comes(front):
     with pytest.raises(LookupError, match="no solution of face:200 has at most 1 triangles; the least is 2"):
         front.best(triangles=1)
@@ -233,9 +245,11 @@ def test_a_limit_that_nothing_meets_says_how_near_the_front_comes(front):
         front[:-1].best(max_error=1e-9)
     with pytest.raises(LookupError, match=r"the least RMS error of a solution of face:200 is .*, and 0 was asked for"):
         front[:-1].best(rms_error=0)
-    with pytest.raises(TypeError, match=r"best\(\) takes one limit, such as triangles=500 .*; 2 are given"):
-        front.best(triangles=5, error=3)
-    with pytest.raises(TypeError, match="0 are given"):
+    two = r"no solution of face:200 holds all of .*; error 4165.98 at 2 triangles; with error 3 the smallest found has 350"
+    with pytest.raises(Missed, match=two) as missed:
+        front.best(triangles=2, error=3)
+    assert missed.value.nearest == front[0]
+    with pytest.raises(TypeError, match="takes limits, such as triangles=500 .*; none is given"):
         front.best()
     with pytest.raises(TypeError, match=r"best\(\) knows no limit 'size'; it takes error, triangles, vertices, "):
         front.best(size=5)

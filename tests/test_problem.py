@@ -79,7 +79,7 @@ def test_the_other_quality_numbers_come_along(problem):
             assert out[key][i] == pytest.approx(getattr(quality, key))
 
 
-@pytest.mark.parametrize("arguments", [{}, {"max_triangles": 30, "max_error": 2.0}, {"regions": 5}, {"memo": 0}])
+@pytest.mark.parametrize("arguments", [{}, {"max_triangles": 30, "max_objective": 2.0}, {"regions": 5}, {"memo": 0}])
 def test_one_chromosome_gets_what_it_gets_among_many_to_the_type(arguments):
     problem = MeshProblem("peaks:6", **arguments)
     X = np.vstack([subsets(problem, 4), np.zeros(36, bool)])
@@ -219,7 +219,7 @@ def test_a_subset_without_a_triangle_gets_the_worst_objectives():
 
 
 def test_constraints_bound_triangles_and_error():
-    problem = MeshProblem("face:300", max_triangles=120, max_error=40.0)
+    problem = MeshProblem("face:300", max_triangles=120, max_objective=40.0)
     out = problem.evaluate(subsets(problem), return_as_dictionary=True)
     np.testing.assert_allclose(out["G"][:, 0], out["F"][:, 1] - 120)
     np.testing.assert_allclose(out["G"][:, 1], out["F"][:, 0] - 40.0)
@@ -231,8 +231,8 @@ def test_constraints_bound_triangles_and_error():
     ("arguments", "message"),
     [
         ({"max_triangles": 0}, "leaves no mesh"),
-        ({"max_error": -1.0}, "is no error"),
-        ({"max_error": float("nan")}, "is no error"),
+        ({"max_objective": -1.0}, "is no error"),
+        ({"max_objective": float("nan")}, "is no error"),
         ({"footprint": "box"}, "footprint is 'box': expected one of model, hull"),
         ({"outside": "zero"}, "outside is 'zero': expected one of nearest, ignore"),
         ({"n_threads": 0}, "no number of threads"),
@@ -323,7 +323,7 @@ def test_the_documentation_names_every_objective_and_every_number_beside_them():
 
 
 def test_a_bound_on_the_error_is_one_on_the_first_objective():
-    problem = MeshProblem("face:300", objectives=("rms_error", "triangles"), max_error=2.0, max_triangles=90)
+    problem = MeshProblem("face:300", objectives=("rms_error", "triangles"), max_objective=2.0, max_triangles=90)
     F, G = problem.evaluate(subsets(problem))
     np.testing.assert_allclose(G, F[:, ::-1] - [90, 2.0])
 

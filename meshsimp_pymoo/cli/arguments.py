@@ -59,7 +59,7 @@ def add_settings(parser: Any, kind: type[Any], *, only: Sequence[str] = (), **ot
         default = None if name in otherwise else own[name]
         said = otherwise.get(name, str(default) if isinstance(known.kind, Choice) and default is not None else "")
         help_text = known.help + (f" (default: {said})" if said else "")
-        parser.add_argument(_option(name), default=default, help=help_text, **values)
+        parser.add_argument(option(name), default=default, help=help_text, **values)
 
 
 def settings_from(args: argparse.Namespace, kind: type[Settings], **derived: Any) -> Settings:
@@ -74,7 +74,7 @@ def add_wishes(wanted: Any) -> None:
     for name, measure in MEASURES.items():
         if measure.wish:
             kind, metavar = (Real(0), "E") if measure.unit else (Whole(1), "N")
-            wanted.add_argument(_option(name), type=typed(kind.from_text), metavar=metavar, help=measure.wish)
+            wanted.add_argument(option(name), type=typed(kind.from_text), metavar=metavar, help=measure.wish)
 
 
 def wishes_of(args: argparse.Namespace) -> dict[str, float]:
@@ -83,7 +83,8 @@ def wishes_of(args: argparse.Namespace) -> dict[str, float]:
     return {name: limit for name, limit in wished.items() if limit is not None}
 
 
-def _option(name: str) -> str:
+def option(name: str) -> str:
+    """Return what the command line calls a setting or a measure."""
     return "--" + name.replace("_", "-")
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import argparse
 import re
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from meshsimp_pymoo.cli.arguments import settings_from, wishes_of
+from meshsimp_pymoo.cli.arguments import option, settings_from, wishes_of
+from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.search.presets import DEFAULT
-from meshsimp_pymoo.surface.measures import OBJECTIVES
+from meshsimp_pymoo.search.wishes import measure_for
+from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
 from meshsimp_pymoo.surface.rules import Rules
 
 Part = TypeVar("Part")
@@ -47,6 +51,11 @@ class Wish:
         """The most triangles that are wanted."""
         found = self.limits.get("triangles")
         return None if found is None else int(found)
+
+    @property
+    def options(self) -> str:
+        """The limits as the command line names them."""
+        return listed([option(name) for name in self.limits], "and")
 
     def of(self, front: Any) -> tuple[Any | None, str]:
         """Return the solution of a front that is wanted, if one is, and why there is none, if so."""
@@ -95,6 +104,18 @@ class Request:
     wish: Wish
     output: Output
     tiling: Tiling
+    #: What is minimised, if the command line says so; ``rules`` have what a wish makes of it.
+    measure: str | None = None
+
+    @property
+    def is_targeted(self) -> bool:
+        """Whether the search is for the mesh that is wished for; other algorithms than the default find a front."""
+        return bool(self.wish.limits) and self.search.algorithm == DEFAULT
+
+    @property
+    def algorithm(self) -> str:
+        """What searches."""
+        return "targeted" if self.is_targeted else self.search.algorithm
 
     @property
     def wanted(self) -> dict[str, Any]:
@@ -106,22 +127,58 @@ class Request:
     def recorded(self) -> dict[str, Any]:
         """What of it is worth a place in the record of what was searched, beside options and rules."""
         search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
-        return search | self.wanted | {"refit": self.output.refit}
+        return search | {"algorithm": self.algorithm} | self.wanted | {"refit": self.output.refit}
 
 
 def request_of(args: argparse.Namespace) -> Request:
     """Return what a command line of ``meshsimp simplify`` asks for; from here on no namespace travels."""
     folder = args.output or f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
-    measure = next(name for name, known in OBJECTIVES.items() if known.minimised == args.measure)
-    return Request(
+    measure = next((name for name, known in OBJECTIVES.items() if known.minimised == args.measure), None)
+    request = Request(
         model=args.model,
         options=settings_from(args, Options),
-        rules=settings_from(args, Rules, measure=measure),
+        rules=settings_from(args, Rules, measure=measure or Rules().measure),
         search=_part(Search, args),
         wish=Wish(wishes_of(args), args.pick == "knee"),
         output=_part(Output, args, folder=Path(folder)),
         tiling=_part(Tiling, args),
+        measure=measure,
     )
+    for (one, other), (meets, why) in REFUSED.items():
+        if meets(request):
+            raise UsageError(f"{_filled(one, request)} does not go with {_filled(other, request)}: {why}")
+    if not request.is_targeted:
+        return request
+    return replace(request, rules=replace(request.rules, measure=measure_for(request.wish.limits, measure)))
+
+
+def _lowers_another(request: Request) -> bool:
+    """Tell whether a measure is named that is not the one that is wished for."""
+    try:
+        measure_for(request.wish.limits, request.measure)
+    except ValueError:
+        return request.is_targeted
+    return False
+
+
+# What does not go with what, whatever the model is: two options, when that is so, and why, with the way out. What tiles
+# do not know is said in cli/tiling.py.
+REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
+    ("{wish}", "--pick knee"): (
+        lambda request: bool(request.wish.limits) and request.wish.knee,
+        "each chooses a mesh, and there is one chosen mesh; leave one of them out",
+    ),
+    ("{wish}", "--measure {measure}"): (
+        _lowers_another,
+        "a wish for an error lowers that error; leave --measure out, or take the mesh out of a front that was searched "
+        "by it (meshsimp pick)",
+    ),
+}
+
+
+def _filled(words: str, request: Request) -> str:
+    spelled = MEASURES[request.measure].minimised if request.measure else ""
+    return words.format(wish=request.wish.options, measure=spelled)
 
 
 def _part(kind: type[Part], args: argparse.Namespace, **others: Any) -> Part:

@@ -6,7 +6,7 @@ import gc
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,8 @@ from meshsimp_pymoo.search.memetic import FEWEST, measurable, sweep_generations
 from meshsimp_pymoo.search.operators import NestedSubsets
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
 from meshsimp_pymoo.search.starting import begun
+from meshsimp_pymoo.search.targeted import targeted
+from meshsimp_pymoo.search.wishes import USUAL_BUDGET
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import (
     CHECKPOINT,
@@ -59,6 +61,7 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
+from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.warming import SEARCH
 
@@ -93,7 +96,7 @@ def _simplify(request: Request, shown: Stages) -> int:
     else:
         refuse_alone(request.tiling)
     _check_budget(search)
-    what = {"settings": request.recorded | budget(search), "seed": search.seed, "interrupted": False}
+    what = {"settings": request.recorded | budget(request), "seed": search.seed, "interrupted": False}
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
@@ -103,7 +106,7 @@ def _simplify(request: Request, shown: Stages) -> int:
             format_to_write(output.format).check(problem.model)
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
-        _refuse_impossible(problem, request.wish)
+        _refuse_impossible(problem, request.wish, quiet=output.quiet)
     shown.expect("writing", WRITING_SECONDS[0] + WRITING_SECONDS[1] * problem.n_var**0.5)
     keeper = Keeper(problem, request, {"read_seconds": read_seconds, "compile_seconds": compiled.seconds})
     if is_drawn_only:
@@ -142,8 +145,8 @@ def _check_budget(search: Search) -> None:
         say(f"warning: evaluations do not measure {search.algorithm}, whose children cost any work; use {way_out}")
 
 
-def _refuse_impossible(problem: MeshProblem, wish: Wish) -> None:
-    """Stop before the search if no subset of the vertices is a mesh, or none can meet the target."""
+def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None:
+    """Stop before the search if no subset of the vertices is a mesh, or none can meet the target; say if none may."""
     table = problem.evaluate_subsets(np.array([np.ones(problem.n_var, dtype=bool), problem.pinned]))
     whole, bare = (problem.as_quality(row) for row in table)
     if whole.triangles == 0:
@@ -159,6 +162,12 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish) -> None:
             f"--triangles {wish.triangles} is impossible: {problem.model.name} has {least} to "
             f"{whole.triangles} triangles with its pinned vertices"
         )
+    values = asdict(whole)
+    missed = [name for name, most in wish.limits.items() if name != "triangles" and values[name] > most]
+    if missed and not quiet:
+        # some lie one above the other, or their mesh leaves some uncovered: another subset may be more accurate
+        said = listed([f"{MEASURES[name].label} {values[name]:.4g}" for name in missed], "and")
+        say(f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest")
 
 
 # ----------------------------------------------------------------------------------------------------------- the search
@@ -177,8 +186,9 @@ class _Found:
     until: float | None
 
 
-def budget(search: Search) -> dict[str, float]:
-    """Return the budget of a search by kind; where none is given, generations as is usual for its algorithm."""
+def budget(request: Request) -> dict[str, float]:
+    """Return the budget of a search by kind; where none is given, what is usual for its algorithm."""
+    search = request.search
     given: dict[str, float | None] = {
         "time": search.time, "evaluations": search.evaluations, "generations": search.generations,
         "moves": search.moves,
@@ -186,6 +196,8 @@ def budget(search: Search) -> dict[str, float]:
     found = {kind: amount for kind, amount in given.items() if amount is not None}
     if found:
         return found
+    if request.is_targeted:
+        return {"moves": USUAL_BUDGET}
     sweeps = PRESETS[search.algorithm].sweeps
     return {"generations": sweep_generations(search.population) if sweeps else DEFAULT_GENERATIONS}
 
@@ -200,10 +212,13 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
         "generations": MaximumGenerationTermination,
         "moves": Moves,
     }
-    ((kind, amount),) = budget(search).items()
+    ((kind, amount),) = budget(request).items()
     if kind == "time" and request.output.refit:
         amount *= 1.0 - REFIT_SHARE
-    algorithm = preset.function(pop_size=search.population)
+    if request.is_targeted:
+        algorithm: Any = targeted(pop_size=search.population, **request.wish.limits)  # type: ignore[arg-type]
+    else:
+        algorithm = preset.function(pop_size=search.population)
     return algorithm.setup(problem, termination=terminations[kind](amount), seed=search.seed)
 
 
@@ -220,8 +235,13 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             while algorithm.has_next():
                 stop_if_interrupted()
                 algorithm.next()
+                if keeper.request.is_targeted:
+                    words = _answer_in_words(algorithm, first=found is None)
+                    if found is None and not keeper.output.quiet:
+                        say(words)
+                else:
+                    words = front_in_words(problem.model, algorithm.evaluator.n_eval, algorithm.opt.get("F"))
                 found, generations = algorithm.opt, algorithm.n_iter - 1
-                words = front_in_words(problem.model, algorithm.evaluator.n_eval, found.get("F"))
                 show(0.0 if timed else algorithm.termination.perc, words)  # the clock knows better
                 keeper.keep()
             keeper.keep(last=True)
@@ -236,7 +256,9 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
     seconds = before + time.perf_counter() - start
     try:
         # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
-        front = Front.from_subsets(problem, X, ends=True)
+        front = Front.from_subsets(
+            problem, X, ends=True, wish=keeper.request.wish.limits if keeper.request.is_targeted else None
+        )
     except LookupError:
         raise UsageError(
             f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "
@@ -246,9 +268,22 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
     return _Found(front, generations, algorithm.evaluator.n_eval, moves_of(algorithm), seconds, until)
 
 
+def _answer_in_words(algorithm: Any, *, first: bool) -> str:
+    """Return what comes nearest to a wish so far, for the line of its progress."""
+    answer, errors = algorithm.answer, [name for name in algorithm.limits if name != "triangles"]
+    said = [f"{int(answer.F[-1]):,} triangles"]
+    said += [f"{MEASURES[name].label} {float(answer.get(name)):.4g}" for name in errors or ["mean_error"]]
+    if len(answer.X) == int(answer.X.sum()):
+        said.append("which takes all vertices")
+    if algorithm.missed:
+        said.append("which misses the wish")
+    return f"{'first answer' if first else 'best so far'}: {', '.join(said)}"
+
+
 def _subsets_begun(problem: MeshProblem, algorithm: Any) -> NDArray[np.bool_] | None:
     """Return subsets of what there is of a search's start, as many as can be measured soon; None if there is none."""
-    sampling, start = getattr(algorithm.initialization, "sampling", None), begun(problem.surface)
+    sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
+    start = begun(problem.surface)
     if start is None or not isinstance(sampling, NestedSubsets):
         return None
     n = min(max(measurable(problem, MEASURED_SHARE * WAIT_SECONDS), FEWEST), algorithm.pop_size)
@@ -289,10 +324,11 @@ class Keeper:
         return {
             "model": self.problem.model.hash,
             **plain(self.problem.surface.rules),
-            "algorithm": search.algorithm,
+            "algorithm": self.request.algorithm,
+            **(self.request.wish.limits if self.request.is_targeted else {}),
             "population": search.population,
             "seed": search.seed,
-            **budget(search),
+            **budget(self.request),
             **({"refit": True} if self.output.refit and search.time is not None else {}),  # takes a share of the time
             **{name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")},
         }
@@ -361,7 +397,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
     try:
         fitted = _refit(found, chosen, request, shown) if output.refit else None
         run = {
-            "settings": request.recorded | budget(search),
+            "settings": request.recorded | budget(request),
             "seed": search.seed,
             "generations": found.generations,
             "evaluations": found.evaluations,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from meshsimp_pymoo.cli.terminal import INTERRUPTED, WRITING, Stages, answering,
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import format_to_write
+from meshsimp_pymoo.memory import fits_in_one_piece
 from meshsimp_pymoo.opening import count_samples, open_grid
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import TILES, claim_output, now
@@ -28,7 +29,8 @@ from meshsimp_pymoo.workers import EngineError, open_engine
 
 # What tiles know, or what makes no difference to them; all else is refused where it is not what asks for nothing.
 KNOWN: dict[type[Any], tuple[str, ...]] = {
-    Search: ("seed", "threads", "checkpoint"),  # nothing is left to chance, and finished tiles are always saved
+    # nothing is left to chance, and finished tiles are always saved
+    Search: ("seed", "threads", "checkpoint", "time"),
     Rules: FREE_RULES,
     Options: ("up", "spacing", "nodata", "window", "band", "encoding", "scale"),
     Output: ("folder", "overwrite", "format", "meshes", "page", "quiet", "json"),
@@ -36,10 +38,10 @@ KNOWN: dict[type[Any], tuple[str, ...]] = {
 
 
 def wants_tiles(request: Request) -> bool:
-    """Tell whether the model is to be thinned tile by tile: because it was asked for, or because it is big."""
+    """Tell whether the model is to be thinned tile by tile: because it was asked for, or is too big for one piece."""
     if request.tiling.tile is None:
         count = count_samples(request.model, window=request.options.window)
-        return count is not None and count >= TILED_FROM
+        return count is not None and count >= TILED_FROM and not fits_in_one_piece(count)
     return bool(request.tiling.tile)
 
 
@@ -58,7 +60,8 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     _refuse_unknown(request)
     wish, output, tiling = request.wish, request.output, request.tiling
     out, tile = output.folder, tiling.tile or TILE
-    what = {"settings": request.wanted | {"tile": tile, "pieces": tiling.pieces}}
+    timed = {} if request.search.time is None else {"time": request.search.time}
+    what = {"settings": request.wanted | timed | {"tile": tile, "pieces": tiling.pieces}}
     is_drawn_only = lacks_pictures(output, what | {"options": plain(request.options)})
     if not is_drawn_only:
         _claim(output)
@@ -67,7 +70,8 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
             grid = open_grid(request.model, request.options)
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
-    surface = GridSurface(grid, request.rules)
+    rules = replace(request.rules, measure=request.measure or Rules().measure)
+    surface = GridSurface(grid, rules)
     if is_drawn_only:
         return hand_over_stored(request, surface, shown)
     start, begun = time.perf_counter(), now()
@@ -95,13 +99,14 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
             ):
                 front = tiled_front(
                     grid,
-                    rules=request.rules,
+                    rules=rules,
                     tile=tile,
                     most=most,
                     engine=engine,
                     store=Folder(out / TILES, identity_of_tiles),
                     threads=threads,
                     progress=show,
+                    until=None if request.search.time is None else start + request.search.time,
                 )
                 chosen, _ = wish.of(front)
                 stop_if_interrupted()
@@ -155,7 +160,8 @@ def _has_pieces(out: Path) -> bool:
 
 
 def _refuse_unknown(request: Request) -> None:
-    for part in (request.search, request.rules, request.options, request.output):
+    rules = replace(request.rules, measure=request.measure or Rules().measure)
+    for part in (request.search, rules, request.options, request.output):
         for item in fields(part):
             if item.name not in KNOWN[type(part)] and getattr(part, item.name) != item.default:
                 raise UsageError(

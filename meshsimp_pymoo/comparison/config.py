@@ -234,6 +234,10 @@ Different = Annotated[tuple[Thing, ...], Field(min_length=1), AfterValidator(_di
 # ------------------------------------------------------------------------------------------ the parts of a file
 
 
+# What a key was called before.
+FORMER: dict[Any, str] = {"max_error": "max_objective"}
+
+
 class Part(BaseModel):
     """A mapping with known keys, its fields. Where there is a ``word``, a bare text is the value of that key."""
 
@@ -252,7 +256,9 @@ class Part(BaseModel):
             raise ValueError(f"expected a mapping with the keys {', '.join(names)}")
         for name in given:
             if name not in names:
-                raise _Mistake(f"unknown key{meant(name, names)}; known here: {', '.join(names)}", name)
+                raise _Mistake(
+                    f"unknown key{meant(FORMER.get(name) or name, names)}; known here: {', '.join(names)}", name
+                )
         found = [name for name in cls.one_of if name in given]
         if cls.one_of and len(found) != 1:
             raise ValueError(f"give one of {', '.join(cls.one_of.values())}, not {' and '.join(found) or 'none'}")
@@ -270,7 +276,7 @@ def _with_keys(known: Mapping[str, Any]) -> Any:
 
 
 # Keys of `problem`: how a model is read, what counts, and these arguments of MeshProblem.
-LIMITS: dict[str, Kind] = {"max_triangles": Whole(1), "max_error": Real(0), "regions": Whole(1)}
+LIMITS: dict[str, Kind] = {"max_triangles": Whole(1), "max_objective": Real(0), "regions": Whole(1)}
 PROBLEM_OPTIONS = {
     **{
         name: _of(known.kind)

@@ -134,7 +134,7 @@ class Problem:
 
     def meets_limits(self, F: FloatArray) -> npt.NDArray[np.bool_]:
         """Return which solutions (n, 2), by the error that was searched, a search of this problem could find."""
-        most = [self.limits.get(name, np.inf) for name in ("max_error", "max_triangles")]
+        most = [self.limits.get(name, np.inf) for name in ("max_objective", "max_triangles")]
         return np.all(np.less_equal(F, most), axis=1)
 
 

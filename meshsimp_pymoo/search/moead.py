@@ -158,7 +158,7 @@ class TchebycheffMOEAD(MOEAD):
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         if problem.has_constraints():
             raise ValueError(
-                "MOEA/D takes no constraints; drop max_triangles= and max_error= from the problem, or use NSGA-II"
+                "MOEA/D takes no constraints; drop max_triangles= and max_objective= from the problem, or use NSGA-II"
             )
         if problem.n_obj != 2:
             raise ValueError(f"MOEA/D here decomposes two objectives, the problem has {problem.n_obj}; use nsga3()")

@@ -43,6 +43,8 @@ class Measure(NamedTuple):
         Whether its order is that of this sum; thinning goes by the maximum itself where it is not.
     wish : str
         What ``--NAME`` asks for, if a mesh can be chosen by it.
+    searched : str
+        Of a wish for an error: the objective of the same order, which is lowered for it.
     """
 
     of: Callable[[Any, float], Any]
@@ -53,6 +55,7 @@ class Measure(NamedTuple):
     power: int = 1
     is_sum: bool = False
     wish: str = ""
+    searched: str = ""
 
 
 def _measure(of: Callable[[Any, float], Any], **facts: Any) -> Any:
@@ -109,6 +112,7 @@ class Quality:
         meaning="mean over all original vertices",
         unit=LENGTH,
         wish="the smallest with a mean deviation of at most E [model units]",
+        searched="error",
     )
     rms_error: float = _measure(
         lambda table, weight: _root(table[..., SQUARES] / weight),
@@ -118,6 +122,8 @@ class Quality:
         minimised="rms",
         is_sum=True,
         power=2,
+        wish="the smallest with a root mean square deviation of at most E [model units]",
+        searched="rms_error",
     )
     max_error: float = _measure(
         lambda table, weight: table[..., MAXIMUM],
@@ -127,6 +133,7 @@ class Quality:
         minimised="max",
         power=8,
         wish="the smallest that deviates nowhere by more than E [model units]",
+        searched="max_error",
     )
     uncovered: int = _measure(
         lambda table, weight: table[..., UNCOVERED],

@@ -24,6 +24,7 @@ References
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict
@@ -189,6 +190,7 @@ def tiled_front(
     store: Folder | InMemory | None = None,
     threads: int = 1,
     progress: Progress | None = None,
+    until: float | None = None,
 ) -> Front:
     """Thin a height grid tile by tile to a whole front, nested but for its smallest solutions.
 
@@ -211,6 +213,9 @@ def tiled_front(
         Threads that measure the solutions.
     progress : callable, optional
         Told about the progress.
+    until : float, optional
+        The vertices of the smallest solutions are moved only as far as ``time.perf_counter() = until``; thinning takes
+        what it takes.
 
     Returns
     -------
@@ -250,7 +255,7 @@ def tiled_front(
     n_left = len(level) - np.searchsorted(np.sort(level), slopes, side="right")
     slopes = slopes[int(np.argmax(n_left <= max(ABOUT * n_wanted, len(grid.corners)))) :]
     samples, level = samples[level > slopes[0]], level[level > slopes[0]]
-    moved = work.move([samples[level > at] for at in slopes])
+    moved = work.move([samples[level > at] for at in slopes], until)
     quality = work.measure(
         [samples[level > at] if new is None else new for at, new in zip(slopes, moved, strict=True)], threads
     )
@@ -464,8 +469,8 @@ class _Phases:
             self.store.put("finish", **stored)
         return stored["removed"], stored["level"]
 
-    def move(self, solutions: list[IntArray]) -> list[IntArray | None]:
-        """Move the vertices of those of the solutions that are small, but for the smallest there is."""
+    def move(self, solutions: list[IntArray], until: float | None) -> list[IntArray | None]:
+        """Move the vertices of the solutions that are small, but for the smallest there is, as far as the time goes."""
         small = [
             k
             for k, kept in enumerate(solutions)
@@ -476,12 +481,15 @@ class _Phases:
             return moved
         coarse = CoarseGrid(self.grid)
         missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
-        tasks = (coarse.task(solutions[k], int(self.grid.triangles_of(solutions[k]).sum()) - 2) for k in missing)
+        in_time = (k for k in missing if until is None or time.perf_counter() < until)
+        tasks = (coarse.task(solutions[k], int(self.grid.triangles_of(solutions[k]).sum()) - 2) for k in in_time)
         for place, rows in self.engine.each(_move, tasks):
             self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
         for k in small:
             piece = self.store.get(f"moved_{k:04d}")
+            if piece is None and until is not None:
+                continue
             if piece is None:
                 raise ResultError(f"{self.grid.name}: {LOST}")
             moved[k] = piece["samples"]

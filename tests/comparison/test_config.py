@@ -318,7 +318,7 @@ MISTAKES = {
         ["algorithms[0].parameters.pop_size", "the tag", "python/tuple' is not understood"],
     ),
     "option value unknown": ({"problem": "{footprint: hul}"}, ["problem.footprint", "'hul'", "'hull'"]),
-    "option of wrong type": ({"problem": "{max_error: small}"}, ["problem.max_error", "'small'", "number"]),
+    "option of wrong type": ({"problem": "{max_objective: small}"}, ["problem.max_objective", "'small'", "number"]),
     "objective unknown": ({"problem": "{objectives: [errror, triangles]}"}, ["problem.objectives", "rms_error"]),
     "three objectives": (
         {"problem": "{objectives: [error, max_error, triangles]}"},

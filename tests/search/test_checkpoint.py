@@ -45,7 +45,7 @@ def problems():
     return {
         "usual": MeshProblem("face:90", n_threads=1),
         "three": MeshProblem("face:90", objectives=measures, n_threads=1),
-        "limited": MeshProblem("face:90", max_triangles=60, max_error=400.0, n_threads=1),
+        "limited": MeshProblem("face:90", max_triangles=60, max_objective=400.0, n_threads=1),
     }
 
 

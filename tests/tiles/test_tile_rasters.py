@@ -180,6 +180,7 @@ def test_a_big_raster_is_cut_into_tiles_without_being_asked_and_a_window_of_it_c
     path, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.setattr(tiled_command, "TILED_FROM", 10_000)
+    monkeypatch.setattr(tiled_command, "fits_in_one_piece", lambda count: False)
     assert (
         main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1", "--no-page"]) == 0
     )

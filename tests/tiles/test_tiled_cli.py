@@ -187,7 +187,7 @@ def test_pieces_are_written_one_for_each_tile(path, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--time", "5s"], "--time does not go with tiles"),
+        (["--moves", "500"], "--moves does not go with tiles"),
         (["--algorithm", "nsga2_v1"], "--algorithm does not go with tiles"),
         (["--population", "50"], "--population does not go with tiles"),
         (["--max-edge", "5"], "--max-edge does not go with tiles"),
@@ -230,6 +230,7 @@ def test_a_big_grid_with_gaps_is_searched_in_one_piece_unless_tiles_are_asked_fo
     heights[5:9, 11] = np.nan
     np.save(tmp_path / "gaps.npy", heights)
     monkeypatch.setattr(tiled_command, "TILED_FROM", 500)
+    monkeypatch.setattr(tiled_command, "fits_in_one_piece", lambda count: False)
     command = ["simplify", str(tmp_path / "gaps.npy"), "-o", str(tmp_path / "out"), "--meshes", "none", "--up", "z"]
     assert main([*command, "--tile", "64"]) == 2
     assert "only a grid without gaps can be cut into tiles" in capsys.readouterr().err
@@ -243,11 +244,15 @@ def test_a_big_grid_with_gaps_is_searched_in_one_piece_unless_tiles_are_asked_fo
 
 def test_big_grids_are_cut_into_tiles_without_being_asked(path, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(tiled_command, "TILED_FROM", 5_000)
+    asked = []
+    monkeypatch.setattr(tiled_command, "fits_in_one_piece", lambda count: bool(asked.append(count)))
     assert (
         main(["simplify", str(path), "-o", str(tmp_path / "out"), "--meshes", "none", "--jobs", "1", "--no-page"]) == 0
     )
     assert "thinned tile by tile" in capsys.readouterr().out
-    monkeypatch.setattr(tiled_command, "TILED_FROM", 10_000_000)
+    # where the memory allows, in one piece
+    assert asked == [np.load(path).size]
+    monkeypatch.setattr(tiled_command, "fits_in_one_piece", lambda count: True)
     call = ["simplify", str(path), "-o", str(tmp_path / "whole"), "--generations", "1", "--population", "4"]
     assert main([*call, "--meshes", "none"]) == 0
     assert (tmp_path / "whole" / "front.npz").exists()

@@ -32,7 +32,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     from meshsimp_pymoo.formats.table import written_suffixes
 
     parser.add_argument("front", metavar="OUT", help="the folder of a front")
-    wanted = parser.add_argument_group("which one").add_mutually_exclusive_group(required=True)
+    wanted = parser.add_argument_group("which one (several limits: all of them hold)")
     add_wishes(wanted)
     wanted.add_argument("--knee", action="store_true", help="the best compromise: the knee of the front")
     wanted.add_argument("--solution", type=whole(0), metavar="K", help="the one of this number in front.csv")
@@ -52,11 +52,17 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.cli.arguments import wishes_of
     from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.requests import Wish
+    from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.files import claim_file
     from meshsimp_pymoo.formats.table import written_suffixes
 
-    path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
+    said = ([wish.options] if wish.limits else []) + ["--knee"] * args.knee + ["--solution"] * (args.solution is not None)
+    if not said:
+        raise UsageError("which solution is wanted? say limits, such as --triangles 500, or --knee, or --solution K")
+    if len(said) > 1:
+        raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
+    path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     with said_when_compiling(args.quiet):
         return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
 

@@ -17,7 +17,7 @@ examples:
       and the most accurate mesh of at most 500 triangles
   meshsimp simplify dem.asc --time 60s --pick knee
       search for a minute, take the best compromise
-  meshsimp simplify scan.obj --max-error 0.1 --format obj
+  meshsimp simplify scan.obj --max-error 0.1 --time 20s --format obj
       the smallest that deviates nowhere by more than 0.1
   meshsimp simplify grid.npy --spacing 30 --nodata=-9999
       a height grid
@@ -49,6 +49,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.formats.table import all_formats, listed, written_formats
     from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
+    from meshsimp_pymoo.search.wishes import USUAL_BUDGET
     from meshsimp_pymoo.surface.measures import OBJECTIVES
     from meshsimp_pymoo.surface.rules import Rules
 
@@ -56,13 +57,15 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace results that are in OUT already")
 
     wanted = parser.add_argument_group(
-        "the mesh you want, written to OUT/chosen.ply beside the front"
-    ).add_mutually_exclusive_group()
+        "the mesh you want, written to OUT/chosen.ply beside the front (several limits: all of them hold)",
+        "It is answered within seconds, then improved for as long as there is time; the front around it comes along.",
+    )
     add_wishes(wanted)
     wanted.add_argument("--pick", choices=("knee",), help="the best compromise: the knee of the front")
 
     budget = parser.add_argument_group(
-        f"how long to search (default: one sweep over all sizes; other algorithms: {DEFAULT_GENERATIONS} generations)"
+        f"how long to search (default: one sweep over all sizes, or {USUAL_BUDGET:,} moves around the mesh you want; "
+        f"other algorithms: {DEFAULT_GENERATIONS} generations)"
     ).add_mutually_exclusive_group()
     budget.add_argument(
         "--time", type=duration, metavar="T", help="60s, 10min, 1h (results then depend on the machine)"
@@ -118,8 +121,8 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--measure",
         type=str.lower,
         choices=list(spelled),
-        default=next(iter(spelled)),
-        help=f"error that is made small beside the triangles: {meanings} (default: %(default)s)",
+        help=f"error that is made small beside the triangles: {meanings} (default: {next(iter(spelled))}, or what is "
+        "wished for)",
     )
 
     output = parser.add_argument_group("what is written and shown")

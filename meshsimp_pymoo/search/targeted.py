@@ -1,0 +1,441 @@
+"""Search for one mesh: of so many triangles, or as accurate as is wished for; the front around it comes along.
+
+The first population is an answer already: vertices are inserted greedily by the measure that is wished for, somewhat
+beyond the wish, and thinned back to it and further down [1]_. Then meshes are annealed around that answer:
+
+* for a number of triangles at exactly that size, and a few at neighbouring ones;
+* for an error at several smaller sizes, of which the smallest that holds is where the next generation begins. None
+  holds: the next sizes are closer. All hold: farther apart. For a maximum what is annealed away is what exceeds it,
+  the sum of max(0, d_p - E), until nothing does.
+
+Every generation makes as many moves as all before it, and the last one what is left of the budget: one slow
+annealing gives better meshes than several quick ones, and the quick ones find out at which size it pays.
+
+References
+----------
+.. [1] M. Garland, P. S. Heckbert, "Fast polygonal approximation of terrains and height fields", CMU-CS-95-181, 1995.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.population import Population
+from pymoo.termination.max_eval import MaximumFunctionCallTermination
+from pymoo.util.display.multi import MultiObjectiveOutput
+
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
+from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
+from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
+from meshsimp_pymoo.search.local_search import relocate_all
+from meshsimp_pymoo.search.memetic import measurable
+from meshsimp_pymoo.search.operators import PackedDuplicates
+from meshsimp_pymoo.search.requirements import surface_of
+from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
+from meshsimp_pymoo.surface.surface import Surface, movable_ground
+from meshsimp_pymoo.workers import on_threads
+
+# How far beyond the wish vertices are inserted before they are thinned back: times the triangles, or the error.
+MORE_TRIANGLES = 2.5
+LESS_ERROR = 0.5
+# Meshes of the first population: as many as are measured in a second or so, but never fewer.
+MEASURED = 1.5e7
+FEWEST = 8
+# Attempts in a generation at sizes that differ by this share of the smallest that holds, and its bounds.
+ATTEMPTS = 4
+STEP = 0.08
+STEPS = (0.002, 0.24)
+# For a number of triangles: the sizes that are annealed, as shares of it, and their shares of the moves.
+SIZES = (1.0, 1.0, 0.85, 1.18)
+SIZE_MOVES = (1.0, 1.0, 0.25, 0.25)
+# The first generation's share of the budget, which is enough to learn how long a move takes; where there is no budget
+# its moves a kept vertex; and the most that a generation makes.
+FIRST = 1 / 40
+PILOT = 50.0
+SLOWEST = 4000.0
+SECONDS_A_MOVE = 2e-6
+# What is kept for the end, and the most meshes that are added then.
+LAST_SHARE = 0.05
+BETWEEN = 24
+# Temperatures, in units of the error per kept vertex, and the share left in the end: from a thinned mesh, and from one
+# that was annealed slowly at its size.
+FRESH: dict[str, Any] = {"temperature": 0.3, "cooling": 0.03}
+AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
+# Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
+OWN = 0.05
+# Generations without a better mesh, beyond the budget's, after which nothing more is expected.
+IDLE = 12
+
+# Bytes of a mesh's error that come from adding up in another order.
+ROUNDING = 1e-9
+
+
+class TargetedSearch(Algorithm):
+    """The algorithm of :func:`targeted`.
+
+    Attributes
+    ----------
+    limits : dict of str to float
+        What is wished for, by measure.
+    within : dict of str to float
+        Those of them that hold beside the problem's objectives.
+    """
+
+    pop: Any
+    opt: Any
+    problem: Any
+
+    def __init__(self, limits: dict[str, float], pop_size: int, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.limits = limits
+        self.pop_size = pop_size
+        self.within: dict[str, float] = {}
+        self.eliminate_duplicates = PackedDuplicates()
+        self.step = STEP
+        self.idle = 0
+        self.is_annealed = False
+        self.moves_done = 0
+        self.seconds = 0.0
+        self.attempted: list[int] = []
+
+    @property
+    def moves(self) -> int:
+        """Moves of the annealing that were made so far."""
+        return self.moves_done
+
+    @property
+    def answer(self) -> Any:
+        """The individual that comes nearest to the wish so far; it holds where its shortfall is 0."""
+        return self.pop[_order(self.pop, self.limits)[0]]
+
+    @property
+    def missed(self) -> float:
+        """By how much the answer misses the wish, as a share of it; 0: it holds."""
+        return float(_missed(self.pop, self.limits)[_order(self.pop, self.limits)[0]])
+
+    # ------------------------------------------------------------------------------------------------ for pymoo's loop
+
+    def _setup(self, problem: Any, **kwargs: Any) -> None:
+        if problem.n_obj != 2:
+            raise ValueError(f"a wish is for two objectives and the problem has {problem.n_obj}; use nsga3()")
+        if problem.has_constraints():
+            raise ValueError("a wish takes no constraints; drop max_triangles= and max_objective= from the problem")
+        surface = surface_of(problem, self)
+        measure = problem.objectives[0]
+        measure_for(self.limits, measure)
+        movable_ground(surface, "a search for one mesh and its thinning")
+        self.within = beside(self.limits, measure)
+        super()._setup(problem, **kwargs)
+
+    def _initialize_infill(self) -> Population:
+        fronts = self._direct()
+        n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
+        X = [front.kept(k) for front in fronts for k in _rungs(front, -(-n // len(fronts)), self._wanted(front))]
+        return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
+
+    def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
+        self.pop = _survivors(infills, self.limits, self.pop_size)
+
+    def _infill(self) -> Population:
+        left = self._seconds_left()
+        plan = self._plan() if left is None or left > 0.0 else None
+        if plan is None:
+            self.termination.force_termination = True
+            return Population.create()
+        parents, sizes, moves = plan
+        begun = self._clock()
+        made = moves.copy()
+        again = "triangles" in self.limits and self.is_annealed
+        children = relocate_all(
+            self._cost(),
+            parents,
+            moves,
+            self.random_state,
+            triangles=sizes,
+            seconds=left,
+            made=made,
+            **(AGAIN if again else FRESH),
+        )
+        self.is_annealed = self.moves_done > 0
+        if "triangles" not in self.limits and not self.within:
+            children = np.array(on_threads(self._squeezed, children))
+        self.seconds += self._clock() - begun
+        self.moves_done += int(made.sum())
+        self.attempted = sizes.tolist()
+        offspring = self.eliminate_duplicates.do(Population.new(X=children), self.pop)
+        self.idle = 0 if len(offspring) else self.idle + 1
+        if self.idle >= IDLE:
+            self.termination.force_termination = True
+        return offspring
+
+    def _advance(self, infills: Any = None, **kwargs: Any) -> None:
+        if not len(infills):
+            return
+        if "triangles" not in self.limits:
+            n_held = int((_missed(infills, self.limits) == 0.0).sum())
+            factor = 0.5 if n_held == 0 else 2.0 if n_held == len(self.attempted) else 1.0
+            self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
+        self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.pop_size)
+
+    def _set_optimum(self) -> None:
+        self.opt = _survivors(self.pop, self.limits, len(self.pop))
+
+    def next(self) -> None:
+        """Do a generation; the time in which functions are compiled is not its own."""
+        with compiling_left_out(self):
+            super().next()
+
+    def _finalize(self) -> None:
+        """Add the answer, thinned: the front just below it."""
+        evaluations = part_of(self.termination, MaximumFunctionCallTermination)
+        most = BETWEEN if evaluations is None else min(BETWEEN, evaluations.n_max_evals - self.evaluator.n_eval)
+        left = self._seconds_left(whole=True)
+        if left is not None:
+            most = min(most, measurable(self.problem, left / 2.0))
+        if most < 1 or self.pop is None or not len(self.pop):
+            return
+        answer = self.answer
+        stop = np.zeros(1, np.bool_)
+        with stopping(stop, None if left is None else max(left, 0.0) / 2.0):
+            front = thinning(self.problem.surface, kept=answer.X, least=int(answer.F[-1] / 2), stop=stop)
+        rows = _rungs(front, most, None)
+        extra = self.eliminate_duplicates.do(Population.new(X=np.array([front.kept(k) for k in rows])), self.pop)
+        extra = extra[np.sort(spread(len(extra))[:most])] if len(extra) > most else extra
+        if len(extra):
+            self.evaluator.eval(self.problem, extra, algorithm=self)
+            merged = Population.merge(self.opt, extra)
+            self.opt = _survivors(merged, self.limits, len(merged))
+
+    # ------------------------------------------------------------------------------------------------- the first answer
+
+    def _direct(self) -> list[NestedFront]:
+        """Return nested fronts that reach beyond the wish, if anything does, and down to the smallest mesh."""
+        surface: Surface = self.problem.surface
+        measure = self.problem.objectives[0]
+        by = "point" if measure == "max_error" else "triangle"
+        fronts = []
+        stop = np.zeros(1, np.bool_)
+
+        def back(inserted: NestedFront) -> None:
+            fronts.append(thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
+
+        with stopping(stop, seconds_given(self)):
+            if "triangles" in self.limits:
+                # about two triangles for each vertex
+                most = int(MORE_TRIANGLES * self.limits["triangles"] / 2) + 8
+                back(greedy_insertion(surface, choose=by, most=most, stop=stop))
+            elif (limit := self._limit()) is not None:
+                back(greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop))
+            if "max_error" in self.within:
+                bounded = surface.bounded(self.within["max_error"])
+                back(greedy_insertion(bounded, choose="point", least_error=0.0, stop=stop))
+        return fronts
+
+    def _limit(self) -> float | None:
+        """Return the limit of the measure that is searched, as nested fronts count it; None if there is none."""
+        measure = self.problem.objectives[0]
+        for name, limit in self.limits.items():
+            if name not in ("triangles", *self.within):
+                return limit * self.problem.surface.total_weight if measure == "error" else limit
+        return None
+
+    def _wanted(self, front: NestedFront) -> int | None:
+        """Return the subset of a nested front that the wish is for, as far as the front knows."""
+        if "triangles" in self.limits:
+            fitting = np.flatnonzero((front.triangles > 0) & (front.triangles <= self.limits["triangles"]))
+            return int(fitting[np.argmin(front.error[fitting])]) if len(fitting) else None
+        limit = self._limit()
+        if limit is None:
+            return None
+        fitting = np.flatnonzero((front.triangles > 0) & (front.error <= limit))
+        return int(fitting[np.argmin(front.triangles[fitting])]) if len(fitting) else None
+
+    # ------------------------------------------------------------------------------------------------- its improvement
+
+    def _cost(self) -> Any:
+        """Return the surface whose cost is annealed."""
+        surface, measure = self.problem.surface, self.problem.objectives[0]
+        if measure == "max_error" and "triangles" not in self.limits:
+            return surface.bounded(self.limits["max_error"])
+        if "max_error" not in self.within:
+            return surface
+        bound = self.within["max_error"]
+        # what the sum counts is a share of a deviation, whatever its power
+        own = OWN if measure == "error" else OWN / max(bound, 1e-300)
+        return surface.bounded(bound, own=own)
+
+    def _squeezed(self, kept: BoolArray) -> BoolArray:
+        """Return a subset that holds with as many vertices less as still hold; another one as it is."""
+        limit = self._limit()
+        assert limit is not None
+        front = thinning(self.problem.surface, kept=kept, most_error=limit)
+        wanted = self._wanted(front)
+        return kept if wanted is None else front.kept(wanted)
+
+    def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
+        """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
+        T = self.pop.get("F")[:, -1]
+        if "triangles" in self.limits:
+            wanted = np.unique(np.maximum(np.array(SIZES) * self.limits["triangles"], T.min()).astype(int))
+            sizes = np.array([max(int(share * self.limits["triangles"]), int(T.min())) for share in SIZES])
+            shares = np.array(SIZE_MOVES)
+            if len(wanted) == 1:
+                sizes, shares = sizes[:2], shares[:2]
+        else:
+            order = _order(self.pop, self.limits)
+            k = np.arange(1, ATTEMPTS + 1)
+            if _missed(self.pop, self.limits)[order[0]] == 0.0:
+                sizes = np.minimum(T[order[0]] * (1.0 - self.step * k), T[order[0]] - k)
+                sizes = np.unique(sizes[sizes >= T.min()].astype(int))[::-1]
+                if not len(sizes):
+                    return None
+            else:  # nothing holds yet: at the size of what comes nearest, and at larger ones
+                sizes = np.unique((T[order[0]] * (1.0 + self.step * (k - 1))).astype(int))
+            shares = np.ones(len(sizes))
+        # each from the most accurate mesh that is not smaller, or is nearest to it
+        parents = [self._parent(size) for size in sizes]
+        kept = self.pop.get("X")[parents]
+        work = np.maximum((kept & ~self.problem.pinned).sum(axis=1), 1)
+        moves = self._moves(shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        return (kept, sizes, moves) if moves.any() else None
+
+    def _parent(self, size: int) -> int:
+        """Return the individual from which a mesh of so many triangles is annealed."""
+        T, order = self.pop.get("F")[:, -1], _order(self.pop, self.limits)
+        if "triangles" not in self.limits:
+            return int(order[0])
+        larger = np.flatnonzero(size <= T)
+        return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
+
+    def _moves(self, weights: FloatArray, work: float) -> IntArray:
+        """Return the moves of each row of a generation."""
+        budget, seconds = part_of(self.termination, Moves), self._seconds_left()
+        at_once = "triangles" in self.limits
+        most = [SLOWEST * work]
+        if budget is not None:
+            most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))
+        if seconds is not None:
+            a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
+            most.append(_next_share(self.moves_done, seconds / a_move, at_once))
+        if len(most) == 1:
+            most.append(max(PILOT * work, self.moves_done))
+        whole = int(min(most))
+        moves = np.diff(np.round(np.cumsum(weights) / weights.sum() * whole), prepend=0.0)
+        return moves.astype(np.int64)
+
+    def _seconds_left(self, *, whole: bool = False) -> float | None:
+        """Return the seconds left for the search, or for its end too; None: there is no limit."""
+        given = seconds_given(self)
+        if given is None:
+            return None
+        return given * (1.0 if whole else 1.0 - LAST_SHARE) - self._clock()
+
+    def _clock(self) -> float:
+        """Return the seconds since the search began, without those of compiling."""
+        return float(time.time() - self.start_time)
+
+
+def _next_share(done: float, left: float, at_once: bool) -> float:
+    """Return the part of a budget for the next generation: as much as was done, or all that is left."""
+    planned = max(FIRST * left, done)
+    return left if left < 1.5 * planned or (at_once and done) else planned
+
+
+def _values(pop: Any, names: Any) -> dict[str, FloatArray]:
+    F = pop.get("F")
+    return {name: F[:, -1] if name == "triangles" else pop.get(name).astype(float) for name in names}
+
+
+def _missed(pop: Any, limits: dict[str, float]) -> FloatArray:
+    """Return by how much each individual misses the limits."""
+    return np.broadcast_to(shortfall(_values(pop, limits), limits), len(pop)).astype(float)
+
+
+def _order(pop: Any, limits: dict[str, float]) -> IntArray:
+    """Return the individuals, nearest to the wish first: of those that hold it the most accurate, or the smallest."""
+    F, missed = pop.get("F"), _missed(pop, limits)
+    keys = (F[:, -1], F[:, 0]) if "triangles" in limits else (F[:, 0], F[:, -1])
+    return np.lexsort((*keys, missed))
+
+
+def _survivors(pop: Any, limits: dict[str, float], most: int) -> Any:
+    """Return those that no other one beats, at most about so many, and the one nearest to the wish."""
+    F = pop.get("F")
+    best = {row.tobytes() for row in non_dominated(F)}
+    first: dict[bytes, int] = {}
+    for row in np.lexsort((F[:, 0], F[:, -1])):
+        if (F[row] + 0.0).tobytes() in best:
+            first.setdefault((F[row] + 0.0).tobytes(), int(row))
+    rows = list(first.values())
+    if len(rows) > most:
+        rows = [rows[k] for k in np.unique(np.linspace(0, len(rows) - 1, most).astype(int))]
+    answer = int(_order(pop, limits)[0])
+    return pop[np.unique([*rows, answer])]
+
+
+def _rungs(front: NestedFront, n: int, wanted: int | None) -> list[int]:
+    """Return subsets of a nested front spread evenly over the logarithm of their size, with the one that is wanted."""
+    rows = np.flatnonzero(front.triangles > 0)
+    spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1
+    chosen = set(np.clip(np.round(spaced).astype(int), rows[0], rows[-1]).tolist())
+    return sorted(chosen | ({wanted} if wanted is not None else set()))
+
+
+def targeted(
+    *,
+    triangles: int | None = None,
+    max_error: float | None = None,
+    mean_error: float | None = None,
+    rms_error: float | None = None,
+    pop_size: int = 100,
+    **kwargs: Any,
+) -> TargetedSearch:
+    """Return the search for one mesh: answered at once, then improved around its size.
+
+    With ``triangles`` the most accurate mesh of at most so many, without it the smallest mesh within the limits; where
+    several are given all of them hold. The problem's measure must be the one that is wished for
+    (``objectives=("max_error", "triangles")`` for a maximum); with ``triangles`` it is what is lowered.
+    After :class:`~meshsimp_pymoo.Moves` or a termination by time it ends then, else after ten million moves.
+
+    Parameters
+    ----------
+    triangles : int, optional
+        The most triangles.
+    max_error, mean_error, rms_error : float, optional
+        The most that any original vertex deviates by, the mean of these, and their root mean square [model units].
+    pop_size : int
+        The most meshes of the front that are kept beside the one that is wished for.
+    **kwargs
+        Further arguments of pymoo's ``Algorithm``.
+
+    Raises
+    ------
+    TypeError
+        If nothing is wished for.
+    ValueError
+        If a limit makes no sense; when the search begins, if the problem's measure is another one.
+
+    Returns
+    -------
+    TargetedSearch
+        A pymoo algorithm. Its result is a front around the wish, with what is best of the rest.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from meshsimp_pymoo import MeshProblem, Moves
+    >>> result = minimize(MeshProblem("roof:9"), targeted(triangles=4), Moves(2_000), seed=1)
+    >>> result.algorithm.answer.F
+    array([0., 4.])
+    """
+    limits = checked_limits(
+        {"triangles": triangles, "max_error": max_error, "mean_error": mean_error, "rms_error": rms_error}
+    )
+    if pop_size < 2:
+        raise ValueError(f"pop_size = {pop_size} keeps no front; give 2 or more")
+    defaults: dict[str, Any] = {"output": MultiObjectiveOutput(), "termination": Moves(USUAL_BUDGET)}
+    return TargetedSearch(limits, pop_size, **(defaults | kwargs))
