@@ -34,6 +34,7 @@ from meshsimp_pymoo.surface.books import (
     N_EMITTED,
     N_LOOKED_AT,
     N_SITES,
+    N_THIN,
     NONE,
     PLAIN,
     RUN,
@@ -248,8 +249,10 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
         n += 1
     if n == 0 or live.tally[N_EMITTED] == 0 or live.tally[N_EMITTED] + n_shown == n_emitted:
         return unknown
-    if at_outline:
-        change = _at_outline(g, live, v, w, limit, change, n_gone, n_star, n_ears, n_rim, n)
+    gone_change = change
+    # Where all triangles are emitted, at the hull as well, no vertex is bare that lies in one that comes.
+    if at_outline and (g.side > 0 or live.tally[N_BARE] > 0 or live.tally[N_THIN] > 0):
+        change = _at_outline(g, live, v, w, limit, gone_change, n_gone, n_star, n_ears, n_rim, n)
         return change, n_shown - n_emitted
     head = live.head
     following = live.following
@@ -264,7 +267,10 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
                 y = xy[2 * i + 1] - y0
                 best, most = _holder(forms, n, best, x, y)
                 if most < -ROUNDED_AREA:
-                    return unknown
+                    if not at_outline:
+                        return unknown
+                    change = _at_outline(g, live, v, w, limit, gone_change, n_gone, n_star, n_ears, n_rim, n)
+                    return change, n_shown - n_emitted
                 d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
                 change += weighed_cost(g, d, i) if weighed else d
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
