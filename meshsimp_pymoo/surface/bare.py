@@ -38,7 +38,7 @@ from meshsimp_pymoo.surface.evaluate import REACH
 from meshsimp_pymoo.surface.ground import Ground
 
 # From so many homeless vertices on, the segments that may be nearest to them are listed once for all.
-FEW_TOGETHER = 8
+FEW_TOGETHER = 32
 
 
 @inner(inline=True)

@@ -35,8 +35,9 @@ MOST_TOUCHED = 48
     N_POOL,
     N_TOUCHED,
     N_SITES,
+    N_THIN,
     N_LOOKED_AT,
-) = range(12)
+) = range(13)
 # Entries of ``amount``: running sums, and the largest both together have been since they were last added up anew.
 # The last is the largest deviation that the operation tried or done last has met, where costs are weighed.
 COVERED_ERROR, BARE_ERROR, PEAK, LARGEST = range(4)
@@ -161,7 +162,7 @@ def make_live(n_vertices: int) -> Live:
         going=np.empty(8 * MOST_TOUCHED, np.uint32),
         coming=np.empty((8 * MOST_TOUCHED, 3), np.int64),
         saved=np.empty(10 * MOST_TOUCHED, np.uint32),
-        tally=np.zeros(12, np.int64),
+        tally=np.zeros(13, np.int64),
         amount=np.zeros(4, np.float64),
         peaks=NO_PEAKS,
     )
