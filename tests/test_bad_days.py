@@ -212,6 +212,7 @@ def test_ctrl_c_while_the_start_is_thinned_hands_over_the_large_meshes_and_some_
     def interrupted(surface, *, stop, kept=None):
         if kept is not None:
             return real(surface, kept=kept, stop=stop)
+        time.sleep(0.1)  # until the main thread waits
         signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
         while not stop[0]:
             time.sleep(0.001)
