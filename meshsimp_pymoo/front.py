@@ -544,7 +544,8 @@ class Front(Sequence[FrontSolution]):
                 return best if between is None or between.error >= best.error else between
         elif len(fitting):
             return self._smaller(int(fitting[0]), limits)
-        raise Missed(self._how_near(limits), self[int(np.argmin(missed))])
+        near = self._nearest(limits)
+        raise Missed(self._how_near(limits, near), near)
 
     def _smaller(self, row: int, limits: Mapping[str, float]) -> FrontSolution:
         """Return the smallest solution within limits between one that is and the next smaller one, if there are any."""
@@ -563,7 +564,14 @@ class Front(Sequence[FrontSolution]):
                 low = size
         return best
 
-    def _how_near(self, limits: Mapping[str, float]) -> str:
+    def _nearest(self, limits: Mapping[str, float]) -> FrontSolution:
+        """Return the solution that comes nearest to limits: small enough if any is, then with the least errors."""
+        errors = {name: most for name, most in limits.items() if name != "triangles"}
+        missed = [float(shortfall(asdict(q), errors)) for q in self.quality]
+        too_large = [q.triangles > limits.get("triangles", np.inf) for q in self.quality]
+        return self[min(range(len(self)), key=lambda k: (too_large[k], missed[k], k))]
+
+    def _how_near(self, limits: Mapping[str, float], near: FrontSolution) -> str:
         """Say how near the solutions come to limits that none of them meets."""
         if len(limits) == 1:
             ((name, most),) = limits.items()
@@ -572,21 +580,15 @@ class Front(Sequence[FrontSolution]):
                 return f"the least {label} of a solution of {self.name} is {least:.6g}, and {most:g} was asked for"
             return f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
         errors = {name: most for name, most in limits.items() if name != "triangles"}
-        said = " and ".join(f"{MEASURES[name].label} {most:g}" for name, most in errors.items())
+        reached = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
+        said = f"no solution of {self.name} holds all of what is asked for: {reached} at {near.triangles:,} triangles"
+        if "triangles" not in limits:
+            return said
+        asked = " and ".join(f"{MEASURES[name].label} {most:g}" for name, most in errors.items())
         holding = [q.triangles for q in self.quality if shortfall(asdict(q), errors) == 0.0]
-        parts = [f"no solution of {self.name} holds all of what is asked for"]
-        if "triangles" in limits:
-            fitting = [q for q in self.quality if q.triangles <= limits["triangles"]]
-            if fitting:
-                near = min(fitting, key=lambda q: float(shortfall(asdict(q), errors)))
-                values = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
-                parts.append(f"{values} at {near.triangles:,} triangles")
-            parts.append(f"with {said} the smallest found has {min(holding):,}" if holding else f"none has {said}")
-        else:
-            near = min(self.quality, key=lambda q: float(shortfall(asdict(q), errors)))
-            values = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
-            parts.append(f"the nearest has {values} at {near.triangles:,} triangles")
-        return "; ".join(parts)
+        return f"{said}; " + (
+            f"with {asked} the smallest found has {min(holding):,}" if holding else f"none has {asked}"
+        )
 
     def knee(self) -> FrontSolution:
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""

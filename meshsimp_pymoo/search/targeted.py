@@ -162,7 +162,7 @@ class TargetedSearch(Algorithm):
         )
         self.is_annealed = self.moves_done > 0
         if "triangles" not in self.limits and not self.within:
-            children = np.array(on_threads(self._squeezed, children))
+            children = np.array(on_threads(self._settled, children))
         self.seconds += self._clock() - begun
         self.moves_done += int(made.sum())
         self.attempted = sizes.tolist()
@@ -176,8 +176,10 @@ class TargetedSearch(Algorithm):
         if not len(infills):
             return
         if "triangles" not in self.limits:
-            n_held = int((_missed(infills, self.limits) == 0.0).sum())
-            factor = 0.5 if n_held == 0 else 2.0 if n_held == len(self.attempted) else 1.0
+            better = infills.get("F")[:, -1] < self.answer.F[-1]
+            if self.missed == 0.0:
+                better &= _missed(infills, self.limits) == 0.0
+            factor = 2.0 if better.sum() == len(self.attempted) else 1.0 if better.any() else 0.5
             self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
         self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.pop_size)
 
@@ -215,9 +217,7 @@ class TargetedSearch(Algorithm):
     def _direct(self) -> list[NestedFront]:
         """Return nested fronts that reach beyond the wish, if anything does, and down to the smallest mesh."""
         surface: Surface = self.problem.surface
-        measure = self.problem.objectives[0]
-        by = "point" if measure == "max_error" else "triangle"
-        fronts = []
+        by, fronts = self._choice, []
         stop = np.zeros(1, np.bool_)
 
         def back(inserted: NestedFront) -> None:
@@ -268,13 +268,19 @@ class TargetedSearch(Algorithm):
         own = OWN if measure == "error" else OWN / max(bound, 1e-300)
         return surface.bounded(bound, own=own)
 
-    def _squeezed(self, kept: BoolArray) -> BoolArray:
-        """Return a subset that holds with as many vertices less as still hold; another one as it is."""
-        limit = self._limit()
+    def _settled(self, kept: BoolArray) -> BoolArray:
+        """Return a subset with vertices inserted until it holds, and thinned while it does."""
+        limit, surface = self._limit(), self.problem.surface
         assert limit is not None
-        front = thinning(self.problem.surface, kept=kept, most_error=limit)
+        grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
+        front = thinning(surface, kept=grown.kept(len(grown) - 1), most_error=limit)
         wanted = self._wanted(front)
         return kept if wanted is None else front.kept(wanted)
+
+    @property
+    def _choice(self) -> str:
+        """Which vertex is inserted for the measure that is searched."""
+        return "point" if self.problem.objectives[0] == "max_error" else "triangle"
 
     def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
         """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
