@@ -4,9 +4,9 @@ The first population is an answer already: vertices are inserted greedily by the
 beyond the wish, and thinned back to it and further down [1]_. Then meshes are annealed around that answer:
 
 * for a number of triangles at exactly that size, and a few at neighbouring ones;
-* for an error at several smaller sizes, of which the smallest that holds is where the next generation begins. None
-  holds: the next sizes are closer. All hold: farther apart. For a maximum what is annealed away is what exceeds it,
-  the sum of max(0, d_p - E), until nothing does.
+* for an error at several smaller sizes; then vertices are inserted into each mesh until the wish holds, and it is
+  thinned while it does. The smallest is where the next generation begins, with sizes around the share that was best.
+  For a maximum what is annealed away is what exceeds it, the sum of max(0, d_p - E).
 
 Every generation makes as many moves as all before it, and the last one what is left of the budget: one slow
 annealing gives better meshes than several quick ones, and the quick ones find out at which size it pays.
@@ -100,7 +100,6 @@ class TargetedSearch(Algorithm):
         self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
-        self.attempted: list[int] = []
 
     @property
     def moves(self) -> int:
@@ -162,10 +161,11 @@ class TargetedSearch(Algorithm):
         )
         self.is_annealed = self.moves_done > 0
         if "triangles" not in self.limits and not self.within:
-            children = np.array(on_threads(self._settled, children))
+            settled = on_threads(self._settled, children)
+            children = np.array([kept for kept, _ in settled])
+            self._adapt(np.array([triangles for _, triangles in settled]))
         self.seconds += self._clock() - begun
         self.moves_done += int(made.sum())
-        self.attempted = sizes.tolist()
         offspring = self.eliminate_duplicates.do(Population.new(X=children), self.pop)
         self.idle = 0 if len(offspring) else self.idle + 1
         if self.idle >= IDLE:
@@ -175,12 +175,9 @@ class TargetedSearch(Algorithm):
     def _advance(self, infills: Any = None, **kwargs: Any) -> None:
         if not len(infills):
             return
-        if "triangles" not in self.limits:
-            better = infills.get("F")[:, -1] < self.answer.F[-1]
-            if self.missed == 0.0:
-                better &= _missed(infills, self.limits) == 0.0
-            factor = 2.0 if better.sum() == len(self.attempted) else 1.0 if better.any() else 0.5
-            self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
+        if "triangles" not in self.limits and self.within:
+            F, missed = infills.get("F"), _missed(infills, self.limits)
+            self._adapt(np.where(missed == 0.0, F[:, -1], np.inf))
         self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.pop_size)
 
     def _set_optimum(self) -> None:
@@ -268,14 +265,23 @@ class TargetedSearch(Algorithm):
         own = OWN if measure == "error" else OWN / max(bound, 1e-300)
         return surface.bounded(bound, own=own)
 
-    def _settled(self, kept: BoolArray) -> BoolArray:
-        """Return a subset with vertices inserted until it holds, and thinned while it does."""
+    def _adapt(self, triangles: FloatArray) -> None:
+        """Take steps by which the attempt that was best would be the second; smaller ones where none was better.
+
+        ``triangles`` are those of the meshes that came of the attempts, from the largest size down.
+        """
+        best = int(np.argmin(triangles))
+        factor = (best + 1) / 2.0 if triangles[best] < self.answer.F[-1] else 0.5
+        self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
+
+    def _settled(self, kept: BoolArray) -> tuple[BoolArray, float]:
+        """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles."""
         limit, surface = self._limit(), self.problem.surface
         assert limit is not None
         grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
         front = thinning(surface, kept=grown.kept(len(grown) - 1), most_error=limit)
         wanted = self._wanted(front)
-        return kept if wanted is None else front.kept(wanted)
+        return (kept, np.inf) if wanted is None else (front.kept(wanted), float(front.triangles[wanted]))
 
     @property
     def _choice(self) -> str:
