@@ -35,6 +35,7 @@ from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.memetic import measurable
 from meshsimp_pymoo.search.operators import PackedDuplicates
 from meshsimp_pymoo.search.requirements import surface_of
+from meshsimp_pymoo.search.starting import Start
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.surface.surface import Surface, movable_ground
 from meshsimp_pymoo.workers import on_threads
@@ -69,9 +70,6 @@ AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
 OWN = 0.05
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
 IDLE = 12
-
-# Bytes of a mesh's error that come from adding up in another order.
-ROUNDING = 1e-9
 
 
 class TargetedSearch(Algorithm):
@@ -131,9 +129,9 @@ class TargetedSearch(Algorithm):
         super()._setup(problem, **kwargs)
 
     def _initialize_infill(self) -> Population:
-        fronts = self._direct()
+        starts = self._direct()
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
-        X = [front.kept(k) for front in fronts for k in _rungs(front, -(-n // len(fronts)), self._wanted(front))]
+        X = [start.kept(k) for start in starts for k in _rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
@@ -211,26 +209,29 @@ class TargetedSearch(Algorithm):
 
     # ------------------------------------------------------------------------------------------------- the first answer
 
-    def _direct(self) -> list[NestedFront]:
-        """Return nested fronts that reach beyond the wish, if anything does, and down to the smallest mesh."""
+    def _direct(self) -> list[Start]:
+        """Return nested meshes that reach beyond the wish, if anything does, and down to the smallest one."""
         surface: Surface = self.problem.surface
-        by, fronts = self._choice, []
+        by, limit = self._choice, self._limit()
         stop = np.zeros(1, np.bool_)
 
-        def back(inserted: NestedFront) -> None:
-            fronts.append(thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
+        def back(inserted: NestedFront, **how: Any) -> NestedFront:
+            return thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop, **how)
 
+        starts = []
         with stopping(stop, seconds_given(self)):
+            # thinned around the wish only: where few vertices are left each removal looks at much of the model
             if "triangles" in self.limits:
-                # about two triangles for each vertex
-                most = int(MORE_TRIANGLES * self.limits["triangles"] / 2) + 8
-                back(greedy_insertion(surface, choose=by, most=most, stop=stop))
-            elif (limit := self._limit()) is not None:
-                back(greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop))
+                size = self.limits["triangles"]
+                inserted = greedy_insertion(surface, choose=by, most=int(MORE_TRIANGLES * size / 2) + 8, stop=stop)
+                starts.append(Start.of(inserted, back(inserted, least=int(size / MORE_TRIANGLES))))
+            elif limit is not None:
+                inserted = greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop)
+                starts.append(Start.of(inserted, back(inserted, most_error=limit / LESS_ERROR)))
             if "max_error" in self.within:
-                bounded = surface.bounded(self.within["max_error"])
-                back(greedy_insertion(bounded, choose="point", least_error=0.0, stop=stop))
-        return fronts
+                inserted = greedy_insertion(surface.bounded(self.within["max_error"]), choose="point", stop=stop)
+                starts.append(Start.of(back(inserted, least=int(inserted.triangles[-1] / MORE_TRIANGLES))))
+        return starts
 
     def _limit(self) -> float | None:
         """Return the limit of the measure that is searched, as nested fronts count it; None if there is none."""
@@ -240,7 +241,7 @@ class TargetedSearch(Algorithm):
                 return limit * self.problem.surface.total_weight if measure == "error" else limit
         return None
 
-    def _wanted(self, front: NestedFront) -> int | None:
+    def _wanted(self, front: NestedFront | Start) -> int | None:
         """Return the subset of a nested front that the wish is for, as far as the front knows."""
         if "triangles" in self.limits:
             fitting = np.flatnonzero((front.triangles > 0) & (front.triangles <= self.limits["triangles"]))
@@ -389,7 +390,7 @@ def _survivors(pop: Any, limits: dict[str, float], most: int) -> Any:
     return pop[np.unique([*rows, answer])]
 
 
-def _rungs(front: NestedFront, n: int, wanted: int | None) -> list[int]:
+def _rungs(front: NestedFront | Start, n: int, wanted: int | None) -> list[int]:
     """Return subsets of a nested front spread evenly over the logarithm of their size, with the one that is wanted."""
     rows = np.flatnonzero(front.triangles > 0)
     spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1
