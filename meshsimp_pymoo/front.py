@@ -326,6 +326,8 @@ class Front(Sequence[FrontSolution]):
             usable, quality = usable[holding], [quality[k] for k in holding]
         table = table[usable]
         F = _objectives(quality, problem.objectives)
+        if others:  # where none holds all, by how much the others are missed counts beside
+            F = np.column_stack([F, [float(shortfall(asdict(q), others)) for q in quality]])
         best = {row.tobytes() for row in non_dominated(F)}
         first: dict[bytes, int] = {}
         for row in np.lexsort((table[:, ERROR], table[:, TRIANGLES])):
@@ -514,8 +516,8 @@ class Front(Sequence[FrontSolution]):
         ----------
         triangles : int
             The most accurate solution of at most that many triangles, as far as the other limits let it. Tiles leave
-            a mesh of nearly any size, so that
-            the solution of one of their fronts may be a new one: then its ``front`` is this one with it.
+            a mesh of nearly any size, so that the solution of one of their fronts may be a new one: then its ``front``
+            is this one with it.
         LIMITS : float
             Without ``triangles`` the smallest solution with at most that much of a measure; see
             :class:`~meshsimp_pymoo.surface.measures.Quality`.
@@ -975,8 +977,8 @@ def simplify_to(
     if time is not None and not time > 0:
         raise ValueError(f"time={time} is no time to search for; give seconds")
     if not isinstance(problem, MeshProblem):
-        problem = MeshProblem(problem, rules=Rules(measure=measure_for(limits)))
-    elif problem.n_obj == 2:
+        problem = MeshProblem(problem)
+    if problem.n_obj == 2:
         measure = problem.objectives[0]
         # nobody need have asked for what is minimised unless told otherwise
         wanted = measure_for(limits, None if measure == Rules().measure else measure)

@@ -67,7 +67,7 @@ BETWEEN = 24
 FRESH: dict[str, Any] = {"temperature": 0.3, "cooling": 0.03}
 AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
 # Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
-OWN = 0.05
+OWN = 0.01
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
 IDLE = 12
 
@@ -135,7 +135,7 @@ class TargetedSearch(Algorithm):
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
-        self.pop = _survivors(infills, self.limits, self.pop_size)
+        self.pop = _survivors(infills, self.limits, self.within, self.pop_size)
 
     def _infill(self) -> Population:
         left = self._seconds_left()
@@ -176,10 +176,10 @@ class TargetedSearch(Algorithm):
         if "triangles" not in self.limits and self.within:
             F, missed = infills.get("F"), _missed(infills, self.limits)
             self._adapt(np.where(missed == 0.0, F[:, -1], np.inf))
-        self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.pop_size)
+        self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.within, self.pop_size)
 
     def _set_optimum(self) -> None:
-        self.opt = _survivors(self.pop, self.limits, len(self.pop))
+        self.opt = _survivors(self.pop, self.limits, self.within, len(self.pop))
 
     def next(self) -> None:
         """Do a generation; the time in which functions are compiled is not its own."""
@@ -205,7 +205,7 @@ class TargetedSearch(Algorithm):
         if len(extra):
             self.evaluator.eval(self.problem, extra, algorithm=self)
             merged = Population.merge(self.opt, extra)
-            self.opt = _survivors(merged, self.limits, len(merged))
+            self.opt = _survivors(merged, self.limits, self.within, len(merged))
 
     # ------------------------------------------------------------------------------------------------- the first answer
 
@@ -262,6 +262,8 @@ class TargetedSearch(Algorithm):
         if "max_error" not in self.within:
             return surface
         bound = self.within["max_error"]
+        if "triangles" in self.limits and self.missed > 0.0:
+            return surface.bounded(bound)  # a mesh of this size that holds is to be found first
         # what the sum counts is a share of a deviation, whatever its power
         own = OWN if measure == "error" else OWN / max(bound, 1e-300)
         return surface.bounded(bound, own=own)
@@ -319,7 +321,7 @@ class TargetedSearch(Algorithm):
     def _parent(self, size: int) -> int:
         """Return the individual from which a mesh of so many triangles is annealed."""
         T, order = self.pop.get("F")[:, -1], _order(self.pop, self.limits)
-        if "triangles" not in self.limits:
+        if "triangles" not in self.limits or size == T[order[0]]:
             return int(order[0])
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
@@ -369,20 +371,28 @@ def _missed(pop: Any, limits: dict[str, float]) -> FloatArray:
 
 
 def _order(pop: Any, limits: dict[str, float]) -> IntArray:
-    """Return the individuals, nearest to the wish first: of those that hold it the most accurate, or the smallest."""
-    F, missed = pop.get("F"), _missed(pop, limits)
-    keys = (F[:, -1], F[:, 0]) if "triangles" in limits else (F[:, 0], F[:, -1])
-    return np.lexsort((*keys, missed))
+    """Return the individuals, nearest to the wish first: of those that hold it the most accurate, or the smallest.
 
-
-def _survivors(pop: Any, limits: dict[str, float], most: int) -> Any:
-    """Return those that no other one beats, at most about so many, and the one nearest to the wish."""
+    One that has too many triangles comes after all that have not.
+    """
     F = pop.get("F")
+    if "triangles" not in limits:
+        return np.lexsort((F[:, 0], F[:, -1], _missed(pop, limits)))
+    errors = {name: limit for name, limit in limits.items() if name != "triangles"}
+    return np.lexsort((F[:, -1], F[:, 0], _missed(pop, errors), F[:, -1] > limits["triangles"]))
+
+
+def _survivors(pop: Any, limits: dict[str, float], within: dict[str, float], most: int) -> Any:
+    """Return those that no other one beats, at most about so many, and the one nearest to the wish.
+
+    Limits beside the objectives count as one more: by how much they are missed.
+    """
+    F = np.column_stack([pop.get("F"), _missed(pop, within)]) + 0.0
     best = {row.tobytes() for row in non_dominated(F)}
     first: dict[bytes, int] = {}
-    for row in np.lexsort((F[:, 0], F[:, -1])):
-        if (F[row] + 0.0).tobytes() in best:
-            first.setdefault((F[row] + 0.0).tobytes(), int(row))
+    for row in np.lexsort((F[:, 0], F[:, 1])):
+        if F[row].tobytes() in best:
+            first.setdefault(F[row].tobytes(), int(row))
     rows = list(first.values())
     if len(rows) > most:
         rows = [rows[k] for k in np.unique(np.linspace(0, len(rows) - 1, most).astype(int))]
