@@ -19,6 +19,7 @@ References
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ from meshsimp_pymoo.search.operators import PackedDuplicates
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
-from meshsimp_pymoo.surface.surface import Surface, movable_ground
+from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
 # How far beyond the wish vertices are inserted before they are thinned back: times the triangles, or the error.
@@ -68,6 +69,8 @@ FRESH: dict[str, Any] = {"temperature": 0.3, "cooling": 0.03}
 AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
 # Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
 OWN = 0.01
+# By how much it is lowered where the sum decides among what holds it, as a share.
+SLACK = 1e-3
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
 IDLE = 12
 
@@ -144,9 +147,9 @@ class TargetedSearch(Algorithm):
             self.termination.force_termination = True
             return Population.create()
         parents, sizes, moves = plan
-        begun = self._clock()
+        begun, goal = self._clock(), self._goal
         made = moves.copy()
-        again = "triangles" in self.limits and self.is_annealed
+        again = "triangles" in goal and self.is_annealed
         children = relocate_all(
             self._cost(),
             parents,
@@ -157,8 +160,8 @@ class TargetedSearch(Algorithm):
             made=made,
             **(AGAIN if again else FRESH),
         )
-        self.is_annealed = self.moves_done > 0
-        if "triangles" not in self.limits and not self.within:
+        self.is_annealed = "triangles" in goal and self.moves_done > 0
+        if "triangles" not in goal:
             settled = on_threads(self._settled, children)
             children = np.array([kept for kept, _ in settled])
             self._adapt(np.array([triangles for _, triangles in settled]))
@@ -173,9 +176,6 @@ class TargetedSearch(Algorithm):
     def _advance(self, infills: Any = None, **kwargs: Any) -> None:
         if not len(infills):
             return
-        if "triangles" not in self.limits and self.within:
-            F, missed = infills.get("F"), _missed(infills, self.limits)
-            self._adapt(np.where(missed == 0.0, F[:, -1], np.inf))
         self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.within, self.pop_size)
 
     def _set_optimum(self) -> None:
@@ -229,8 +229,12 @@ class TargetedSearch(Algorithm):
                 inserted = greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop)
                 starts.append(Start.of(inserted, back(inserted, most_error=limit / LESS_ERROR)))
             if "max_error" in self.within:
-                inserted = greedy_insertion(surface.bounded(self.within["max_error"]), choose="point", stop=stop)
-                starts.append(Start.of(back(inserted, least=int(inserted.triangles[-1] / MORE_TRIANGLES))))
+                tight, least = self._tight()
+                inserted = greedy_insertion(tight, choose="point", least_error=least, stop=stop)
+                front = thinning(tight, kept=inserted.kept(len(inserted) - 1), most_error=least, stop=stop)
+                # in the measure that is searched, and somewhat below, where the maximum does not hold
+                back_to = int(front.triangles[0] / MORE_TRIANGLES)
+                starts.append(Start.of(thinning(surface, kept=front.kept(0), least=back_to, stop=stop)))
         return starts
 
     def _limit(self) -> float | None:
@@ -254,19 +258,36 @@ class TargetedSearch(Algorithm):
 
     # ------------------------------------------------------------------------------------------------- its improvement
 
+    @property
+    def _goal(self) -> dict[str, float]:
+        """What the next generation is for: the smallest mesh that holds a maximum, until one is as small as wished."""
+        if "max_error" not in self.within or self.missed == 0.0:
+            return self.limits
+        return {name: limit for name, limit in self.limits.items() if name != "triangles"}
+
     def _cost(self) -> Any:
         """Return the surface whose cost is annealed."""
-        surface, measure = self.problem.surface, self.problem.objectives[0]
+        surface, measure, bound = self.problem.surface, self.problem.objectives[0], self.within.get("max_error")
         if measure == "max_error" and "triangles" not in self.limits:
             return surface.bounded(self.limits["max_error"])
-        if "max_error" not in self.within:
+        if bound is None:
             return surface
-        bound = self.within["max_error"]
-        if "triangles" in self.limits and self.missed > 0.0:
-            return surface.bounded(bound)  # a mesh of this size that holds is to be found first
-        # what the sum counts is a share of a deviation, whatever its power
-        own = OWN if measure == "error" else OWN / max(bound, 1e-300)
-        return surface.bounded(bound, own=own)
+        if "triangles" not in self._goal and self._limit() is None:
+            return surface.bounded(bound)
+        return surface.bounded(bound, own=OWN / self._scale(bound))
+
+    def _scale(self, bound: float) -> float:
+        """Return what makes the cost of a vertex by the measure a deviation again, where it is at most ``bound``."""
+        return 1.0 if self.problem.objectives[0] == "error" else max(bound, 1e-300)
+
+    def _tight(self) -> tuple[Any, float]:
+        """Return a surface by which first what exceeds the maximum counts, then the sum; and the error that holds.
+
+        All sums together count no more than the maximum is lowered by.
+        """
+        surface, bound = self.problem.surface, self.within["max_error"]
+        tight = surface.bounded(bound * (1.0 - SLACK), own=SLACK / (surface.total_weight * self._scale(bound)))
+        return tight, float(error_of(tight, SLACK * bound))
 
     def _adapt(self, triangles: FloatArray) -> None:
         """Take steps by which the attempt that was best would be the second; smaller ones where none was better.
@@ -274,17 +295,41 @@ class TargetedSearch(Algorithm):
         ``triangles`` are those of the meshes that came of the attempts, from the largest size down.
         """
         best = int(np.argmin(triangles))
-        factor = (best + 1) / 2.0 if triangles[best] < self.answer.F[-1] else 0.5
+        now = self.pop.get("F")[_order(self.pop, self._goal)[0], -1]
+        factor = (best + 1) / 2.0 if triangles[best] < now else 0.5
         self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
 
     def _settled(self, kept: BoolArray) -> tuple[BoolArray, float]:
         """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles."""
         limit, surface = self._limit(), self.problem.surface
-        assert limit is not None
-        grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
-        front = thinning(surface, kept=grown.kept(len(grown) - 1), most_error=limit)
-        wanted = self._wanted(front)
+        by, most = surface, limit
+        if "max_error" in self.within:
+            by, most = self._tight()
+            grown = greedy_insertion(by, kept, choose="point", least_error=most)
+            kept = grown.kept(len(grown) - 1)
+        if limit is not None:
+            grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
+            kept = grown.kept(len(grown) - 1)
+        assert most is not None
+        front = thinning(by, kept=kept, most_error=most)
+        wanted = self._smallest(front) if self.within else self._wanted(front)
         return (kept, np.inf) if wanted is None else (front.kept(wanted), float(front.triangles[wanted]))
+
+    def _smallest(self, front: NestedFront) -> int | None:
+        """Return the smallest subset that holds all limits but the triangles, by measuring some of them."""
+
+        def holds(k: int) -> bool:
+            quality = self.problem.as_quality(self.problem.surface.evaluate(front.kept(k)[None])[0])
+            return bool(shortfall(asdict(quality), errors) == 0.0)
+
+        errors = {name: limit for name, limit in self.limits.items() if name != "triangles"}
+        low, high = 0, len(front) - 1
+        if not holds(high):
+            return None
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if holds(middle) else (middle + 1, high)
+        return high
 
     @property
     def _choice(self) -> str:
@@ -293,17 +338,17 @@ class TargetedSearch(Algorithm):
 
     def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
         """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
-        T = self.pop.get("F")[:, -1]
-        if "triangles" in self.limits:
+        T, goal = self.pop.get("F")[:, -1], self._goal
+        if "triangles" in goal:
             wanted = np.unique(np.maximum(np.array(SIZES) * self.limits["triangles"], T.min()).astype(int))
             sizes = np.array([max(int(share * self.limits["triangles"]), int(T.min())) for share in SIZES])
             shares = np.array(SIZE_MOVES)
             if len(wanted) == 1:
                 sizes, shares = sizes[:2], shares[:2]
         else:
-            order = _order(self.pop, self.limits)
+            order = _order(self.pop, goal)
             k = np.arange(1, ATTEMPTS + 1)
-            if _missed(self.pop, self.limits)[order[0]] == 0.0:
+            if _missed(self.pop, goal)[order[0]] == 0.0:
                 sizes = np.minimum(T[order[0]] * (1.0 - self.step * k), T[order[0]] - k)
                 sizes = np.unique(sizes[sizes >= T.min()].astype(int))[::-1]
                 if not len(sizes):
@@ -320,8 +365,8 @@ class TargetedSearch(Algorithm):
 
     def _parent(self, size: int) -> int:
         """Return the individual from which a mesh of so many triangles is annealed."""
-        T, order = self.pop.get("F")[:, -1], _order(self.pop, self.limits)
-        if "triangles" not in self.limits or size == T[order[0]]:
+        T, order = self.pop.get("F")[:, -1], _order(self.pop, self._goal)
+        if "triangles" not in self._goal or "max_error" in self.within:
             return int(order[0])
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
@@ -329,7 +374,7 @@ class TargetedSearch(Algorithm):
     def _moves(self, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
         budget, seconds = part_of(self.termination, Moves), self._seconds_left()
-        at_once = "triangles" in self.limits
+        at_once = "triangles" in self.limits and not self.within
         most = [SLOWEST * work]
         if budget is not None:
             most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))

@@ -90,9 +90,9 @@ def test_of_several_wishes_all_hold(limits):
 
 
 def test_with_a_number_of_triangles_the_sum_is_lowered_within_the_maximum():
-    loose, tight = (simplify_to(MODEL, triangles=500, max_error=limit, moves=QUICK) for limit in (90.0, 50.0))
+    loose, tight = (simplify_to(MODEL, triangles=480, max_error=limit, moves=QUICK) for limit in (90.0, 30.0))
     assert loose.max_error <= 90.0
-    assert tight.max_error <= 50.0 < loose.max_error
+    assert tight.max_error <= 30.0 < loose.max_error
     assert loose.error < tight.error
 
 
