@@ -443,7 +443,7 @@ def baseline_front(surface: Surface, method: str) -> NestedFront:
     front: Any = BASELINES[method].front
     try:
         return front(surface)
-    except ValueError as reason:  # the measure is no sum, say
+    except ValueError as reason:  # a surface without moves, say
         raise ToolUnavailable(str(reason)) from reason
 
 

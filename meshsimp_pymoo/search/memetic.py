@@ -424,10 +424,10 @@ def memetic(
 ) -> MemeticSearch:
     """Return the seeded memetic algorithm: thinning, then annealing down a ladder of sizes.
 
-    It lowers the problem's measure of the error, which must be a sum over the vertices ("error" or "rms_error"). By
-    default it ends after one sweep of the ladder, some tens of seconds for thousands of vertices; with
-    :class:`~meshsimp_pymoo.Moves` or a termination by time it takes as many moves as fit. Evaluations do not measure
-    it: each child of a generation is one, however many moves it took.
+    It lowers the problem's measure of the error: a sum, or the maximum, which thinning goes by and annealing lowers
+    through the sum of the eighth powers. By default it ends after one sweep of the ladder, some tens of seconds for
+    thousands of vertices; with :class:`~meshsimp_pymoo.Moves` or a termination by time it takes as many moves as fit.
+    Evaluations do not measure it: each child of a generation is one, however many moves it took.
 
     Parameters
     ----------

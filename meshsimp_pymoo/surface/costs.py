@@ -28,7 +28,7 @@ def weighed_cost(g: Ground, d: float, i: int) -> float:
     return g.own * d + beyond
 
 
-@inner(inline=True)
+@inner
 def noted_cost(g: Ground, live: Live, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, and note d if it is the largest so far (``LARGEST``)."""
     if not g.weighed:

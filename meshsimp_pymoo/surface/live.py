@@ -187,6 +187,7 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
     pool = live.pool
     following = live.following
     amount = live.amount
+    weighed = g.weighed
     any_thin = False
     for q in range(count[N_REGION]):
         t = region[q]
@@ -268,7 +269,9 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         following[i] = head[r]
         head[r] = i
         if kind[r] & EMITTED:
-            d = noted_cost(g, live, deviation_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i), i)
+            d = deviation_in(xy, z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+            if weighed:
+                d = noted_cost(g, live, d, i)
             subtotal[r] += d
             amount[COVERED_ERROR] += d
         else:

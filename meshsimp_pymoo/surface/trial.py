@@ -254,6 +254,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
         return change, n_shown - n_emitted
     head = live.head
     following = live.following
+    weighed = g.weighed
     best = 0
     for k in range(-1, n_gone):
         # The vertices of the triangles that go, and v itself.
@@ -266,7 +267,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
                 if most < -ROUNDED_AREA:
                     return unknown
                 d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
-                change += noted_cost(g, live, d, i)
+                change += noted_cost(g, live, d, i) if weighed else d
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
         if change > limit:
             return np.inf, 0
