@@ -378,6 +378,7 @@ class Front(Sequence[FrontSolution]):
             "generations": getattr(algorithm, "n_iter", 1) - 1,
             "evaluations": getattr(getattr(algorithm, "evaluator", None), "n_eval", None),
             "moves": moves_of(algorithm),
+            "wish": wish,
             "seconds": getattr(result, "exec_time", None),
         }
         front.run |= {key: value for key, value in facts.items() if value is not None}
