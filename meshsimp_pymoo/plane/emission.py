@@ -48,6 +48,7 @@ def emit(
     min_height: float,
     model_xy: np.ndarray,
     side: int,
+    columns: int,
     state: np.ndarray,
     start: np.ndarray,
     items: np.ndarray,
@@ -84,7 +85,7 @@ def emit(
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
             x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
             y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-            if not inside(model_xy, side, state, start, items, faces, x3, y3):
+            if not inside(model_xy, side, columns, state, start, items, faces, x3, y3):
                 emitted[t // RECORD] = 0
                 continue
         n_triangles += 1

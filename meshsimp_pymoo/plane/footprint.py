@@ -14,6 +14,8 @@ import numpy as np
 from meshsimp_pymoo.compiling.functions import entry, inner
 
 OUTSIDE, INSIDE, MIXED = 0, 1, 2
+# Cells there are at most.
+MOST_CELLS = 2**26
 
 
 class Footprint(NamedTuple):
@@ -23,9 +25,11 @@ class Footprint(NamedTuple):
     ----------
     side : int
         Cells along one side of the unit square; 0 where the projection is convex, so that all of the hull is inside.
-    state : (side * side,) uint8 array
+    columns : int
+        Cells in a row: rows and columns end beyond the mesh.
+    state : (rows * columns,) uint8 array
         OUTSIDE, INSIDE or MIXED.
-    start : (side * side + 1,) int32 array
+    start : (rows * columns + 1,) int32 array
         Where the faces of a MIXED cell begin in ``items``.
     items : (M,) int32 array
         Faces that touch the MIXED cells.
@@ -34,6 +38,7 @@ class Footprint(NamedTuple):
     """
 
     side: int
+    columns: int
     state: np.ndarray
     start: np.ndarray
     items: np.ndarray
@@ -76,6 +81,7 @@ def _in_some_face(
 def inside(
     xy: np.ndarray,
     side: int,
+    columns: int,
     state: np.ndarray,
     start: np.ndarray,
     items: np.ndarray,
@@ -85,7 +91,7 @@ def inside(
 ) -> bool:
     """Whether a third of (x3, y3), in the unit square, lies in the closed projection; ``xy``: the model's."""
     scale = side / 3.0
-    cell = min(int(y3 * scale), side - 1) * side + min(int(x3 * scale), side - 1)
+    cell = int(y3 * scale) * columns + int(x3 * scale)
     kind = state[cell]
     if kind == MIXED:
         return _in_some_face(xy, start, items, faces, cell, x3, y3)
@@ -93,22 +99,24 @@ def inside(
 
 
 @inner
-def _cell_span(low: float, high: float, side: int) -> tuple[int, int]:
-    """First and last cell that [low, high] touches, with a margin for rounding."""
+def _cell_span(low: float, high: float, side: int, count: int) -> tuple[int, int]:
+    """First and last cell of ``count`` that [low, high] touches, with a margin for rounding."""
     margin = 1e-12
-    first = min(max(int((low - margin) * side), 0), side - 1)
-    last = min(max(int((high + margin) * side), 0), side - 1)
+    first = min(max(int((low - margin) * side), 0), count - 1)
+    last = min(max(int((high + margin) * side), 0), count - 1)
     return first, last
 
 
 @inner
-def _row_span(ax: float, ay: float, bx: float, by: float, row: int, side: int) -> tuple[int, int]:
+def _row_span(
+    ax: float, ay: float, bx: float, by: float, row: int, side: int, rows: int, columns: int
+) -> tuple[int, int]:
     """Columns that the segment a-b touches in a row of cells; the outermost rows reach to infinity."""
     low = min(ax, bx)
     high = max(ax, bx)
     if ay != by:
         y0 = row / side if row > 0 else -np.inf
-        y1 = (row + 1) / side if row < side - 1 else np.inf
+        y1 = (row + 1) / side if row < rows - 1 else np.inf
         t0 = (y0 - ay) / (by - ay)
         t1 = (y1 - ay) / (by - ay)
         if t0 > t1:
@@ -119,20 +127,21 @@ def _row_span(ax: float, ay: float, bx: float, by: float, row: int, side: int) -
         x1 = ax + t1 * (bx - ax)
         low = min(x0, x1)
         high = max(x0, x1)
-    return _cell_span(low, high, side)
+    return _cell_span(low, high, side, columns)
 
 
 @entry
-def _mark_outline(xy: np.ndarray, edges: np.ndarray, side: int, state: np.ndarray) -> None:
+def _mark_outline(xy: np.ndarray, edges: np.ndarray, side: int, columns: int, state: np.ndarray) -> None:
+    rows = len(state) // columns
     for k in range(len(edges)):
         a = edges[k, 0]
         b = edges[k, 1]
         ax, ay, bx, by = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1]
-        first_row, last_row = _cell_span(min(ay, by), max(ay, by), side)
+        first_row, last_row = _cell_span(min(ay, by), max(ay, by), side, rows)
         for row in range(first_row, last_row + 1):
-            first, last = _row_span(ax, ay, bx, by, row, side)
+            first, last = _row_span(ax, ay, bx, by, row, side, rows, columns)
             for column in range(first, last + 1):
-                state[row * side + column] = MIXED
+                state[row * columns + column] = MIXED
 
 
 @inner
@@ -153,26 +162,34 @@ def _apart(xy: np.ndarray, a: int, b: int, c: int, x: float, y: float, size: flo
 
 @entry
 def _face_cells(
-    xy: np.ndarray, faces: np.ndarray, side: int, state: np.ndarray, start: np.ndarray, items: np.ndarray, fill: bool
+    xy: np.ndarray,
+    faces: np.ndarray,
+    side: int,
+    columns: int,
+    state: np.ndarray,
+    start: np.ndarray,
+    items: np.ndarray,
+    fill: bool,
 ) -> None:
     """Count (then list) the faces of each MIXED cell; set the cells whose centre a face holds INSIDE."""
+    rows = len(state) // columns
     for f in range(len(faces)):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         low_y = min(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
         high_y = max(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-        first_row, last_row = _cell_span(low_y, high_y, side)
+        first_row, last_row = _cell_span(low_y, high_y, side, rows)
         for row in range(first_row, last_row + 1):
             # The columns between the sides that pass through this row.
-            first, last = side, -1
+            first, last = columns, -1
             for u, v in ((a, b), (b, c), (c, a)):
                 uy, vy = xy[2 * u + 1], xy[2 * v + 1]
-                one, other = _cell_span(min(uy, vy), max(uy, vy), side)
+                one, other = _cell_span(min(uy, vy), max(uy, vy), side, rows)
                 if one <= row <= other:
-                    one, other = _row_span(xy[2 * u], uy, xy[2 * v], vy, row, side)
+                    one, other = _row_span(xy[2 * u], uy, xy[2 * v], vy, row, side, rows, columns)
                     first = min(first, one)
                     last = max(last, other)
             for column in range(first, last + 1):
-                cell = row * side + column
+                cell = row * columns + column
                 if state[cell] == MIXED:
                     if _apart(xy, a, b, c, column / side, row / side, 1.0 / side):
                         continue
@@ -204,18 +221,21 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     none = np.zeros(0, np.int32)
     faces = np.ascontiguousarray(faces, np.int32)
     if convex:
-        return Footprint(0, np.zeros(0, np.uint8), none, none, faces)
+        return Footprint(0, 0, np.zeros(0, np.uint8), none, none, faces)
     flat = np.ascontiguousarray(xy, float).ravel()
-    # Two cells a face: fine enough that few cells are mixed and each of those has few faces, and still small beside the
-    # model.
-    side = int(np.clip(np.sqrt(2 * len(faces)), 8, 8192))
-    state = np.zeros(side * side, np.uint8)
-    _mark_outline(flat, np.ascontiguousarray(outline, np.int64), side, state)
-    counts = np.zeros(side * side + 1, np.int64)
-    _face_cells(flat, faces, side, state, counts, none, False)
-    start = np.zeros(side * side + 1, np.int64)
+    # Two cells a face in the box of the mesh: fine enough that few cells are mixed and each of those has few faces, and
+    # still small beside the model.
+    width, height = np.maximum(xy.max(axis=0), 1.0 / MOST_CELLS)
+    n_cells = min(2.0 * len(faces), MOST_CELLS)
+    side = max(int(min(np.sqrt(n_cells / (width * height)), n_cells / max(width, height))), 8)
+    columns, rows = (int(length * side) + 2 for length in (width, height))  # no rounding leads beyond the last one
+    state = np.zeros(rows * columns, np.uint8)
+    _mark_outline(flat, np.ascontiguousarray(outline, np.int64), side, columns, state)
+    counts = np.zeros(len(state) + 1, np.int64)
+    _face_cells(flat, faces, side, columns, state, counts, none, False)
+    start = np.zeros(len(state) + 1, np.int64)
     np.cumsum(counts[:-1], out=start[1:])
     items = np.zeros(start[-1], np.int32)
     cursor = start.copy()
-    _face_cells(flat, faces, side, state, cursor, items, True)
-    return Footprint(side, state, start.astype(np.int32), items, faces)
+    _face_cells(flat, faces, side, columns, state, cursor, items, True)
+    return Footprint(side, columns, state, start.astype(np.int32), items, faces)

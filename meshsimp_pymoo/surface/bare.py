@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
-from meshsimp_pymoo.plane.nearest import between_boxes, to_box
+from meshsimp_pymoo.plane.nearest import ROUNDING, between_boxes, to_box
 from meshsimp_pymoo.plane.triangulation import TRIANGLE
 from meshsimp_pymoo.surface.books import (
     BARE_ERROR,
@@ -36,6 +36,9 @@ from meshsimp_pymoo.surface.books import (
 from meshsimp_pymoo.surface.costs import bare_deviation, enter_peak, noted_cost
 from meshsimp_pymoo.surface.evaluate import REACH
 from meshsimp_pymoo.surface.ground import Ground
+
+# From so many homeless vertices on, the segments that may be nearest to them are listed once for all.
+FEW_TOGETHER = 32
 
 
 @inner(inline=True)
@@ -202,24 +205,32 @@ def nearest(g: Ground, live: Live, x: float, y: float, guess: int, gap: float) -
     kind = live.kind
     spans = live.spans
     nodes = live.nodes
+    distances = live.distances
     n_leaves = len(live.first_segment)
     best = guess
     nodes[0] = 1
+    distances[0] = to_box(spans, 1, x, y)
     depth = 1
     while depth > 0:
         depth -= 1
-        node = nodes[depth]
-        if to_box(spans, node, x, y) > gap or spans[node, 0] > spans[node, 1]:
+        if distances[depth] > gap:
             continue
-        if node < n_leaves:
-            # The nearer child on top.
+        node = nodes[depth]
+        # Down to a leaf by the nearer child; the other one waits, if it is near enough.
+        while 0 < node < n_leaves:
             near = 2 * node
             far = near + 1
-            if to_box(spans, far, x, y) < to_box(spans, near, x, y):
+            to_near = to_box(spans, near, x, y)
+            to_far = to_box(spans, far, x, y)
+            if to_far < to_near:
                 near, far = far, near
-            nodes[depth] = far
-            nodes[depth + 1] = near
-            depth += 2
+                to_near, to_far = to_far, to_near
+            if to_far <= gap and to_far < np.inf:
+                nodes[depth] = far
+                distances[depth] = to_far
+                depth += 1
+            node = near if to_near <= gap and to_near < np.inf else 0
+        if node == 0:
             continue
         h = np.int64(live.first_segment[node - n_leaves])
         while h != NONE:
@@ -230,6 +241,90 @@ def nearest(g: Ground, live: Live, x: float, y: float, guess: int, gap: float) -
                     best = h
                     gap = d
             h = np.int64(live.segment_after[slot(h)])
+    return best, gap
+
+
+@inner
+def list_candidates(g: Ground, live: Live, who: np.ndarray, n: int, known: float) -> int:
+    """List the segments that can be nearest to one of n vertices; return their number, -1 if it is not worth it.
+
+    That is where the vertices are few, or the segments many. ``known`` is the squared distance to some other segment
+    from the middle of the vertices' box, see `middle_of`.
+    """
+    if n < FEW_TOGETHER:
+        return -1
+    xy = g.xy
+    kind = live.kind
+    spans = live.spans
+    nodes = live.nodes
+    n_leaves = len(live.first_segment)
+    x, y, radius = middle_of(xy, who, n)
+    gap = known
+    if g.nearest:
+        _, gap = nearest(g, live, x, y, NONE, known)
+    # A vertex is at most that far from its nearest segment, and the middle at most once more from it.
+    bound = min(np.sqrt(gap) + 2.0 * radius, np.sqrt(farthest(g)) + radius) + 4.0 * ROUNDING
+    bound *= bound * (1.0 + 1e-9)
+    n_found = 0
+    nodes[0] = 1
+    depth = 1
+    while depth > 0:
+        depth -= 1
+        node = nodes[depth]
+        d = to_box(spans, node, x, y)
+        if d > bound or d == np.inf:
+            continue
+        if node < n_leaves:
+            nodes[depth] = 2 * node
+            nodes[depth + 1] = 2 * node + 1
+            depth += 2
+            continue
+        h = np.int64(live.first_segment[node - n_leaves])
+        while h != NONE:
+            if is_segment(kind, h):
+                a, b, _ = corners_of(live.mesh, h)
+                if squared_gap(xy, a, b, x, y) <= bound:
+                    if n_found == len(live.candidates):
+                        return -1
+                    live.candidates[n_found] = h
+                    n_found += 1
+            h = np.int64(live.segment_after[slot(h)])
+    return n_found
+
+
+@inner
+def middle_of(xy: np.ndarray, who: np.ndarray, n: int) -> tuple[float, float, float]:
+    """Return the middle of the box of n vertices, and how far from it they are at most."""
+    low_x = low_y = np.inf
+    high_x = high_y = -np.inf
+    for k in range(n):
+        i = np.int64(who[k])
+        low_x = min(low_x, xy[2 * i])
+        high_x = max(high_x, xy[2 * i])
+        low_y = min(low_y, xy[2 * i + 1])
+        high_y = max(high_y, xy[2 * i + 1])
+    x = 0.5 * (low_x + high_x)
+    y = 0.5 * (low_y + high_y)
+    return x, y, np.sqrt((high_x - x) * (high_x - x) + (high_y - y) * (high_y - y))
+
+
+@inner
+def nearest_of(
+    g: Ground, live: Live, n_candidates: int, x: float, y: float, guess: int, gap: float
+) -> tuple[int, float]:
+    """As :func:`nearest`, among the candidates listed, if there are any."""
+    if n_candidates < 0:
+        return nearest(g, live, x, y, guess, gap)
+    xy = g.xy
+    mesh = live.mesh
+    best = guess
+    for k in range(n_candidates):
+        h = np.int64(live.candidates[k])
+        a, b, c = corners_of(mesh, h)
+        d = squared_gap(xy, a, b, x, y)
+        if d < gap or (d == gap and h != best and (best == NONE or rank(a, b, c) < rank_of(mesh, best))):
+            best = h
+            gap = d
     return best, gap
 
 
@@ -251,7 +346,7 @@ def may_reach(g: Ground, live: Live, node: int, a: int, b: int) -> bool:
     x = 0.5 * (boxes[node, 0] + boxes[node, 1])
     y = 0.5 * (boxes[node, 2] + boxes[node, 3])
     half = 0.5 * ((boxes[node, 1] - boxes[node, 0]) * abs(ey) + (boxes[node, 3] - boxes[node, 2]) * abs(ex))
-    away = max((abs((x - ax) * ey - (y - ay) * ex) - half) / length - 1e-15, 0.0)
+    away = max((abs((x - ax) * ey - (y - ay) * ex) - half) / length - ROUNDING, 0.0)
     return away * away * (1.0 - 1e-9) <= reach
 
 
@@ -412,6 +507,7 @@ def settle_bare(g: Ground, live: Live) -> None:
             if is_segment(live.kind, h):
                 _draw_near(g, live, h)
         h = np.int64(NONE)
+        n_candidates = list_candidates(g, live, live.homeless, count[N_HOMELESS], np.inf)
         for k in range(count[N_HOMELESS]):
             i = np.int64(live.homeless[k])
             if live.bare[i] == HOMELESS:
@@ -426,7 +522,7 @@ def settle_bare(g: Ground, live: Live) -> None:
                         gap = d
                     else:
                         h = np.int64(NONE)
-                h, gap = nearest(g, live, x, y, h, gap)
+                h, gap = nearest_of(g, live, n_candidates, x, y, h, gap)
                 _house(g, live, i, h, gap)
         _refresh(g, live)
     count[N_ADDED] = 0

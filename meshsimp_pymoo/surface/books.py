@@ -35,8 +35,9 @@ MOST_TOUCHED = 48
     N_POOL,
     N_TOUCHED,
     N_SITES,
+    N_THIN,
     N_LOOKED_AT,
-) = range(12)
+) = range(13)
 # Entries of ``amount``: running sums, and the largest both together have been since they were last added up anew.
 # The last is the largest deviation that the operation tried or done last has met, where costs are weighed.
 COVERED_ERROR, BARE_ERROR, PEAK, LARGEST = range(4)
@@ -93,6 +94,8 @@ class Live(NamedTuple):
     star_side: np.ndarray  # (N,)
     star_inserted: np.ndarray  # (N,)
     nodes: np.ndarray  # (64,) of the tree, to be looked at
+    distances: np.ndarray  # (64,) how far they are
+    candidates: np.ndarray  # (24,) segments that can be nearest to vertices that lie together
     gone: np.ndarray  # (2 MOST_TOUCHED,) triangles that a tentative change takes away
     forms: np.ndarray  # (2 MOST_TOUCHED, 13) sides and planes of those that would come, see trial
     shown: np.ndarray  # (2 MOST_TOUCHED,) whether each of them would be emitted
@@ -150,6 +153,8 @@ def make_live(n_vertices: int) -> Live:
         star_side=np.empty(n, np.int32),
         star_inserted=np.empty(n, np.uint8),
         nodes=np.empty(64, np.int64),
+        distances=np.empty(64, np.float64),
+        candidates=np.empty(24, np.uint32),
         gone=np.empty(2 * MOST_TOUCHED, np.int64),
         forms=np.empty((2 * MOST_TOUCHED, 13), np.float64),
         shown=np.empty(2 * MOST_TOUCHED, np.uint8),
@@ -157,7 +162,7 @@ def make_live(n_vertices: int) -> Live:
         going=np.empty(8 * MOST_TOUCHED, np.uint32),
         coming=np.empty((8 * MOST_TOUCHED, 3), np.int64),
         saved=np.empty(10 * MOST_TOUCHED, np.uint32),
-        tally=np.zeros(12, np.int64),
+        tally=np.zeros(13, np.int64),
         amount=np.zeros(4, np.float64),
         peaks=NO_PEAKS,
     )

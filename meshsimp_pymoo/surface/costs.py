@@ -104,7 +104,7 @@ def is_inside(g: Ground, a: int, b: int, c: int) -> bool:
     xy = g.xy
     x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
     y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-    return inside(xy, g.side, g.state, g.start, g.items, g.faces, x3, y3)
+    return inside(xy, g.side, g.columns, g.state, g.start, g.items, g.faces, x3, y3)
 
 
 @inner(inline=True)

@@ -198,6 +198,7 @@ def _evaluate_one(
         ground.min_height,
         xy,
         ground.side,
+        ground.columns,
         ground.state,
         ground.start,
         ground.items,

@@ -27,6 +27,7 @@ class Ground(NamedTuple):
     exact_area: float  # up to where double precision is exact, see plane.predicates
     exact_lift: float
     side: int  # the footprint, see plane.footprint; 0: all of the hull
+    columns: int
     state: np.ndarray
     start: np.ndarray
     items: np.ndarray
@@ -60,6 +61,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         exact_area=area,
         exact_lift=lift,
         side=footprint.side if rules.footprint == "model" else 0,
+        columns=footprint.columns,
         state=footprint.state,
         start=footprint.start,
         items=footprint.items,

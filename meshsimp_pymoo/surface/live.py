@@ -36,6 +36,7 @@ from meshsimp_pymoo.surface.books import (
     N_POOL,
     N_REGION,
     N_SITES,
+    N_THIN,
     N_TOUCHED,
     PEAK,
     PEELED,
@@ -87,7 +88,9 @@ def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
                 forget_bare(live, i)
             i = following[i]
         head[r] = -1
-        if bits >= SEGMENT:
+        if bits != PLAIN and bits != 0:
+            if bits & THIN:
+                count[N_THIN] -= 1
             for k in range(3):
                 set_segment(live, t + k, False)
         kind[r] = 0
@@ -116,6 +119,7 @@ def _turn_thin(live: Live, t: int) -> None:
         live.region[count[N_REGION]] = t
         _collect(live, live.region[count[N_REGION] :], 1)
         count[N_REGION] += 1
+        count[N_THIN] += 1
     # The outline's segments have gone with the collecting.
     bits = ((bits & (SEGMENT - 1)) | IN_REGION) ^ PEELED
     live.kind[t >> 3] = (bits | EMITTED) if (bits & (INSIDE | PEELED)) == INSIDE else (bits & ~EMITTED)
@@ -188,7 +192,6 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
     following = live.following
     amount = live.amount
     weighed = g.weighed
-    any_thin = False
     for q in range(count[N_REGION]):
         t = region[q]
         a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
@@ -198,12 +201,15 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
         bits = PLAIN if is_inside(g, a, b, c) else 0
         if is_thin(g, a, b, c):
             bits |= THIN
+            count[N_THIN] += 1
         kind[t >> 3] = bits
-    for q in range(count[N_REGION]):
-        t = region[q]
-        any_thin = any_thin or (kind[t >> 3] & THIN) != 0
-        for k in range(3):
-            any_thin = any_thin or (kind[mesh[t + 4 + k] >> 3] & THIN) != 0
+    any_thin = False
+    if count[N_THIN] > 0:
+        for q in range(count[N_REGION]):
+            t = region[q]
+            any_thin = any_thin or (kind[t >> 3] & THIN) != 0
+            for k in range(3):
+                any_thin = any_thin or (kind[mesh[t + 4 + k] >> 3] & THIN) != 0
     if any_thin:
         n_first = count[N_REGION]
         for q in range(n_first):

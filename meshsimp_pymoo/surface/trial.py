@@ -16,15 +16,16 @@ from meshsimp_pymoo.surface.bare import (
     corners_of,
     farthest,
     is_segment,
+    list_candidates,
     may_reach,
-    nearest,
+    middle_of,
+    nearest_of,
     rank,
     rank_of,
     slot,
     squared_gap,
 )
 from meshsimp_pymoo.surface.books import (
-    BARE_ERROR,
     COVERED,
     EMITTED,
     HOUSED,
@@ -34,6 +35,7 @@ from meshsimp_pymoo.surface.books import (
     N_EMITTED,
     N_LOOKED_AT,
     N_SITES,
+    N_THIN,
     NONE,
     PLAIN,
     RUN,
@@ -249,8 +251,10 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
         n += 1
     if n == 0 or live.tally[N_EMITTED] == 0 or live.tally[N_EMITTED] + n_shown == n_emitted:
         return unknown
-    if at_outline:
-        change = _at_outline(g, live, v, w, limit, change, n_gone, n_star, n_ears, n_rim, n)
+    gone_change = change
+    # Where all triangles are emitted, at the hull as well, no vertex is bare that lies in one that comes.
+    if at_outline and (g.side > 0 or live.tally[N_BARE] > 0 or live.tally[N_THIN] > 0):
+        change = _at_outline(g, live, v, w, limit, gone_change, n_gone, n_star, n_ears, n_rim, n)
         return change, n_shown - n_emitted
     head = live.head
     following = live.following
@@ -265,7 +269,10 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
                 y = xy[2 * i + 1] - y0
                 best, most = _holder(forms, n, best, x, y)
                 if most < -ROUNDED_AREA:
-                    return unknown
+                    if not at_outline:
+                        return unknown
+                    change = _at_outline(g, live, v, w, limit, gone_change, n_gone, n_star, n_ears, n_rim, n)
+                    return change, n_shown - n_emitted
                 d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
                 change += noted_cost(g, live, d, i) if weighed else d
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
@@ -396,7 +403,7 @@ def _nearest_coming(g: Ground, live: Live, n_coming: int, i: int, own: int, gap:
 
 
 @inner
-def _cost_if_homeless(g: Ground, live: Live, n_coming: int, i: int, guess: int) -> tuple[float, int]:
+def _cost_if_homeless(g: Ground, live: Live, n_coming: int, n_candidates: int, i: int, guess: int) -> tuple[float, int]:
     """Return the cost of bare vertex i by the nearest of the segments that stay or come, and the nearest that stays.
 
     ``guess`` is one that stays, or NONE.
@@ -413,7 +420,7 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, i: int, guess: int) 
             h = guess
             gap = d
     bound = gap
-    h, gap = nearest(g, live, x, y, h, gap)
+    h, gap = nearest_of(g, live, n_candidates, x, y, h, gap)
     if h != NONE and near >= 0 and gap == bound:
         # As near as one that comes, unless it is nearer.
         d = squared_gap(g.xy, coming[near, 0], coming[near, 1], x, y)
@@ -429,14 +436,40 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, i: int, guess: int) 
     return 0.0, h
 
 
+@inner(inline=True)
+def _count_out(live: Live, i: int, change: float, n_tried: int) -> tuple[float, int]:
+    """Take what vertex i costs, if it is bare, from the change, once; return both as they are then."""
+    if live.bare[i] != HOUSED:
+        return change, n_tried
+    live.bare[i] = TRIED
+    live.pool[n_tried] = i
+    return change - live.cost[i], n_tried + 1
+
+
 @inner
-def _drawn_near(g: Ground, live: Live, n_coming: int, n_tried: int) -> tuple[float, int]:
-    """Return the change of cost of the housed vertices that would be nearer to a segment that comes; mark them."""
+def _housed(g: Ground, live: Live, n_homeless: int, n_coming: int, change: float, limit: float) -> float:
+    """Add what the homeless vertices would cost to the change, as long as it is no more than the limit; return it."""
+    known = np.inf
+    x, y, _ = middle_of(g.xy, live.homeless, n_homeless)
+    for k in range(n_coming):
+        known = min(known, squared_gap(g.xy, live.coming[k, 0], live.coming[k, 1], x, y))
+    n_candidates = list_candidates(g, live, live.homeless, n_homeless, known)
+    guess = np.int64(NONE)
+    for k in range(n_homeless):
+        d, guess = _cost_if_homeless(g, live, n_coming, n_candidates, live.homeless[k], guess)
+        change += d
+        if change > limit:
+            break
+    return change
+
+
+@inner
+def _drawn_near(g: Ground, live: Live, n_coming: int, change: float, n_tried: int) -> tuple[float, int]:
+    """Add to the change what housed vertices would cost that are nearer to a segment that comes; count them out."""
     xy = g.xy
     nodes = live.nodes
     coming = live.coming
     n_leaves = len(live.first_segment)
-    change = 0.0
     for k in range(n_coming):
         nodes[0] = 1
         depth = 1
@@ -458,10 +491,8 @@ def _drawn_near(g: Ground, live: Live, n_coming: int, n_tried: int) -> tuple[flo
                         best, gap = _nearest_coming(g, live, n_coming, i, live.bare_segment[i], gap)
                         if best >= 0:
                             a, b, c = coming[best, 0], coming[best, 1], coming[best, 2]
-                            change += noted_cost(g, live, bare_deviation(g, a, b, c, i, gap), i) - live.cost[i]
-                            live.bare[i] = TRIED
-                            live.pool[n_tried] = i
-                            n_tried += 1
+                            change += noted_cost(g, live, bare_deviation(g, a, b, c, i, gap), i)
+                            change, n_tried = _count_out(live, i, change, n_tried)
     return change, n_tried
 
 
@@ -489,7 +520,6 @@ def _at_outline(
     kind = live.kind
     bare = live.bare
     used = live.used
-    cost = live.cost
     homeless = live.homeless
     seen = live.pool
     shown = live.shown
@@ -528,11 +558,8 @@ def _at_outline(
             if used[i] == 0 and bare[i] == COVERED:
                 homeless[n_homeless] = i
                 n_homeless += 1
-            elif used[i] > 0 and bare[i] == HOUSED:
-                change -= cost[i]
-                bare[i] = TRIED
-                seen[n_tried] = i
-                n_tried += 1
+            elif used[i] > 0:
+                change, n_tried = _count_out(live, i, change, n_tried)
     for k in range(n_gone):
         t = live.gone[k]
         if kind[t >> 3] & EMITTED:
@@ -544,19 +571,35 @@ def _at_outline(
             used[a] -= 1
             used[b] -= 1
             used[c] -= 1
+    # First all that may lower the cost: bare vertices that are placed anew, lose their segment or find a nearer one.
+    n_going = 0
+    n_coming = 0
+    if live.tally[N_BARE] > 0:
+        if v >= 0:
+            change, n_tried = _count_out(live, v, change, n_tried)
+        for k in range(n_gone):
+            if not kind[live.gone[k] >> 3] & EMITTED:
+                i = np.int64(live.head[live.gone[k] >> 3])
+                while i >= 0:
+                    change, n_tried = _count_out(live, i, change, n_tried)
+                    i = np.int64(live.following[i])
+        n_going, n_coming = _come_and_go(live, n_gone, n_comers, n_rim, w)
+        for k in range(n_going):
+            i = np.int64(live.first_bare[slot(np.int64(live.going[k]))])
+            while i >= 0:
+                if bare[i] == HOUSED:
+                    change, n_tried = _count_out(live, i, change, n_tried)
+                    homeless[n_homeless] = i
+                    n_homeless += 1
+                i = np.int64(live.bare_after[i])
+        change, n_tried = _drawn_near(g, live, n_coming, change, n_tried)
     # The vertices of the triangles that go, and v itself.
     x0 = xy[2 * max(v, w)]
     y0 = xy[2 * max(v, w) + 1]
-    most_gained = live.amount[BARE_ERROR]
     best = 0
     for k in range(-1, n_gone):
         i = np.int64(v) if k < 0 else np.int64(live.head[live.gone[k] >> 3])
         while i >= 0:
-            if bare[i] == HOUSED:
-                change -= cost[i]
-                bare[i] = TRIED
-                seen[n_tried] = i
-                n_tried += 1
             if i != w:
                 x = xy[2 * i] - x0
                 y = xy[2 * i + 1] - y0
@@ -568,31 +611,14 @@ def _at_outline(
                     homeless[n_homeless] = i
                     n_homeless += 1
             i = np.int64(live.following[i]) if k >= 0 else np.int64(-1)
-        if change - most_gained > limit:
+        if change > limit:
             break
-    if change - most_gained > limit:
-        change = np.inf
-    elif n_homeless > 0 or n_tried < live.tally[N_BARE]:
-        n_going, n_coming = _come_and_go(live, n_gone, n_comers, n_rim, w)
-        for k in range(n_going):
-            i = np.int64(live.first_bare[slot(np.int64(live.going[k]))])
-            while i >= 0:
-                if bare[i] == HOUSED:
-                    change -= cost[i]
-                    bare[i] = TRIED
-                    seen[n_tried] = i
-                    n_tried += 1
-                    homeless[n_homeless] = i
-                    n_homeless += 1
-                i = np.int64(live.bare_after[i])
-        guess = np.int64(NONE)
-        for k in range(n_homeless):
-            d, guess = _cost_if_homeless(g, live, n_coming, homeless[k], guess)
-            change += d
-        d, n_tried = _drawn_near(g, live, n_coming, n_tried)
-        change += d
-        for k in range(n_going):
-            kind[live.going[k] >> 3] |= SEGMENT << (live.going[k] & 3)
+    if n_homeless > 0 and change <= limit:
+        if live.tally[N_BARE] == 0:
+            n_going, n_coming = _come_and_go(live, n_gone, n_comers, n_rim, w)
+        change = _housed(g, live, n_homeless, n_coming, change, limit)
+    for k in range(n_going):
+        kind[live.going[k] >> 3] |= SEGMENT << (live.going[k] & 3)
     for k in range(n_tried):
         bare[seen[k]] = HOUSED
-    return change
+    return change if change <= limit else np.inf
