@@ -327,6 +327,8 @@ class Front(Sequence[FrontSolution]):
             usable, quality = usable[holding], [quality[k] for k in holding]
         table = table[usable]
         F = _objectives(quality, problem.objectives)
+        if others:  # where none holds all, by how much the others are missed counts beside
+            F = np.column_stack([F, [float(shortfall(asdict(q), others)) for q in quality]])
         best = {row.tobytes() for row in non_dominated(F)}
         first: dict[bytes, int] = {}
         for row in np.lexsort((table[:, ERROR], table[:, TRIANGLES])):
@@ -377,6 +379,7 @@ class Front(Sequence[FrontSolution]):
             "generations": getattr(algorithm, "n_iter", 1) - 1,
             "evaluations": getattr(getattr(algorithm, "evaluator", None), "n_eval", None),
             "moves": moves_of(algorithm),
+            "wish": wish,
             "seconds": getattr(result, "exec_time", None),
         }
         front.run |= {key: value for key, value in facts.items() if value is not None}
@@ -515,8 +518,8 @@ class Front(Sequence[FrontSolution]):
         ----------
         triangles : int
             The most accurate solution of at most that many triangles, as far as the other limits let it. Tiles leave
-            a mesh of nearly any size, so that
-            the solution of one of their fronts may be a new one: then its ``front`` is this one with it.
+            a mesh of nearly any size, so that the solution of one of their fronts may be a new one: then its ``front``
+            is this one with it.
         LIMITS : float
             Without ``triangles`` the smallest solution with at most that much of a measure; see
             :class:`~meshsimp_pymoo.surface.measures.Quality`.
@@ -545,7 +548,8 @@ class Front(Sequence[FrontSolution]):
                 return best if between is None or between.error >= best.error else between
         elif len(fitting):
             return self._smaller(int(fitting[0]), limits)
-        raise Missed(self._how_near(limits), self[int(np.argmin(missed))])
+        near = self._nearest(limits)
+        raise Missed(self._how_near(limits, near), near)
 
     def _smaller(self, row: int, limits: Mapping[str, float]) -> FrontSolution:
         """Return the smallest solution within limits between one that is and the next smaller one, if there are any."""
@@ -564,7 +568,14 @@ class Front(Sequence[FrontSolution]):
                 low = size
         return best
 
-    def _how_near(self, limits: Mapping[str, float]) -> str:
+    def _nearest(self, limits: Mapping[str, float]) -> FrontSolution:
+        """Return the solution that comes nearest to limits: small enough if any is, then with the least errors."""
+        errors = {name: most for name, most in limits.items() if name != "triangles"}
+        missed = [float(shortfall(asdict(q), errors)) for q in self.quality]
+        too_large = [q.triangles > limits.get("triangles", np.inf) for q in self.quality]
+        return self[min(range(len(self)), key=lambda k: (too_large[k], missed[k], k))]
+
+    def _how_near(self, limits: Mapping[str, float], near: FrontSolution) -> str:
         """Say how near the solutions come to limits that none of them meets."""
         if len(limits) == 1:
             ((name, most),) = limits.items()
@@ -573,21 +584,15 @@ class Front(Sequence[FrontSolution]):
                 return f"the least {label} of a solution of {self.name} is {least:.6g}, and {most:g} was asked for"
             return f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
         errors = {name: most for name, most in limits.items() if name != "triangles"}
-        said = " and ".join(f"{MEASURES[name].label} {most:g}" for name, most in errors.items())
+        reached = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
+        said = f"no solution of {self.name} holds all of what is asked for: {reached} at {near.triangles:,} triangles"
+        if "triangles" not in limits:
+            return said
+        asked = " and ".join(f"{MEASURES[name].label} {most:g}" for name, most in errors.items())
         holding = [q.triangles for q in self.quality if shortfall(asdict(q), errors) == 0.0]
-        parts = [f"no solution of {self.name} holds all of what is asked for"]
-        if "triangles" in limits:
-            fitting = [q for q in self.quality if q.triangles <= limits["triangles"]]
-            if fitting:
-                near = min(fitting, key=lambda q: float(shortfall(asdict(q), errors)))
-                values = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
-                parts.append(f"{values} at {near.triangles:,} triangles")
-            parts.append(f"with {said} the smallest found has {min(holding):,}" if holding else f"none has {said}")
-        else:
-            near = min(self.quality, key=lambda q: float(shortfall(asdict(q), errors)))
-            values = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
-            parts.append(f"the nearest has {values} at {near.triangles:,} triangles")
-        return "; ".join(parts)
+        return f"{said}; " + (
+            f"with {asked} the smallest found has {min(holding):,}" if holding else f"none has {asked}"
+        )
 
     def knee(self) -> FrontSolution:
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
@@ -974,8 +979,8 @@ def simplify_to(
     if time is not None and not time > 0:
         raise ValueError(f"time={time} is no time to search for; give seconds")
     if not isinstance(problem, MeshProblem):
-        problem = MeshProblem(problem, rules=Rules(measure=measure_for(limits)))
-    elif problem.n_obj == 2:
+        problem = MeshProblem(problem)
+    if problem.n_obj == 2:
         measure = problem.objectives[0]
         # nobody need have asked for what is minimised unless told otherwise
         wanted = measure_for(limits, None if measure == Rules().measure else measure)

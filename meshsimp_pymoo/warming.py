@@ -95,7 +95,9 @@ def _thinning() -> None:
 
     surface = _square()
     n, rows, numbers = surface.n_vertices, np.zeros(9, np.int32), np.zeros(9)
-    _compile_for(thin, *_records(surface), n, surface.pinned, 0, np.inf, np.inf, np.zeros(1, np.bool_), rows, numbers, rows)
+    _compile_for(
+        thin, *_records(surface), n, surface.pinned, 0, np.inf, np.inf, np.zeros(1, np.bool_), rows, numbers, rows
+    )
 
 
 def _moves() -> None:

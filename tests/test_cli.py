@@ -277,6 +277,62 @@ def test_both_ends_of_the_front_are_there_without_a_search_for_them(tmp_path):
     assert stored.F[-1, 0] == 0
 
 
+@pytest.mark.parametrize("limits", [{"triangles": 90}, {"max_error": 25.0}, {"mean_error": 9.0, "rms_error": 12.0}])
+def test_a_wish_is_answered_first_and_then_searched(tmp_path, capsys, limits):
+    options = [str(part) for name, most in limits.items() for part in (f"--{name.replace('_', '-')}", most)]
+    command = ("simplify", "jacksboro:20", "-o", tmp_path / "out", *options, "--meshes", 2, "--moves", 3_000)
+    assert run(*command) == 0
+    out, err = capsys.readouterr()
+    first = re.search(r"first answer: ([\d,]+) triangles, m", err.replace("RMS", "m"))
+    front = Front.load(tmp_path / "out")
+    chosen = front[front.run["chosen"]]
+    assert chosen.triangles <= int(first[1].replace(",", ""))
+    assert all(getattr(chosen, name) <= most for name, most in limits.items())
+    assert front.run["wish"] == limits
+    assert (front.run["settings"]["algorithm"], front.run["moves"]) == ("targeted", 3_000)
+    searched = f"{next(iter(limits.values())):g}"
+    assert re.search(rf"^searched: around .* {searched}", out, re.MULTILINE)
+    assert "What was searched is the mesh with a" in (tmp_path / "out" / "report.html").read_text()
+    assert out.count("chosen: ") == 1
+
+
+def test_a_wish_that_even_all_vertices_miss_is_said_before_and_how_near_it_came(tmp_path, capsys):
+    roof = load("roof:5")
+    points = np.vstack([roof.points, [-1, 1, 3]])
+    write_mesh(tmp_path / "twin.ply", points, np.vstack([roof.faces, [0, 1, 25]]))
+    command = ("simplify", tmp_path / "twin.ply", "-o", tmp_path / "out", "--max-error", "0.5", "--moves", 200)
+    assert run(*command) == 1
+    said = capsys.readouterr().err
+    assert re.search(r"even all 26 vertices together have max error \d.*; looking for what comes nearest", said)
+    assert re.search(r"no chosen mesh: the least max error of a solution of .*, and 0\.5 was asked for", said)
+
+
+def test_two_wishes_that_do_not_hold_at_once_say_what_each_takes(tmp_path, capsys):
+    options = ("--triangles", 60, "--max-error", 20, "--moves", 2_000, "--meshes", "none", "--no-page")
+    assert run("simplify", "jacksboro:20", "-o", tmp_path / "out", *options) == 1
+    said = (
+        r"holds all of what .*: max error \d\S* at \d+ triangles; with max error 20 the smallest found has \d+; search"
+    )
+    assert re.search(said, capsys.readouterr().err)
+    assert not (tmp_path / "out" / "chosen.ply").exists()
+
+
+def test_other_heights_do_not_raise_what_is_wished_for(tmp_path, capsys):
+    options = ("--max-error", 25, "--moves", 2_000, "--meshes", 4, "--refit", "--no-page")
+    assert run("simplify", "jacksboro:20", "-o", tmp_path / "out", *options) == 0
+    stored = read_front(tmp_path / "out")
+    model = load("jacksboro:20")
+    fitted = list(enumerate(stored.refitted_meshes))
+    raised = re.search(r"(\d) of (\d) meshes are not refitted: .* raise their max error", capsys.readouterr().err)
+    assert int(raised[2]) - int(raised[1]) == sum(bool(name) for _, name in fitted)
+    problem = MeshProblem(model)
+    for row, name in fitted:
+        if name:
+            mesh = trimesh.load(tmp_path / "out" / name, process=False)
+            found = problem.surface.score(mesh.vertices, mesh.faces).quality
+            assert found.max_error <= stored.quality["max_error"][row] * (1 + 1e-6)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -1116,8 +1172,8 @@ def test_refitted_meshes_stand_beside_the_others_and_the_referee_agrees(tmp_path
         (["--measure", "l2"], "--measure: invalid choice: 'l2' (choose from l1, rms, max); did you mean l1?"),
         (
             ["--max-error", "1", "--measure", "rms"],
-            "--max-error does not go with --measure rms: a wish for an error lowers that error; leave --measure out, or "
-            "take the mesh out of a front that was searched by it (meshsimp pick)",
+            "--max-error does not go with --measure rms: a wish for an error lowers that error; leave --measure out, "
+            "or take the mesh out of a front that was searched by it (meshsimp pick)",
         ),
         (["--weights", "sharpness"], "no per-vertex attribute 'sharpness' to weigh by; it has: none"),
     ],

@@ -55,7 +55,7 @@ class Wish:
     @property
     def options(self) -> str:
         """The limits as the command line names them."""
-        return listed([option(name) for name in self.limits], "and")
+        return listed([option(name) for name in self.limits], "and") if self.limits else ""
 
     def of(self, front: Any) -> tuple[Any | None, str]:
         """Return the solution of a front that is wanted, if one is, and why there is none, if so."""

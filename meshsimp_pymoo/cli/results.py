@@ -31,6 +31,7 @@ from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.search.checkpoint import difference
+from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import known_units, reference_system
@@ -157,6 +158,8 @@ def _tell(front: Front, output: Output) -> None:
         f"front: {len(front)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
         f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} ({', '.join(effort)})"
     )
+    if run.get("wish"):
+        tell(f"searched: around {in_words(run['wish'])}; the rest of the front is what came along")
     if chosen is not None:
         path = _chosen_path(output)
         tell(f"chosen: {path} (solution {chosen}): {described(front.quality[chosen], unit)}")

@@ -408,6 +408,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
             "generations": found.generations,
             "evaluations": found.evaluations,
             **({} if found.moves is None else {"moves": found.moves}),
+            **({"wish": request.wish.limits} if request.is_targeted else {}),
             "begun": keeper.begun,
             "seconds": round(found.seconds, 3),
             **{name: round(seconds, 3) for name, seconds in keeper.before.items()},
@@ -422,7 +423,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
                 meshes=output.meshes,
                 mesh_format=output.format,
                 chosen=chosen,
-                refit=fitted or output.refit,
+                refit=False if fitted is None else fitted,
                 pictures=False,
                 run=run,
                 until=found.until,
@@ -437,7 +438,11 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
 
 
 def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown: Stages) -> dict[int, Refitted]:
-    """Return the best heights of the meshes to be written, as many as the time allows, the chosen one first."""
+    """Return the best heights of the meshes to be written, as many as the time allows, the chosen one first.
+
+    A mesh of which they raise an error that is wished for keeps its own.
+    """
+    wished = [name for name in request.wish.limits if MEASURES[name].unit]
     front, limit = found.front, request.search.time
     rows = even_selection(len(front), request.output.meshes)
     order = [rows[k] for k in spread(len(rows))]
@@ -449,20 +454,38 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
     elif limit is not None:
         until = begun_at + limit - found.seconds
     fitted: dict[int, Refitted] = {}
-    longest = 0.0
+    done, longest = 0, 0.0
     with shown.stage("refitting", "refitting") as show:
         for row in order:
             begun = time.perf_counter()
-            if until is not None and fitted and begun + longest > until:
+            if until is not None and done and begun + longest > until:
                 break
-            if is_interrupted() and fitted:
+            if is_interrupted() and done:
                 break
-            fitted[row] = front[row].refit(until=until)
+            refitted = front[row].refit(until=until)
+            if not _raises(front[row], refitted, wished):
+                fitted[row] = refitted
+            done += 1
             longest = max(longest, time.perf_counter() - begun)
-            show(len(fitted) / len(order), f"refitted {len(fitted)} of {len(order)} meshes")
-    if len(fitted) < len(order):
+            show(done / len(order), f"refitted {done} of {len(order)} meshes")
+    if done < len(order):
         say(
-            f"{len(fitted)} of {len(order)} meshes are refitted in the time given; for more search longer (--time) or "
+            f"{done} of {len(order)} meshes are refitted in the time given; for more search longer (--time) or "
             "write fewer (--meshes)"
         )
+    if len(fitted) < done:
+        raised = listed([MEASURES[name].label for name in wished], "or")
+        say(
+            f"{done - len(fitted)} of {done} meshes are not refitted: heights of less error in all raise their {raised}"
+        )
     return fitted
+
+
+def _raises(solution: FrontSolution, refitted: Refitted, wished: list[str]) -> bool:
+    """Tell whether other heights raise one of these measures of a mesh, by more than rounding."""
+    others = [name for name in wished if name != "mean_error"]  # which they lower
+    if not others:
+        return False
+    surface = solution.front.surface
+    found = surface.score(refitted.vertices, np.searchsorted(refitted.rows, refitted.faces)).quality
+    return any(getattr(found, name) > (1.0 + 1e-9) * getattr(solution, name) for name in others)

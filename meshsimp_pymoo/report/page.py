@@ -22,6 +22,7 @@ from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED, original_mesh
+from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
@@ -173,7 +174,7 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=list(_what_is_thinned(model, held, missing)),
+        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing)],
         heights={"value": f"{exaggeration:g}", "step": f"{exaggeration / 20:g}", "most": f"{5 * exaggeration:g}"},
         examples={
             "triangles": columns["triangles"][count // 2],
@@ -287,6 +288,14 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     if chosen is not None and not files[chosen]:
         files[chosen] = next((path.name for path in sorted(front.folder.glob("chosen.*"))), "")
     return files
+
+
+def _what_was_searched(run: Mapping[str, Any]) -> Iterator[str]:
+    if run.get("wish"):
+        yield (
+            f"What was searched is the mesh with {in_words(run['wish'])}. The others came along: a search for the "
+            "whole front would find better ones far from it."
+        )
 
 
 def _what_is_thinned(model: Original, held: _Embedded, missing: int) -> Iterator[str]:

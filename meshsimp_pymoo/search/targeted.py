@@ -4,9 +4,9 @@ The first population is an answer already: vertices are inserted greedily by the
 beyond the wish, and thinned back to it and further down [1]_. Then meshes are annealed around that answer:
 
 * for a number of triangles at exactly that size, and a few at neighbouring ones;
-* for an error at several smaller sizes, of which the smallest that holds is where the next generation begins. None
-  holds: the next sizes are closer. All hold: farther apart. For a maximum what is annealed away is what exceeds it,
-  the sum of max(0, d_p - E), until nothing does.
+* for an error at several smaller sizes; then vertices are inserted into each mesh until the wish holds, and it is
+  thinned while it does. The smallest is where the next generation begins, with sizes around the share that was best.
+  For a maximum what is annealed away is what exceeds it, the sum of max(0, d_p - E).
 
 Every generation makes as many moves as all before it, and the last one what is left of the budget: one slow
 annealing gives better meshes than several quick ones, and the quick ones find out at which size it pays.
@@ -19,6 +19,7 @@ References
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -35,8 +36,9 @@ from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.memetic import measurable
 from meshsimp_pymoo.search.operators import PackedDuplicates
 from meshsimp_pymoo.search.requirements import surface_of
+from meshsimp_pymoo.search.starting import Start
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
-from meshsimp_pymoo.surface.surface import Surface, movable_ground
+from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
 # How far beyond the wish vertices are inserted before they are thinned back: times the triangles, or the error.
@@ -66,12 +68,11 @@ BETWEEN = 24
 FRESH: dict[str, Any] = {"temperature": 0.3, "cooling": 0.03}
 AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
 # Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
-OWN = 0.05
+OWN = 0.01
+# By how much it is lowered where the sum decides among what holds it, as a share.
+SLACK = 1e-3
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
 IDLE = 12
-
-# Bytes of a mesh's error that come from adding up in another order.
-ROUNDING = 1e-9
 
 
 class TargetedSearch(Algorithm):
@@ -100,7 +101,6 @@ class TargetedSearch(Algorithm):
         self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
-        self.attempted: list[int] = []
 
     @property
     def moves(self) -> int:
@@ -132,13 +132,13 @@ class TargetedSearch(Algorithm):
         super()._setup(problem, **kwargs)
 
     def _initialize_infill(self) -> Population:
-        fronts = self._direct()
+        starts = self._direct()
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
-        X = [front.kept(k) for front in fronts for k in _rungs(front, -(-n // len(fronts)), self._wanted(front))]
+        X = [start.kept(k) for start in starts for k in _rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
-        self.pop = _survivors(infills, self.limits, self.pop_size)
+        self.pop = _survivors(infills, self.limits, self.within, self.pop_size)
 
     def _infill(self) -> Population:
         left = self._seconds_left()
@@ -147,9 +147,9 @@ class TargetedSearch(Algorithm):
             self.termination.force_termination = True
             return Population.create()
         parents, sizes, moves = plan
-        begun = self._clock()
+        begun, goal = self._clock(), self._goal
         made = moves.copy()
-        again = "triangles" in self.limits and self.is_annealed
+        again = "triangles" in goal and self.is_annealed
         children = relocate_all(
             self._cost(),
             parents,
@@ -160,12 +160,13 @@ class TargetedSearch(Algorithm):
             made=made,
             **(AGAIN if again else FRESH),
         )
-        self.is_annealed = self.moves_done > 0
-        if "triangles" not in self.limits and not self.within:
-            children = np.array(on_threads(self._squeezed, children))
+        self.is_annealed = "triangles" in goal and self.moves_done > 0
+        if "triangles" not in goal:
+            settled = on_threads(self._settled, children)
+            children = np.array([kept for kept, _ in settled])
+            self._adapt(np.array([triangles for _, triangles in settled]))
         self.seconds += self._clock() - begun
         self.moves_done += int(made.sum())
-        self.attempted = sizes.tolist()
         offspring = self.eliminate_duplicates.do(Population.new(X=children), self.pop)
         self.idle = 0 if len(offspring) else self.idle + 1
         if self.idle >= IDLE:
@@ -175,14 +176,10 @@ class TargetedSearch(Algorithm):
     def _advance(self, infills: Any = None, **kwargs: Any) -> None:
         if not len(infills):
             return
-        if "triangles" not in self.limits:
-            n_held = int((_missed(infills, self.limits) == 0.0).sum())
-            factor = 0.5 if n_held == 0 else 2.0 if n_held == len(self.attempted) else 1.0
-            self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
-        self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.pop_size)
+        self.pop = _survivors(Population.merge(self.pop, infills), self.limits, self.within, self.pop_size)
 
     def _set_optimum(self) -> None:
-        self.opt = _survivors(self.pop, self.limits, len(self.pop))
+        self.opt = _survivors(self.pop, self.limits, self.within, len(self.pop))
 
     def next(self) -> None:
         """Do a generation; the time in which functions are compiled is not its own."""
@@ -208,32 +205,37 @@ class TargetedSearch(Algorithm):
         if len(extra):
             self.evaluator.eval(self.problem, extra, algorithm=self)
             merged = Population.merge(self.opt, extra)
-            self.opt = _survivors(merged, self.limits, len(merged))
+            self.opt = _survivors(merged, self.limits, self.within, len(merged))
 
     # ------------------------------------------------------------------------------------------------- the first answer
 
-    def _direct(self) -> list[NestedFront]:
-        """Return nested fronts that reach beyond the wish, if anything does, and down to the smallest mesh."""
+    def _direct(self) -> list[Start]:
+        """Return nested meshes that reach beyond the wish, if anything does, and down to the smallest one."""
         surface: Surface = self.problem.surface
-        measure = self.problem.objectives[0]
-        by = "point" if measure == "max_error" else "triangle"
-        fronts = []
+        by, limit = self._choice, self._limit()
         stop = np.zeros(1, np.bool_)
 
-        def back(inserted: NestedFront) -> None:
-            fronts.append(thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
+        def back(inserted: NestedFront, **how: Any) -> NestedFront:
+            return thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop, **how)
 
+        starts = []
         with stopping(stop, seconds_given(self)):
+            # thinned around the wish only: where few vertices are left each removal looks at much of the model
             if "triangles" in self.limits:
-                # about two triangles for each vertex
-                most = int(MORE_TRIANGLES * self.limits["triangles"] / 2) + 8
-                back(greedy_insertion(surface, choose=by, most=most, stop=stop))
-            elif (limit := self._limit()) is not None:
-                back(greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop))
+                size = self.limits["triangles"]
+                inserted = greedy_insertion(surface, choose=by, most=int(MORE_TRIANGLES * size / 2) + 8, stop=stop)
+                starts.append(Start.of(inserted, back(inserted, least=int(size / MORE_TRIANGLES))))
+            elif limit is not None:
+                inserted = greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop)
+                starts.append(Start.of(inserted, back(inserted, most_error=limit / LESS_ERROR)))
             if "max_error" in self.within:
-                bounded = surface.bounded(self.within["max_error"])
-                back(greedy_insertion(bounded, choose="point", least_error=0.0, stop=stop))
-        return fronts
+                tight, least = self._tight()
+                inserted = greedy_insertion(tight, choose="point", least_error=least, stop=stop)
+                front = thinning(tight, kept=inserted.kept(len(inserted) - 1), most_error=least, stop=stop)
+                # in the measure that is searched, and somewhat below, where the maximum does not hold
+                back_to = int(front.triangles[0] / MORE_TRIANGLES)
+                starts.append(Start.of(thinning(surface, kept=front.kept(0), least=back_to, stop=stop)))
+        return starts
 
     def _limit(self) -> float | None:
         """Return the limit of the measure that is searched, as nested fronts count it; None if there is none."""
@@ -243,7 +245,7 @@ class TargetedSearch(Algorithm):
                 return limit * self.problem.surface.total_weight if measure == "error" else limit
         return None
 
-    def _wanted(self, front: NestedFront) -> int | None:
+    def _wanted(self, front: NestedFront | Start) -> int | None:
         """Return the subset of a nested front that the wish is for, as far as the front knows."""
         if "triangles" in self.limits:
             fitting = np.flatnonzero((front.triangles > 0) & (front.triangles <= self.limits["triangles"]))
@@ -256,39 +258,97 @@ class TargetedSearch(Algorithm):
 
     # ------------------------------------------------------------------------------------------------- its improvement
 
+    @property
+    def _goal(self) -> dict[str, float]:
+        """What the next generation is for: the smallest mesh that holds a maximum, until one is as small as wished."""
+        if "max_error" not in self.within or self.missed == 0.0:
+            return self.limits
+        return {name: limit for name, limit in self.limits.items() if name != "triangles"}
+
     def _cost(self) -> Any:
         """Return the surface whose cost is annealed."""
-        surface, measure = self.problem.surface, self.problem.objectives[0]
+        surface, measure, bound = self.problem.surface, self.problem.objectives[0], self.within.get("max_error")
         if measure == "max_error" and "triangles" not in self.limits:
             return surface.bounded(self.limits["max_error"])
-        if "max_error" not in self.within:
+        if bound is None:
             return surface
-        bound = self.within["max_error"]
-        # what the sum counts is a share of a deviation, whatever its power
-        own = OWN if measure == "error" else OWN / max(bound, 1e-300)
-        return surface.bounded(bound, own=own)
+        if "triangles" not in self._goal and self._limit() is None:
+            return surface.bounded(bound)
+        return surface.bounded(bound, own=OWN / self._scale(bound))
 
-    def _squeezed(self, kept: BoolArray) -> BoolArray:
-        """Return a subset that holds with as many vertices less as still hold; another one as it is."""
-        limit = self._limit()
-        assert limit is not None
-        front = thinning(self.problem.surface, kept=kept, most_error=limit)
-        wanted = self._wanted(front)
-        return kept if wanted is None else front.kept(wanted)
+    def _scale(self, bound: float) -> float:
+        """Return what makes the cost of a vertex by the measure a deviation again, where it is at most ``bound``."""
+        return 1.0 if self.problem.objectives[0] == "error" else max(bound, 1e-300)
+
+    def _tight(self) -> tuple[Any, float]:
+        """Return a surface by which first what exceeds the maximum counts, then the sum; and the error that holds.
+
+        All sums together count no more than the maximum is lowered by.
+        """
+        surface, bound = self.problem.surface, self.within["max_error"]
+        tight = surface.bounded(bound * (1.0 - SLACK), own=SLACK / (surface.total_weight * self._scale(bound)))
+        return tight, float(error_of(tight, SLACK * bound))
+
+    def _adapt(self, triangles: FloatArray) -> None:
+        """Take steps by which the attempt that was best would be the second; smaller ones where none was better.
+
+        ``triangles`` are those of the meshes that came of the attempts, from the largest size down.
+        """
+        best = int(np.argmin(triangles))
+        now = self.pop.get("F")[_order(self.pop, self._goal)[0], -1]
+        factor = (best + 1) / 2.0 if triangles[best] < now else 0.5
+        self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
+
+    def _settled(self, kept: BoolArray) -> tuple[BoolArray, float]:
+        """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles."""
+        limit, surface = self._limit(), self.problem.surface
+        by, most = surface, limit
+        if "max_error" in self.within:
+            by, most = self._tight()
+            grown = greedy_insertion(by, kept, choose="point", least_error=most)
+            kept = grown.kept(len(grown) - 1)
+        if limit is not None:
+            grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
+            kept = grown.kept(len(grown) - 1)
+        assert most is not None
+        front = thinning(by, kept=kept, most_error=most)
+        wanted = self._smallest(front) if self.within else self._wanted(front)
+        return (kept, np.inf) if wanted is None else (front.kept(wanted), float(front.triangles[wanted]))
+
+    def _smallest(self, front: NestedFront) -> int | None:
+        """Return the smallest subset that holds all limits but the triangles, by measuring some of them."""
+
+        def holds(k: int) -> bool:
+            quality = self.problem.as_quality(self.problem.surface.evaluate(front.kept(k)[None])[0])
+            return bool(shortfall(asdict(quality), errors) == 0.0)
+
+        errors = {name: limit for name, limit in self.limits.items() if name != "triangles"}
+        low, high = 0, len(front) - 1
+        if not holds(high):
+            return None
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if holds(middle) else (middle + 1, high)
+        return high
+
+    @property
+    def _choice(self) -> str:
+        """Which vertex is inserted for the measure that is searched."""
+        return "point" if self.problem.objectives[0] == "max_error" else "triangle"
 
     def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
         """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
-        T = self.pop.get("F")[:, -1]
-        if "triangles" in self.limits:
+        T, goal = self.pop.get("F")[:, -1], self._goal
+        if "triangles" in goal:
             wanted = np.unique(np.maximum(np.array(SIZES) * self.limits["triangles"], T.min()).astype(int))
             sizes = np.array([max(int(share * self.limits["triangles"]), int(T.min())) for share in SIZES])
             shares = np.array(SIZE_MOVES)
             if len(wanted) == 1:
                 sizes, shares = sizes[:2], shares[:2]
         else:
-            order = _order(self.pop, self.limits)
+            order = _order(self.pop, goal)
             k = np.arange(1, ATTEMPTS + 1)
-            if _missed(self.pop, self.limits)[order[0]] == 0.0:
+            if _missed(self.pop, goal)[order[0]] == 0.0:
                 sizes = np.minimum(T[order[0]] * (1.0 - self.step * k), T[order[0]] - k)
                 sizes = np.unique(sizes[sizes >= T.min()].astype(int))[::-1]
                 if not len(sizes):
@@ -305,8 +365,8 @@ class TargetedSearch(Algorithm):
 
     def _parent(self, size: int) -> int:
         """Return the individual from which a mesh of so many triangles is annealed."""
-        T, order = self.pop.get("F")[:, -1], _order(self.pop, self.limits)
-        if "triangles" not in self.limits:
+        T, order = self.pop.get("F")[:, -1], _order(self.pop, self._goal)
+        if "triangles" not in self._goal or "max_error" in self.within:
             return int(order[0])
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
@@ -314,7 +374,7 @@ class TargetedSearch(Algorithm):
     def _moves(self, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
         budget, seconds = part_of(self.termination, Moves), self._seconds_left()
-        at_once = "triangles" in self.limits
+        at_once = "triangles" in self.limits and not self.within
         most = [SLOWEST * work]
         if budget is not None:
             most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))
@@ -356,20 +416,28 @@ def _missed(pop: Any, limits: dict[str, float]) -> FloatArray:
 
 
 def _order(pop: Any, limits: dict[str, float]) -> IntArray:
-    """Return the individuals, nearest to the wish first: of those that hold it the most accurate, or the smallest."""
-    F, missed = pop.get("F"), _missed(pop, limits)
-    keys = (F[:, -1], F[:, 0]) if "triangles" in limits else (F[:, 0], F[:, -1])
-    return np.lexsort((*keys, missed))
+    """Return the individuals, nearest to the wish first: of those that hold it the most accurate, or the smallest.
 
-
-def _survivors(pop: Any, limits: dict[str, float], most: int) -> Any:
-    """Return those that no other one beats, at most about so many, and the one nearest to the wish."""
+    One that has too many triangles comes after all that have not.
+    """
     F = pop.get("F")
+    if "triangles" not in limits:
+        return np.lexsort((F[:, 0], F[:, -1], _missed(pop, limits)))
+    errors = {name: limit for name, limit in limits.items() if name != "triangles"}
+    return np.lexsort((F[:, -1], F[:, 0], _missed(pop, errors), F[:, -1] > limits["triangles"]))
+
+
+def _survivors(pop: Any, limits: dict[str, float], within: dict[str, float], most: int) -> Any:
+    """Return those that no other one beats, at most about so many, and the one nearest to the wish.
+
+    Limits beside the objectives count as one more: by how much they are missed.
+    """
+    F = np.column_stack([pop.get("F"), _missed(pop, within)]) + 0.0
     best = {row.tobytes() for row in non_dominated(F)}
     first: dict[bytes, int] = {}
-    for row in np.lexsort((F[:, 0], F[:, -1])):
-        if (F[row] + 0.0).tobytes() in best:
-            first.setdefault((F[row] + 0.0).tobytes(), int(row))
+    for row in np.lexsort((F[:, 0], F[:, 1])):
+        if F[row].tobytes() in best:
+            first.setdefault(F[row].tobytes(), int(row))
     rows = list(first.values())
     if len(rows) > most:
         rows = [rows[k] for k in np.unique(np.linspace(0, len(rows) - 1, most).astype(int))]
@@ -377,7 +445,7 @@ def _survivors(pop: Any, limits: dict[str, float], most: int) -> Any:
     return pop[np.unique([*rows, answer])]
 
 
-def _rungs(front: NestedFront, n: int, wanted: int | None) -> list[int]:
+def _rungs(front: NestedFront | Start, n: int, wanted: int | None) -> list[int]:
     """Return subsets of a nested front spread evenly over the logarithm of their size, with the one that is wanted."""
     rows = np.flatnonzero(front.triangles > 0)
     spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1

@@ -80,6 +80,19 @@ def beside(limits: Mapping[str, float], measure: str) -> dict[str, float]:
     return {name: limit for name, limit in limits.items() if name in SEARCHED and SEARCHED[name] != measure}
 
 
+def in_words(limits: Mapping[str, float]) -> str:
+    """Return limits as people say them.
+
+    >>> in_words({"triangles": 5000, "max_error": 0.25})
+    'at most 5,000 triangles and a max error of at most 0.25'
+    """
+    said = [
+        f"at most {limit:,} triangles" if name == "triangles" else f"a {MEASURES[name].label} of at most {limit:g}"
+        for name, limit in limits.items()
+    ]
+    return " and ".join(said)
+
+
 def shortfall(values: Mapping[str, Any], limits: Mapping[str, float]) -> Any:
     """Return by how much limits are missed, added up, each as a share of it; 0: all hold.
 

@@ -281,6 +281,21 @@ def test_any_size_can_be_taken_out_of_the_front(front, wanted):
     assert len(found.mesh.faces) == found.triangles
 
 
+@pytest.mark.parametrize("name", ["mean_error", "rms_error", "max_error"])
+def test_the_smallest_within_an_error_lies_between_two_solutions(front, name):
+    values = np.array([getattr(solution, name) for solution in front])
+    # the first solution after the middle that is better than all before it
+    row = next(k for k in range(len(front) // 2, len(front)) if values[k] < values[:k].min())
+    limit = 0.5 * (values[row] + values[:row].min())
+    smaller, larger = front[row - 1], front[row]
+    found = front.best(**{name: limit})
+    assert getattr(found, name) <= limit
+    assert smaller.triangles < found.triangles <= larger.triangles
+    assert name == "max_error" or found.triangles < larger.triangles
+    both = front.best(triangles=larger.triangles, **{name: limit})
+    assert (getattr(both, name) <= limit, both.triangles <= larger.triangles) == (True, True)
+
+
 def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size(front):
     coarse = CoarseGrid(GRID)
     assert len(coarse.samples) <= 1 << 13
@@ -293,6 +308,13 @@ def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size
     assert 198 <= moved.n_triangles <= 200
     whole = thinning(SURFACE)
     assert measure(GRID, moved).error < 0.97 * np.interp(200, whole.triangles, whole.error)
+
+
+def test_vertices_are_moved_only_as_far_as_the_time_goes(front):
+    late = tiled_front(GRID, tile=64, until=0.0)
+    assert all(moved is None for moved in late._kept.moved)
+    assert any(moved is not None for moved in front._kept.moved)
+    assert late[0].triangles == front[0].triangles == 2
 
 
 def test_a_grid_that_is_small_is_looked_at_in_whole_and_a_narrow_one_ends():

@@ -57,7 +57,8 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.formats.table import written_suffixes
 
     wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
-    said = ([wish.options] if wish.limits else []) + ["--knee"] * args.knee + ["--solution"] * (args.solution is not None)
+    choices = {wish.options: wish.limits, "--knee": args.knee, "--solution": args.solution is not None}
+    said = [choice for choice, is_said in choices.items() if is_said]
     if not said:
         raise UsageError("which solution is wanted? say limits, such as --triangles 500, or --knee, or --solution K")
     if len(said) > 1:
