@@ -103,9 +103,18 @@ def thread_pool(n_threads: int | None = None) -> ThreadPoolExecutor:
     """Return one pool of threads a process and size, so that the threads are started once."""
     n_threads = n_threads or os.cpu_count() or 1
     if n_threads not in _executors:
-        _executors[n_threads] = ThreadPoolExecutor(
+        pool = ThreadPoolExecutor(
             n_threads, thread_name_prefix="meshsimp", initializer=setattr, initargs=(_own, "is_worker", True)
         )
+        # All threads start here: the one whose start Ctrl-C interrupts is unknown to its pool, and would be waited for
+        # at the end of the process without being told to end, unless the pool goes first.
+        ready = threading.Event()
+        try:
+            for _ in range(n_threads):
+                pool.submit(ready.wait)
+        finally:
+            ready.set()
+        _executors[n_threads] = pool
     return _executors[n_threads]
 
 
