@@ -228,3 +228,28 @@ def test_what_fails_or_is_interrupted_sets_the_flag_and_waits_for_what_is_under_
     finally:
         signal.signal(signal.SIGINT, before)
     assert ended[-1] == "interrupted"
+
+
+@pytest.mark.parametrize("nth", [1, 2])
+def test_a_thread_that_is_interrupted_while_it_starts_keeps_no_process_alive(nth):
+    code = f"""
+import threading
+from meshsimp_pymoo.workers import on_threads
+
+start, started = threading.Thread.start, []
+
+def interrupted(thread):
+    start(thread)
+    started.append(thread)
+    if len(started) == {nth}:
+        raise KeyboardInterrupt  # before the pool knows of it
+
+threading.Thread.start = interrupted
+try:
+    on_threads(print, ["nothing"], n_threads=2)
+except KeyboardInterrupt:
+    print("interrupted")
+print(*on_threads(str, ["again", "done"], n_threads=2))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=20, check=True)
+    assert done.stdout.split() == ["interrupted", "again", "done"]
