@@ -181,11 +181,11 @@ PARTS = (
         _reading, 0.7, False,
     ),
     Part("evaluation", ("surface.evaluate:_evaluate",), _evaluation, 5.2, False),
-    Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 4.6, False),
-    Part("thinning", ("search.greedy:thin",), _thinning, 9.0, True),
-    Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 3.4, True),
-    Part("insertion", ("search.greedy:_grow",), _insertion, 1.5, True),
-    Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 2.0, True),
+    Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 6.6, False),
+    Part("thinning", ("search.greedy:thin",), _thinning, 9.4, True),
+    Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True),
+    Part("insertion", ("search.greedy:_grow",), _insertion, 2.3, True),
+    Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 3.4, True),
     Part(
         "tiles",
         (

@@ -109,7 +109,7 @@ class Live(NamedTuple):
 
 
 def make_live(n_vertices: int) -> Live:
-    """Return empty books for a model of that size; about 700 N bytes, of which only what is used becomes resident."""
+    """Return empty books for a model of that size; about 450 N bytes, of which only what is used becomes resident."""
     n = n_vertices + 4
     leaves = -(-n_vertices // RUN)
     return Live(

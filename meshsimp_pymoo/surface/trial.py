@@ -409,6 +409,14 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, n_candidates: int, i
     ``guess`` is one that stays, or NONE.
     """
     coming = live.coming
+    if live.bare[i] == TRIED:
+        own = np.int64(live.bare_segment[i])
+        if own == NONE or is_segment(live.kind, own):
+            # What was nearest of those that there are still is.
+            near, gap = _nearest_coming(g, live, n_coming, i, own, live.bare_gap[i])
+            if near >= 0:
+                return bare_cost(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap), guess
+            return live.cost[i], guess
     x = g.xy[2 * i]
     y = g.xy[2 * i + 1]
     near, gap = _nearest_coming(g, live, n_coming, i, NONE, farthest(g))

@@ -19,7 +19,7 @@ from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.compiling.store import made_from, place
 from meshsimp_pymoo.errors import CodeWarning
 from meshsimp_pymoo.search.greedy import thin
-from meshsimp_pymoo.surface import live
+from meshsimp_pymoo.surface import trial
 
 # ------------------------------------------------------------------------------------------------------------ the place
 
@@ -185,7 +185,7 @@ def test_code_is_known_by_all_it_is_made_from():
 def test_code_of_a_loop_is_made_from_the_answers_of_the_surfaces(monkeypatch):
     """They are in another file, which Numba's own time stamps do not see."""
     known = made_from(thin.py_func)
-    monkeypatch.setattr(live, "MOST_TOUCHED", live.MOST_TOUCHED + 1)
+    monkeypatch.setattr(trial, "MOST_TOUCHED", trial.MOST_TOUCHED + 1)
     assert made_from(thin.py_func) != known
 
 

@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
+from growing import KINDS
 from samples import stepped_model, surface
 
 from meshsimp_pymoo import MeshProblem
@@ -134,3 +137,34 @@ def test_passes_over_a_problem_s_surface_follow_its_rules_and_a_model_has_none()
     for method in METHODS.values():
         with pytest.raises(TypeError, match=r"a OpenModel has no rules; give a surface, such as problem\.surface"):
             method(problem.model)
+
+
+@pytest.mark.filterwarnings("ignore:.*belong to no face")
+@pytest.mark.parametrize("name", KINDS)
+def test_thinning_is_exact_where_outline_gaps_and_hubs_grow(name):
+    """A hub may go later than it could, but what is said of each subset is so, and each removal was costed exactly."""
+    kind = KINDS[name]
+    rated = surface(kind.make(400), up="z", **kind.rules)
+    front = thinning(rated)
+    rows = np.unique(np.linspace(0, len(front) - 1, 12).astype(int))
+    table = rated.evaluate(np.array([front.kept(k) for k in rows]))
+    np.testing.assert_array_equal(table[:, 1], front.triangles[rows])
+    np.testing.assert_allclose(table[:, 0], front.error[rows], rtol=1e-9, atol=1e-9 * rated.diagonal)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*belong to no face")
+@pytest.mark.parametrize("name", KINDS)
+def test_the_time_of_thinning_does_not_grow_with_the_square(name):
+    """Of four times as many vertices it takes sixteen times as long where it does; `benchmarks/growth.py` says more."""
+    kind, took = KINDS[name], []
+    for n in (3_000, 12_000):
+        rated = surface(kind.make(n), up="z", **kind.rules)
+        thinning(rated, least=n)
+        least = np.inf
+        for _ in range(3):
+            start = time.thread_time()
+            thinning(rated)
+            least = min(least, time.thread_time() - start)
+        took.append(least)
+    assert took[1] < 4**1.7 * took[0]
