@@ -49,7 +49,7 @@ from meshsimp_pymoo.search.memetic import FEWEST, measurable, sweep_generations
 from meshsimp_pymoo.search.operators import NestedSubsets
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
 from meshsimp_pymoo.search.starting import begun
-from meshsimp_pymoo.search.targeted import targeted
+from meshsimp_pymoo.search.targeted import TargetedSearch, rungs, targeted
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import (
@@ -276,11 +276,14 @@ def _answer_in_words(algorithm: Any, *, first: bool) -> str:
 
 def _subsets_begun(problem: MeshProblem, algorithm: Any) -> NDArray[np.bool_] | None:
     """Return subsets of what there is of a search's start, as many as can be measured soon; None if there is none."""
+    n = min(max(measurable(problem, MEASURED_SHARE * WAIT_SECONDS), FEWEST), getattr(algorithm, "pop_size", FEWEST))
+    if isinstance(algorithm, TargetedSearch):
+        start = algorithm.begun
+        return None if start is None else np.array([start.kept(row) for row in rungs(start, n)])
     sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
     start = begun(problem.surface)
     if start is None or not isinstance(sampling, NestedSubsets):
         return None
-    n = min(max(measurable(problem, MEASURED_SHARE * WAIT_SECONDS), FEWEST), algorithm.pop_size)
     return np.array([start.kept(int(row)) for row in np.unique(sampling.rows(start, n))])
 
 

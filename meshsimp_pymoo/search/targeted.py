@@ -101,6 +101,8 @@ class TargetedSearch(Algorithm):
         self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
+        #: What there is of the first answer while it is looked for.
+        self.begun: Start | None = None
 
     @property
     def moves(self) -> int:
@@ -134,7 +136,7 @@ class TargetedSearch(Algorithm):
     def _initialize_infill(self) -> Population:
         starts = self._direct()
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
-        X = [start.kept(k) for start in starts for k in _rungs(start, -(-n // len(starts)), self._wanted(start))]
+        X = [start.kept(k) for start in starts for k in rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
@@ -199,7 +201,7 @@ class TargetedSearch(Algorithm):
         stop = np.zeros(1, np.bool_)
         with stopping(stop, None if left is None else max(left, 0.0) / 2.0):
             front = thinning(self.problem.surface, kept=answer.X, least=int(answer.F[-1] / 2), stop=stop)
-        rows = _rungs(front, most, None)
+        rows = rungs(front, most)
         extra = self.eliminate_duplicates.do(Population.new(X=np.array([front.kept(k) for k in rows])), self.pop)
         extra = extra[np.sort(spread(len(extra))[:most])] if len(extra) > most else extra
         if len(extra):
@@ -215,26 +217,33 @@ class TargetedSearch(Algorithm):
         by, limit = self._choice, self._limit()
         stop = np.zeros(1, np.bool_)
 
-        def back(inserted: NestedFront, **how: Any) -> NestedFront:
-            return thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop, **how)
+        def around(inserted_in: Surface, insert: dict[str, Any], **back: Any) -> Start:
+            """Insert vertices, and thin them around the wish only: each removal looks at much where few are left."""
+            try:
+                inserted = greedy_insertion(inserted_in, stop=stop, **insert)
+            except ValueError:  # the pinned vertices span no triangle: it has nothing to begin with
+                return Start.of(thinning(inserted_in, stop=stop))
+            self.begun = Start.of(inserted)
+            thinned = thinning(inserted_in, kept=inserted.kept(len(inserted) - 1), stop=stop, **back)
+            return Start.of(inserted, thinned)
 
         starts = []
         with stopping(stop, seconds_given(self)):
-            # thinned around the wish only: where few vertices are left each removal looks at much of the model
             if "triangles" in self.limits:
                 size = self.limits["triangles"]
-                inserted = greedy_insertion(surface, choose=by, most=int(MORE_TRIANGLES * size / 2) + 8, stop=stop)
-                starts.append(Start.of(inserted, back(inserted, least=int(size / MORE_TRIANGLES))))
+                most = int(MORE_TRIANGLES * size / 2) + 8  # about two triangles for each vertex
+                starts.append(around(surface, {"choose": by, "most": most}, least=int(size / MORE_TRIANGLES)))
             elif limit is not None:
-                inserted = greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop)
-                starts.append(Start.of(inserted, back(inserted, most_error=limit / LESS_ERROR)))
+                insert = {"choose": by, "least_error": LESS_ERROR * limit}
+                starts.append(around(surface, insert, most_error=limit / LESS_ERROR))
             if "max_error" in self.within:
                 tight, least = self._tight()
-                inserted = greedy_insertion(tight, choose="point", least_error=least, stop=stop)
-                front = thinning(tight, kept=inserted.kept(len(inserted) - 1), most_error=least, stop=stop)
+                front = around(tight, {"choose": "point", "least_error": least}, most_error=least)
+                k = int(np.flatnonzero(front.error <= least)[0]) if (front.error <= least).any() else len(front) - 1
                 # in the measure that is searched, and somewhat below, where the maximum does not hold
-                back_to = int(front.triangles[0] / MORE_TRIANGLES)
-                starts.append(Start.of(thinning(surface, kept=front.kept(0), least=back_to, stop=stop)))
+                back_to = int(front.triangles[k] / MORE_TRIANGLES)
+                starts.append(Start.of(thinning(surface, kept=front.kept(k), least=back_to, stop=stop)))
+        self.begun = None
         return starts
 
     def _limit(self) -> float | None:
@@ -445,7 +454,7 @@ def _survivors(pop: Any, limits: dict[str, float], within: dict[str, float], mos
     return pop[np.unique([*rows, answer])]
 
 
-def _rungs(front: NestedFront | Start, n: int, wanted: int | None) -> list[int]:
+def rungs(front: NestedFront | Start, n: int, wanted: int | None = None) -> list[int]:
     """Return subsets of a nested front spread evenly over the logarithm of their size, with the one that is wanted."""
     rows = np.flatnonzero(front.triangles > 0)
     spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1
