@@ -59,7 +59,14 @@ SIZE_MOVES = (1.0, 1.0, 0.25, 0.25)
 FIRST = 1 / 40
 PILOT = 50.0
 SLOWEST = 4000.0
-SECONDS_A_MOVE = 2e-6
+# Seconds a move before any is timed: about so many, and so many for each of the model's vertices in a triangle. And
+# what it takes to begin with a mesh, for each vertex of the model: a generation whose beginning takes more than this
+# share of the time that is left is the last.
+SECONDS_A_MOVE = (6e-7, 1.7e-7)
+SECONDS_TO_BEGIN = 1e-6
+LONG_BEGIN = 0.1
+# With fewer moves than these for each kept vertex a thinned mesh is not heated as much.
+FEW_MOVES = 40.0
 # What is kept for the end, and the most meshes that are added then.
 LAST_SHARE = 0.05
 BETWEEN = 24
@@ -151,7 +158,8 @@ class TargetedSearch(Algorithm):
         parents, sizes, moves = plan
         begun, goal = self._clock(), self._goal
         made = moves.copy()
-        again = "triangles" in goal and self.is_annealed
+        few = moves.max() < FEW_MOVES * np.maximum(parents.sum(axis=1).min(), 1)
+        again = "triangles" in goal and bool(self.is_annealed or few)
         children = relocate_all(
             self._cost(),
             parents,
@@ -369,7 +377,7 @@ class TargetedSearch(Algorithm):
         parents = [self._parent(size) for size in sizes]
         kept = self.pop.get("X")[parents]
         work = np.maximum((kept & ~self.problem.pinned).sum(axis=1), 1)
-        moves = self._moves(shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        moves = self._moves(sizes, shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
         return (kept, sizes, moves) if moves.any() else None
 
     def _parent(self, size: int) -> int:
@@ -380,7 +388,7 @@ class TargetedSearch(Algorithm):
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
 
-    def _moves(self, weights: FloatArray, work: float) -> IntArray:
+    def _moves(self, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
         budget, seconds = part_of(self.termination, Moves), self._seconds_left()
         at_once = "triangles" in self.limits and not self.within
@@ -388,8 +396,14 @@ class TargetedSearch(Algorithm):
         if budget is not None:
             most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))
         if seconds is not None:
-            a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
-            most.append(_next_share(self.moves_done, seconds / a_move, at_once))
+            in_a_triangle = self.problem.n_var / max(float(sizes.mean()), 1.0)
+            guess = SECONDS_A_MOVE[0] + SECONDS_A_MOVE[1] * in_a_triangle
+            a_move = self.seconds / self.moves_done if self.moves_done else guess
+            begin = SECONDS_TO_BEGIN * self.problem.n_var * len(sizes) / 2.0
+            if begin > LONG_BEGIN * seconds:
+                most.append(max(seconds - begin, 0.1 * seconds) / a_move)
+            else:
+                most.append(_next_share(self.moves_done, seconds / a_move, at_once))
         if len(most) == 1:
             most.append(max(PILOT * work, self.moves_done))
         whole = int(min(most))
