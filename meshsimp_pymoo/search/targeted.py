@@ -398,7 +398,7 @@ class TargetedSearch(Algorithm):
         if seconds is not None:
             in_a_triangle = self.problem.n_var / max(float(sizes.mean()), 1.0)
             guess = SECONDS_A_MOVE[0] + SECONDS_A_MOVE[1] * in_a_triangle
-            a_move = self.seconds / self.moves_done if self.moves_done else guess
+            a_move = self.seconds / self.moves_done if self.moves_done and self.seconds > 0.0 else guess
             begin = SECONDS_TO_BEGIN * self.problem.n_var * len(sizes) / 2.0
             if begin > LONG_BEGIN * seconds:
                 most.append(max(seconds - begin, 0.1 * seconds) / a_move)
