@@ -312,7 +312,8 @@ class Front(Sequence[FrontSolution]):
         """
         rows = np.atleast_2d(np.asarray(kept))
         known = [np.ones((1, problem.n_var), dtype=bool), problem.pinned[None]] if ends else []
-        table = np.vstack([problem.evaluate_subsets(some) for some in (rows, *known)])
+        threads = getattr(problem.elementwise_runner, "n_threads", 1)
+        table = np.vstack([problem.evaluate_subsets(some, n_threads=threads) for some in (rows, *known)])
         usable = np.flatnonzero([_is_feasible(problem, row) for row in table])
         if not len(usable):
             raise LookupError(

@@ -41,6 +41,8 @@ from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Simplified, Surface, mesh_arrays
 
+# Entries of subsets that are looked at together.
+ENTRIES_AT_ONCE = 1 << 24
 # Chromosomes whose numbers are remembered; each takes about 200 bytes.
 MEMO_SIZE = 100_000
 # Regions in which the error may be kept with each solution and each chromosome remembered.
@@ -255,7 +257,12 @@ class MeshProblem(ElementwiseProblem):
         See `meshsimp_pymoo.surface.measures` for its columns. Pinned vertices are added first.
         """
         _require_bool(X)
-        X = np.asarray(X) | self.pinned
+        X = np.asarray(X)
+        at_once = max(8 * n_threads, ENTRIES_AT_ONCE // self.n_var)
+        if len(X) > at_once:  # without a copy of all of them
+            parts = [X[k : k + at_once] for k in range(0, len(X), at_once)]
+            return np.vstack([self.evaluate_subsets(part, n_threads=n_threads) for part in parts])
+        X = X | self.pinned
         if not self._memo_size:
             return self._kernel(X, n_threads)
         packed = np.packbits(X, axis=1)

@@ -20,7 +20,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, FIRST_EXCEPTION, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -44,6 +44,8 @@ TRIES = 3
 # Tasks in flight for each worker: one that is done, one that waits.
 AHEAD = 2
 CONNECT_SECONDS = 30
+# Who waits for threads looks up as often as this.
+HEARING_SECONDS = 0.2
 
 # Libraries that would start threads of their own beside the processes.
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -65,10 +67,14 @@ class Reserve(Generic[Item]):
     ----------
     make : callable
         Makes one; a function of a module, or a partial one, so that an owner can be pickled: without the objects.
+    is_kept : bool
+        Whether one that nobody uses stays. Where it is so large that making it is nothing beside using it, it goes, so
+        that what is done next has its memory.
     """
 
-    def __init__(self, make: Callable[[], Item]) -> None:
+    def __init__(self, make: Callable[[], Item], is_kept: bool = True) -> None:
         self._make = make
+        self._is_kept = is_kept
         self._idle: list[Item] = []
 
     @contextlib.contextmanager
@@ -81,10 +87,11 @@ class Reserve(Generic[Item]):
         try:
             yield item
         finally:
-            self._idle.append(item)
+            if self._is_kept:
+                self._idle.append(item)
 
     def __reduce__(self) -> Any:
-        return Reserve, (self._make,)
+        return Reserve, (self._make, self._is_kept)
 
 
 _executors: dict[int, ThreadPoolExecutor] = {}
@@ -135,6 +142,10 @@ def on_threads(
     try:
         pool = thread_pool(n_threads)
         futures.extend(pool.submit(work, item) for item in todo)
+        # a signal that another thread was given, or any on Windows, does not end a wait
+        while (state := wait(futures, HEARING_SECONDS, return_when=FIRST_EXCEPTION)).not_done:
+            for future in state.done:
+                future.result()
         return [future.result() for future in futures]
     except BaseException:
         if stop is not None:

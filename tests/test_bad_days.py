@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from meshsimp_pymoo.comparison.tables import Table
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, PictureWarning
 from meshsimp_pymoo.formats.table import write_mesh
+from meshsimp_pymoo.search import starting
 from meshsimp_pymoo.storage import CHECKPOINT, read_front
 
 PROGRAM = (sys.executable, "-m", "meshsimp_pymoo")
@@ -198,6 +200,86 @@ def test_a_signal_while_compiling_is_answered_at_once_and_leaves_nothing(tmp_pat
     with pytest.raises(ProcessLookupError):  # the second process, which compiles too, has ended
         os.killpg(process.pid, 0)
     assert [entry.name for entry in tmp_path.iterdir()] == ["cache"]
+
+
+@needs_posix
+def test_ctrl_c_while_the_start_is_thinned_hands_over_the_large_meshes_and_some_small_ones(
+    tmp_path, monkeypatch, capsys
+):
+    np.save(tmp_path / "rough.npy", np.random.default_rng(1).random((60, 60)))
+    real = starting.thinning
+
+    def interrupted(surface, *, stop, kept=None):
+        if kept is not None:
+            return real(surface, kept=kept, stop=stop)
+        time.sleep(0.1)  # until the main thread waits
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        while not stop[0]:
+            time.sleep(0.001)
+        return real(surface, least=6_000)
+
+    monkeypatch.setattr(starting, "thinning", interrupted)
+    out = tmp_path / "out"
+    assert (
+        main(["simplify", str(tmp_path / "rough.npy"), "-o", str(out), "--no-page", "--quiet", "--meshes", "9"]) == 130
+    )
+    said = capsys.readouterr().err
+    assert "stopping: the front so far is written next" in said
+    assert "of its start" in said
+    front = Front.load(out)
+    sizes = [solution.triangles for solution in front]
+    assert front.run["interrupted"]
+    assert front.run["generations"] == 0
+    assert sizes[0] == 2
+    assert sizes[-1] == 2 * 59 * 59
+    assert any(6_000 <= size < sizes[-1] for size in sizes)
+    assert sum(2 < size < 6_000 for size in sizes) >= 4
+
+
+@needs_posix
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [0.5, 3.0])
+def test_ctrl_c_in_a_search_of_200_000_vertices_is_answered_by_results_within_five_seconds(tmp_path, seconds):
+    np.save(tmp_path / "rough.npy", np.random.default_rng(1).random((450, 450)))
+    out = tmp_path / "out"
+    command = [*PROGRAM, "simplify", str(tmp_path / "rough.npy"), "-o", str(out), "--tile", "none", "--time", "1h"]
+    subprocess.run([*command[:-4], "--tile", "none", "--time", "1s", "--overwrite"], check=True)  # compiled
+    with subprocess.Popen([*command, "--overwrite"], stderr=subprocess.PIPE, text=True) as process:
+        before = (out / "run.json").read_bytes()
+        time.sleep(4.0 + seconds)  # in the search
+        process.send_signal(signal.SIGINT)
+        begun = time.perf_counter()
+        while (out / "run.json").read_bytes() == before and process.poll() is None:
+            time.sleep(0.05)
+        took = time.perf_counter() - begun
+        process.communicate()
+    assert process.returncode == 130
+    assert took < 5.0
+    assert len(Front.load(out)) > 5
+
+
+@needs_posix
+@pytest.mark.slow
+def test_a_vertex_of_a_large_model_takes_little_memory(tmp_path):
+    """What the program has without a model left out; large arrays are 1.2 kB a vertex at most."""
+    code = """
+import resource, sys
+from meshsimp_pymoo import cli
+from meshsimp_pymoo.memory import give_back_at_once
+give_back_at_once()
+code = cli.main(sys.argv[1:])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, file=sys.stderr)
+sys.exit(code)
+"""
+    peaks = []
+    for side in (20, 600):
+        name = tmp_path / f"{side}.npy"
+        np.save(name, np.random.default_rng(1).random((side, side)))
+        how = ["--tile", "none", "--time", "10s", "--meshes", "5", "--quiet", "-o", str(tmp_path / str(side))]
+        done = subprocess.run([sys.executable, "-c", code, "simplify", str(name), *how], capture_output=True, text=True)
+        assert done.returncode == 0
+        peaks.append(int(done.stderr.split()[-1]))
+    assert peaks[1] - peaks[0] < 1200 * 600**2
 
 
 @pytest.mark.parametrize("interrupted", [False, True])

@@ -9,6 +9,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -253,6 +254,22 @@ def test_an_empty_or_unfinished_front_is_refused(tmp_path, model, solutions):
     with pytest.raises(TypeError, match=r"a set cannot be recorded in run\.json"):
         write_solutions(tmp_path / "out", model, solutions, run={"seed": {1}})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_meshes_that_would_be_late_are_left_out_but_the_chosen_one_is_written(tmp_path, model, solutions):
+    late = write_solutions(tmp_path / "late", model, solutions, chosen=3, until=time.perf_counter())
+    early = write_solutions(tmp_path / "early", model, solutions, chosen=3, until=time.perf_counter() + 60.0)
+    plain = write_solutions(tmp_path / "plain", model, solutions, chosen=3)
+    names = {folder: sorted(path.name for path in (folder / "meshes").iterdir()) for folder in (late, early, plain)}
+    assert len(names[late]) == 1
+    assert names[early] == names[plain]
+    assert (late / "chosen.ply").read_bytes() == (plain / "chosen.ply").read_bytes()
+    for name in names[plain]:
+        assert (early / "meshes" / name).read_bytes() == (plain / "meshes" / name).read_bytes()
+    assert (early / "front.csv").read_bytes() == (plain / "front.csv").read_bytes()
+    stored = read_front(late)
+    assert [Path(path).name for path in stored.meshes if path] == names[late]
+    np.testing.assert_array_equal(stored.kept, read_front(plain).kept)
 
 
 def test_a_model_in_place_of_a_surface_is_told_apart(tmp_path, model, solutions):

@@ -2,15 +2,18 @@
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
+import numpy as np
 import pytest
 
-from meshsimp_pymoo.workers import DaskEngine, EngineError, Processes, Reserve, Serial, open_engine
+from meshsimp_pymoo.workers import DaskEngine, EngineError, Processes, Reserve, Serial, on_threads, open_engine
 
 
 def square(task, shared):
@@ -177,3 +180,51 @@ def test_a_script_without_the_main_guard_is_told_so(tmp_path):
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60)
     assert ended.returncode != 0
     assert 'if __name__ == "__main__":' in ended.stderr.splitlines()[-1]
+
+
+def test_threads_do_items_in_order_and_within_one_of_them_nothing_waits():
+    def name(_):
+        return threading.current_thread().name
+
+    assert on_threads(lambda k: k * k, range(20)) == [k * k for k in range(20)]
+    assert on_threads(name, [0])[0].startswith("meshsimp")
+    assert on_threads(lambda k: on_threads(lambda j: (k, j), range(2), n_threads=1), range(3), n_threads=1) == [
+        [(k, 0), (k, 1)] for k in range(3)
+    ]
+    # of another's thread one item is done there
+    found = []
+    thread = threading.Thread(target=lambda: found.extend(on_threads(name, [0])), name="another")
+    thread.start()
+    thread.join()
+    assert found == ["another"]
+
+
+def test_what_fails_or_is_interrupted_sets_the_flag_and_waits_for_what_is_under_way():
+    stop, ended = np.zeros(2, bool), []
+
+    def work(k):
+        if k == 0:
+            raise LookupError("no")
+        while not stop[0]:
+            time.sleep(0.001)
+        ended.append(k)
+
+    with pytest.raises(LookupError):
+        on_threads(work, range(40), n_threads=2, stop=stop)
+    assert stop.all()
+    assert len(ended) < 39  # what was not begun is left
+
+    def interrupted(_):
+        os.kill(os.getpid(), signal.SIGINT)
+        while not again[0]:
+            time.sleep(0.001)
+        ended.append("interrupted")
+
+    again = np.zeros(1, bool)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            on_threads(interrupted, [0], stop=again)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended[-1] == "interrupted"

@@ -39,6 +39,7 @@ from meshsimp_pymoo.cli.terminal import (
     warnings_as_lines,
 )
 from meshsimp_pymoo.errors import InputError
+from meshsimp_pymoo.memory import give_back_at_once
 
 __all__ = ["main", "program"]
 
@@ -90,6 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def program() -> NoReturn:
     """Be the shell command: once :func:`main` is done, no signal changes what came of it."""
     sys.unraisablehook = tell_unraisable
+    give_back_at_once()
     code = main()
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)

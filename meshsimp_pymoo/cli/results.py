@@ -38,7 +38,7 @@ from meshsimp_pymoo.surface.units import known_units, reference_system
 
 # How long results take at most after Ctrl-C, about, and what drawing takes for each vertex of the model [s].
 WAIT_SECONDS = 4.0
-DRAWING_SECONDS = 1.5e-5
+DRAWING_SECONDS = 5e-5
 
 # What of a record the summary says again.
 SAID = ("evaluations", "moves", "seconds", "compile_seconds", "seed", "mesh_origin")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import re
 import time
 from collections.abc import Mapping
@@ -45,10 +46,10 @@ from meshsimp_pymoo.search.checkpoint import (
     read_checkpoint,
     restore,
 )
-from meshsimp_pymoo.search.memetic import FEWEST, measurable, sweep_generations
+from meshsimp_pymoo.search.memetic import SECONDS_A_VERTEX, sweep_generations
 from meshsimp_pymoo.search.operators import NestedSubsets
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
-from meshsimp_pymoo.search.starting import begun
+from meshsimp_pymoo.search.starting import Start, begun
 from meshsimp_pymoo.search.targeted import TargetedSearch, rungs, targeted
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET
 from meshsimp_pymoo.settings import plain
@@ -67,7 +68,9 @@ from meshsimp_pymoo.warming import SEARCH
 # Of the time that is given, the share kept for the best heights of the meshes.
 REFIT_SHARE = 0.3
 # Of that time, the share for measuring what a search was to start from.
-MEASURED_SHARE = 0.3
+MEASURED_SHARE = 0.4
+# What measuring takes for each triangle of a mesh, beside what it takes for each vertex of the model [s].
+SECONDS_A_TRIANGLE = 5e-7
 # What writing takes about: for any model, and times the root of its vertices [s].
 WRITING_SECONDS = (1.4, 0.02)
 
@@ -115,7 +118,12 @@ def _simplify(request: Request, shown: Stages) -> int:
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
             return INTERRUPTED
-        return _write(found, keeper, shown)
+        ended = _write(found, keeper, shown)
+        # its subsets, and with the checkpoints those of the search, whose objects refer to each other, take more memory
+        # than the model
+        del found, keeper
+        gc.collect()
+        return hand_over(request, problem.surface, shown) if ended is None else ended
 
 
 def _claim(output: Output, search: Search) -> None:
@@ -276,15 +284,21 @@ def _answer_in_words(algorithm: Any, *, first: bool) -> str:
 
 def _subsets_begun(problem: MeshProblem, algorithm: Any) -> NDArray[np.bool_] | None:
     """Return subsets of what there is of a search's start, as many as can be measured soon; None if there is none."""
-    n = min(max(measurable(problem, MEASURED_SHARE * WAIT_SECONDS), FEWEST), getattr(algorithm, "pop_size", FEWEST))
+    start: Start | None
     if isinstance(algorithm, TargetedSearch):
         start = algorithm.begun
-        return None if start is None else np.array([start.kept(row) for row in rungs(start, n)])
-    sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
-    start = begun(problem.surface)
-    if start is None or not isinstance(sampling, NestedSubsets):
+        rows = None if start is None else np.array(rungs(start, algorithm.pop_size))
+    else:
+        sampling: Any = getattr(getattr(algorithm, "initialization", None), "sampling", None)
+        start = begun(problem.surface) if isinstance(sampling, NestedSubsets) else None
+        rows = None if start is None else np.unique(sampling.rows(start, algorithm.pop_size))
+    if start is None or rows is None:
         return None
-    return np.array([start.kept(int(row)) for row in np.unique(sampling.rows(start, n))])
+    seconds = SECONDS_A_VERTEX * problem.n_var + SECONDS_A_TRIANGLE * start.triangles[rows]
+    order = spread(len(rows))
+    in_time = np.cumsum(seconds[order]) <= MEASURED_SHARE * WAIT_SECONDS
+    chosen = [row for row, fits in zip(order, in_time, strict=True) if fits] or [0]
+    return np.array([start.kept(int(rows[row])) for row in sorted(chosen)])
 
 
 class Keeper:
@@ -386,8 +400,8 @@ class Keeper:
 # ---------------------------------------------------------------------------------------------------------- the results
 
 
-def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
-    """Write what was found, say so, and return the exit code."""
+def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
+    """Write what was found; return the exit code if it could not be, and the checkpoint is in place."""
     request, search, output = keeper.request, keeper.search, keeper.output
     folder, front = output.folder, found.front
     chosen, _ = request.wish.of(front)
@@ -425,7 +439,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int:
         reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
         say(f"{reason}; the same command goes on from the checkpoint in {folder}")
         return INTERRUPTED if isinstance(stop, KeyboardInterrupt) else BAD_INPUT
-    return hand_over(request, front.surface, shown)
+    return None
 
 
 def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown: Stages) -> dict[int, Refitted]:

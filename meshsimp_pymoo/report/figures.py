@@ -57,6 +57,7 @@ PANELS = 3  # meshes beside a front
 LONGEST_NAME = 40  # characters of a model's name in a title: a longer one would leave no room for the axes
 # Their places on the logarithm of the size: meshes of a handful of triangles show little.
 PANEL_SHARES = (0.5, 0.7, 0.9)
+MOST_DRAWN = 500_000
 ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
 # Vertices of an original that are drawn; a picture shows no more of them, and a browser without a graphics card turns
 # no more of them smoothly.
@@ -420,15 +421,22 @@ def panel_rows(triangles: npt.ArrayLike, *wanted: int | None) -> list[int]:
     *wanted : int or None
         Rows that must be shown, such as the chosen one and the knee, the most important first.
 
+    Notes
+    -----
+    Meshes of more than MOST_DRAWN triangles are drawn only if the first of the wanted is one, or no others are there:
+    a panel has fewer pixels, and takes minutes.
+
     Examples
     --------
     >>> sizes = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024]
     >>> panel_rows(sizes), panel_rows(sizes, 10, None, 4), panel_rows([2, 4])
     ([5, 7, 9], [4, 7, 10], [0, 1])
     """
-    size = np.log(np.maximum(np.asarray(triangles, dtype=np.float64), 1.0))
+    first = -1 if not wanted or wanted[0] is None else wanted[0]
+    drawn = max(int(np.searchsorted(triangles, MOST_DRAWN, side="right")), PANELS, first + 1)
+    size = np.log(np.maximum(np.asarray(triangles, dtype=np.float64)[:drawn], 1.0))
     even = (size[0] + (size[-1] - size[0]) * np.array(PANEL_SHARES)).tolist()
-    rows = list(dict.fromkeys(row for row in wanted if row is not None))[:PANELS]
+    rows = list(dict.fromkeys(row for row in wanted if row is not None and row < drawn))[:PANELS]
     for row in rows:  # each takes the place of the nearest
         even.remove(min(even, key=lambda other: abs(other - size[row])))
     found = {*rows, *(int(np.argmin(abs(size - other))) for other in even)}

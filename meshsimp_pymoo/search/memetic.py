@@ -159,7 +159,6 @@ class DownTheLadder(Mating):
         rungs = self.ladder.rungs
         assert rungs is not None
         rows = self.ladder.best(problem, pop)
-        X = pop.get("X")
         # Rungs from the largest down, cut into chains; each chain does one rung a generation.
         chains = [chain for chain in np.array_split(np.arange(len(rungs))[::-1], self.n_chains) if len(chain)]
         turn = np.array([chain[self.step] for chain in chains if self.step < len(chain)])
@@ -174,7 +173,7 @@ class DownTheLadder(Mating):
         begun = time.perf_counter()
         children = relocate_all(
             problem.surface,
-            X[parents],
+            np.array([individual.X for individual in pop[parents]]),
             moves,
             random_state,
             triangles=rungs[turn].astype(int),
@@ -195,7 +194,8 @@ class DownTheLadder(Mating):
     @staticmethod
     def _work(problem: Any, pop: Population, rows: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the moves of each rung if there is one for each kept vertex, up to a share of all vertices."""
-        kept = (pop.get("X") & ~problem.pinned).sum(axis=1)[np.maximum(rows, 0)]
+        movable = ~problem.pinned
+        kept = np.array([np.count_nonzero(individual.X & movable) for individual in pop])[np.maximum(rows, 0)]
         return np.minimum(np.maximum(kept, 1), FULL_SHARE * problem.n_var)
 
     def _moves(

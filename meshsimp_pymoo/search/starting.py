@@ -29,7 +29,7 @@ SECONDS_A_REMOVAL = 1.2e-5
 START_SHARE = 0.5
 # Of that, what inserting takes, the rest is for thinning what was inserted; and what is kept for both where the
 # thinning from all vertices takes longer than was thought.
-INSERT_SHARE = 0.35
+INSERT_SHARE = 0.5
 KEPT_SHARE = 0.3
 # What both may take together after Ctrl-C [s].
 QUICK = 1.2

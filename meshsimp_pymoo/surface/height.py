@@ -27,6 +27,8 @@ from meshsimp_pymoo.workers import Reserve
 
 # A kept vertex of weight 0 counts this share of the mean all the same, so that its refitted height has a value.
 LEAST_WEIGHT = 1e-9
+# From so many vertices on, books and workspaces that are not used are given back: hundreds of bytes a vertex each.
+LARGE = 300_000
 
 
 class HeightSurface:
@@ -57,8 +59,9 @@ class HeightSurface:
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
         self.rules = rules
         self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
-        self._workspaces = Reserve(partial(make_workspace, self.n_vertices))
-        self._books = Reserve(partial(make_live, self.n_vertices))
+        is_small = self.n_vertices < LARGE
+        self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)
+        self._books = Reserve(partial(make_live, self.n_vertices), is_small)
 
     @property
     def n_vertices(self) -> int:

@@ -355,3 +355,10 @@ def test_a_long_name_leaves_the_axes_their_room(roof, tmp_path):
     front = figure.get_axes()[0]
     assert front.get_title(loc="left").startswith("a_a_")
     assert front.get_position().width * figure.subfigs[0].bbox.width > 0.7 * figure.subfigs[0].bbox.width
+
+
+def test_a_mesh_of_more_triangles_than_a_panel_has_pixels_is_drawn_only_if_it_is_chosen():
+    sizes = [10, 100, 1000, 10_000, 2_000_000]
+    assert panel_rows(sizes, None, 4) == [0, 2, 3]
+    assert panel_rows(sizes, 4, 3) == [0, 3, 4]
+    assert panel_rows([600_000, 700_000, 800_000]) == [0, 1, 2]  # there are no others

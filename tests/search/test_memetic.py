@@ -14,7 +14,7 @@ from pymoo.optimize import minimize
 from pymoo.termination.collection import TerminationCollection
 from pymoo.termination.max_gen import MaximumGenerationTermination
 
-from meshsimp_pymoo import MeshProblem, Moves, NestedSubsets, PackedDuplicates, memetic, nsga2_v1, thinning
+from meshsimp_pymoo import MeshProblem, Moves, NestedSubsets, PackedDuplicates, memetic, nsga2_v1, thinning, workers
 from meshsimp_pymoo.search import local_search
 from meshsimp_pymoo.search import memetic as module
 from meshsimp_pymoo.search.local_search import MoveShares
@@ -205,8 +205,7 @@ def test_a_budget_in_moves_gives_the_same_bytes_on_any_number_of_threads(monkeyp
     found = []
     for n_threads in (1, 3):
         with ThreadPoolExecutor(n_threads) as pool:
-            monkeypatch.setattr(local_search, "thread_pool", lambda pool=pool: pool)
-            monkeypatch.setattr(module, "thread_pool", lambda pool=pool: pool)
+            monkeypatch.setattr(workers, "thread_pool", lambda _, pool=pool: pool)
             result = minimize(MeshProblem("face:200", n_threads=n_threads), memetic(20), termination, seed=3)
         found.append((result.X.tobytes(), result.F.tobytes(), result.algorithm.moves))
     assert found[0] == found[1]

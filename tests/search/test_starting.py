@@ -1,0 +1,160 @@
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from pymoo.optimize import minimize
+from samples import surface
+
+from meshsimp_pymoo import MeshProblem, memetic
+from meshsimp_pymoo.errors import SearchWarning
+from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.search import starting
+from meshsimp_pymoo.search.budgets import seconds_given
+from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
+from meshsimp_pymoo.search.starting import Start, begun, thinned
+
+
+def rough(side, seed=1):
+    """Return the surface of random heights on a full grid: thinning it is real work."""
+    return surface(open_model(grid_source(np.random.default_rng(seed).random((side, side)))))
+
+
+def nested(base, order, triangles, n=9):
+    error = np.linspace(1.0, 0.0, len(triangles))
+    return NestedFront(np.array(base), np.array(order, int), error, np.array(triangles), n)
+
+
+def same_meshes(front, start, of_start):
+    """Check that rows of a start are meshes whose numbers are those of the surface itself."""
+    X = np.array([start.kept(int(k)) for k in of_start])
+    table = front.evaluate(X)
+    np.testing.assert_array_equal(table[:, 1], start.triangles[of_start])
+    np.testing.assert_allclose(table[:, 0], start.error[of_start], rtol=1e-9, atol=1e-9)
+
+
+def test_fronts_one_above_the_other_lose_what_the_next_one_has():
+    small = nested([0, 1, 2], [3, 4, 5], [1, 2, 4, 6])
+    middle = nested([0, 1, 2, 4], [5, 6], [4, 5, 7])
+    large = nested([0, 1, 2, 3, 4, 5, 6], [7, 8], [8, 9, 10])
+    start = Start.of(small, middle, large)
+    assert start.triangles.tolist() == [1, 2, 4, 5, 7, 8, 9, 10]
+    assert len(start) == len(start.error) == 8
+    kept = [np.flatnonzero(start.kept(k)).tolist() for k in (1, 2, 4, 7)]
+    assert kept == [[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 2, 4, 5, 6], list(range(9))]
+    assert str(start) == "meshes of 1 to 2, 4 to 7, 8 to 10 triangles"
+    assert not start.is_whole
+    assert Start.of(large, small).triangles.tolist() == [1, 2, 4, 6]  # what begins larger than the next one is gone
+    with pytest.raises(ValueError, match="no subset 8; there are 8"):
+        start.kept(8)
+
+
+def test_without_a_limit_it_is_the_thinning_once_for_a_surface(monkeypatch):
+    model = rough(12)
+    start, whole = thinned(model), thinning(model)
+    assert start.is_whole
+    assert start.parts[0].order.tobytes() == whole.order.tobytes()
+    assert start.error.tobytes() == whole.error.tobytes()
+    monkeypatch.setattr(starting, "thinning", None)
+    assert thinned(model) is start
+    assert thinned(model, 1e-9) is start
+
+
+def test_where_thinning_takes_too_long_what_insertion_finds_is_thinned(monkeypatch):
+    model = rough(60)
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
+    with pytest.warns(SearchWarning, match=r"0.6 s are too short to thin all 3,600 vertices; .* from meshes of \d"):
+        start = thinned(model, 0.6)
+    assert not start.is_whole
+    assert begun(model) is start
+    assert thinned(model, 0.6) is start  # what there is
+    assert (np.diff(start.triangles) >= 0).all()
+    same_meshes(model, start, np.unique(np.linspace(0, len(start) - 1, 20).astype(int)))
+    # without a limit it is not enough
+    again = thinned(model)
+    assert again.is_whole
+    assert again.error.tobytes() == thinning(model).error.tobytes()
+
+
+def test_insertion_thinned_back_is_near_thinning():
+    model = surface(open_model("jacksboro:8"))
+    whole = thinning(model)
+    inserted = greedy_insertion(model, choose="triangle", most=int(0.3 * model.n_vertices))
+    back = thinning(model, kept=inserted.kept(len(inserted) - 1))
+    for share in (0.01, 0.02, 0.05):
+        most = 2 * share * model.n_vertices
+        best = [front.error[front.triangles <= most].min() for front in (whole, back)]
+        assert best[1] < 1.06 * best[0]
+
+
+def test_the_clock_ends_thinning_and_the_small_meshes_come_from_insertion(monkeypatch):
+    model = rough(70)
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 0.0)  # thought to be in time
+    real = starting.thinning
+
+    def slow(surface, *, stop, kept=None):
+        if kept is not None:
+            return real(surface, kept=kept, stop=stop)
+        while not stop[0]:
+            time.sleep(0.001)
+        return real(surface, least=6_000)
+
+    monkeypatch.setattr(starting, "thinning", slow)
+    with pytest.warns(SearchWarning, match="too short"):
+        start = thinned(model, 0.4)
+    large = real(model, least=6_000)
+    assert start.parts[-1].order.tobytes() == large.order.tobytes()
+    assert start.triangles[0] == 2
+    same_meshes(model, start, np.unique(np.geomspace(1, len(start), 20).astype(int) - 1))
+
+
+def test_pinned_vertices_that_span_nothing_leave_thinning_alone(monkeypatch):
+    model = rough(20)
+
+    def refused(*_, **__):
+        raise ValueError("span no triangle")
+
+    monkeypatch.setattr(starting, "greedy_insertion", refused)
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
+    with pytest.warns(SearchWarning, match="too short"):
+        start = thinned(model, 2.0)
+    assert start.error.tobytes() == thinning(model).error.tobytes()
+
+
+def test_a_search_by_time_begins_with_fewer_meshes_where_time_is_short(monkeypatch):
+    from meshsimp_pymoo.search import memetic as module
+
+    problem = MeshProblem("face:400")
+    monkeypatch.setattr(module, "SECONDS_A_VERTEX", problem.elementwise_runner.n_threads * 0.001 / problem.n_var)
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
+    seen = []
+    real = module.MemeticSearch._initialize_infill
+    monkeypatch.setattr(module.MemeticSearch, "_initialize_infill", lambda self: seen.append(real(self)) or seen[-1])
+    with pytest.warns(SearchWarning, match="too short"):
+        result = minimize(problem, memetic(100), ("time", 0.3), seed=1)
+    assert 8 <= len(seen[0]) <= 45  # each takes a thousandth second: 45 in 15 % of the time
+    assert seconds_given(result.algorithm) == 0.3
+    assert result.F[:, 1].min() >= 1
+    assert seconds_given(minimize(problem, memetic(10), ("n_gen", 1), seed=1).algorithm) is None
+
+
+@pytest.mark.parametrize("method", [thinning, greedy_insertion])
+def test_a_flag_that_is_set_ends_them_at_once_and_later_they_are_the_beginning_of_the_whole(method):
+    model = rough(90)
+    set_before = method(model, stop=np.ones(1, bool))
+    assert (len(set_before), len(set_before.order)) == (1, 0)
+    stop = np.zeros(1, bool)
+    timer = threading.Timer(0.01, lambda: stop.__setitem__(0, True))
+    timer.start()
+    part, whole = method(model, stop=stop), method(model)
+    timer.join()
+    assert len(part) < len(whole)
+    own = slice(len(whole) - len(part), None) if method is thinning else slice(len(part))
+    assert part.error.tobytes() == whole.error[own].tobytes()
+    assert part.triangles.tobytes() == whole.triangles[own].tobytes()
+    for k in (0, len(part) // 2, len(part) - 1):
+        other = k + (own.start or 0)
+        np.testing.assert_array_equal(part.kept(k), whole.kept(other))
