@@ -1067,7 +1067,10 @@ def test_help_says_which_grids_are_cut_into_tiles_and_what_each_measure_and_algo
     said = " ".join(capsys.readouterr().out.split())
     counted = [suffix for kind in all_formats() if kind.count_samples for suffix in kind.suffixes]
     assert set(counted) >= {".npy", ".asc", ".tif", ".tiff"}
-    assert f"for {', '.join(counted[:-1])} and {counted[-1]} from 2 million samples on)" in said
+    assert (
+        f"for {', '.join(counted[:-1])} and {counted[-1]} from 2 million samples on, where one piece does not fit"
+        in said
+    )
     assert all(f"{measure.minimised} ({measure.meaning})" in said for measure in OBJECTIVES.values())
     assert all(f"{name}: {PRESETS[name].about}" in said for name in ALGORITHMS)
 

@@ -46,6 +46,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.search import checkpoint
+from meshsimp_pymoo.search.targeted import TargetedSearch
 from meshsimp_pymoo.storage import CHECKPOINT, PICTURES, read_front
 from meshsimp_pymoo.surface.model import build_model
 
@@ -284,6 +285,28 @@ def test_a_search_with_other_settings_does_not_go_on_from_it(tmp_path, whole, mo
     assert reproducible(out) != whole
     assert simplify(stopped(tmp_path / "b", monkeypatch), "--threads", "2", "--format", "obj") == 0
     assert reproducible(tmp_path / "b") == whole
+
+
+def test_a_search_for_a_wish_goes_on_to_the_same_bytes_and_for_another_one_not(tmp_path, monkeypatch, capsys):
+    def search(out, *options):
+        return run("simplify", "jacksboro:20", "--moves", "4000", *PLAIN, *OFTEN, *options, "-o", out)
+
+    wish = ("--max-error", "40", "--mean-error", "9")
+    assert search(tmp_path / "whole", *wish) == 0
+    step, count = TargetedSearch.next, []
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "PAUSE", 0.0)
+        patch.setattr(
+            TargetedSearch, "next", lambda self: stop(Killed)() if len(count) == 3 else (count.append(1), step(self))
+        )
+        with pytest.raises(Killed):
+            search(tmp_path / "out", *wish)
+    assert (tmp_path / "out" / CHECKPOINT).exists()
+    capsys.readouterr()
+    assert search(tmp_path / "out", "--max-error", "41", "--mean-error", "9") == 2
+    assert "belongs to another search (max_error 40.0, not 41.0)" in one_line(capsys)
+    assert search(tmp_path / "out", *wish) == 0
+    assert reproducible(tmp_path / "out") == reproducible(tmp_path / "whole")
 
 
 def test_without_checkpoints_none_is_written_or_used(tmp_path, whole, monkeypatch, capsys):

@@ -452,7 +452,7 @@ def test_a_notebook_shows_the_picture_and_a_table_with_the_knee(front):
     )
     assert f"<tr>{header}</tr>" in page
     first = front.quality[0]
-    numbers = (first.triangles, first.vertices, first.error, first.mean_error, first.max_error)
+    numbers = (first.triangles, first.vertices, first.error, first.mean_error, first.rms_error, first.max_error)
     assert "".join(f"<td>{number:.6g}</td>" for number in numbers) in page
     rows = page.count("<tr>") - 1
     assert 3 <= rows <= 13

@@ -49,8 +49,8 @@ from meshsimp_pymoo.search.checkpoint import (
 from meshsimp_pymoo.search.memetic import SECONDS_A_VERTEX, sweep_generations
 from meshsimp_pymoo.search.operators import NestedSubsets
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
-from meshsimp_pymoo.search.starting import begun
-from meshsimp_pymoo.search.targeted import targeted
+from meshsimp_pymoo.search.starting import Start, begun
+from meshsimp_pymoo.search.targeted import TargetedSearch, rungs, targeted
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import (
@@ -284,11 +284,16 @@ def _answer_in_words(algorithm: Any, *, first: bool) -> str:
 
 def _subsets_begun(problem: MeshProblem, algorithm: Any) -> NDArray[np.bool_] | None:
     """Return subsets of what there is of a search's start, as many as can be measured soon; None if there is none."""
-    sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
-    start = begun(problem.surface)
-    if start is None or not isinstance(sampling, NestedSubsets):
+    start: Start | None
+    if isinstance(algorithm, TargetedSearch):
+        start = algorithm.begun
+        rows = None if start is None else np.array(rungs(start, algorithm.pop_size))
+    else:
+        sampling: Any = getattr(getattr(algorithm, "initialization", None), "sampling", None)
+        start = begun(problem.surface) if isinstance(sampling, NestedSubsets) else None
+        rows = None if start is None else np.unique(sampling.rows(start, algorithm.pop_size))
+    if start is None or rows is None:
         return None
-    rows = np.unique(sampling.rows(start, algorithm.pop_size))
     seconds = SECONDS_A_VERTEX * problem.n_var + SECONDS_A_TRIANGLE * start.triangles[rows]
     order = spread(len(rows))
     in_time = np.cumsum(seconds[order]) <= MEASURED_SHARE * WAIT_SECONDS

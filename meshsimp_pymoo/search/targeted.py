@@ -59,7 +59,14 @@ SIZE_MOVES = (1.0, 1.0, 0.25, 0.25)
 FIRST = 1 / 40
 PILOT = 50.0
 SLOWEST = 4000.0
-SECONDS_A_MOVE = 2e-6
+# Seconds a move before any is timed: about so many, and so many for each of the model's vertices in a triangle. And
+# what it takes to begin with a mesh, for each vertex of the model: a generation whose beginning takes more than this
+# share of the time that is left is the last.
+SECONDS_A_MOVE = (6e-7, 1.7e-7)
+SECONDS_TO_BEGIN = 1e-6
+LONG_BEGIN = 0.1
+# With fewer moves than these for each kept vertex a thinned mesh is not heated as much.
+FEW_MOVES = 40.0
 # What is kept for the end, and the most meshes that are added then.
 LAST_SHARE = 0.05
 BETWEEN = 24
@@ -101,6 +108,8 @@ class TargetedSearch(Algorithm):
         self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
+        #: What there is of the first answer while it is looked for.
+        self.begun: Start | None = None
 
     @property
     def moves(self) -> int:
@@ -134,7 +143,7 @@ class TargetedSearch(Algorithm):
     def _initialize_infill(self) -> Population:
         starts = self._direct()
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
-        X = [start.kept(k) for start in starts for k in _rungs(start, -(-n // len(starts)), self._wanted(start))]
+        X = [start.kept(k) for start in starts for k in rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
@@ -149,7 +158,8 @@ class TargetedSearch(Algorithm):
         parents, sizes, moves = plan
         begun, goal = self._clock(), self._goal
         made = moves.copy()
-        again = "triangles" in goal and self.is_annealed
+        few = moves.max() < FEW_MOVES * np.maximum(parents.sum(axis=1).min(), 1)
+        again = "triangles" in goal and bool(self.is_annealed or few)
         children = relocate_all(
             self._cost(),
             parents,
@@ -199,7 +209,7 @@ class TargetedSearch(Algorithm):
         stop = np.zeros(1, np.bool_)
         with stopping(stop, None if left is None else max(left, 0.0) / 2.0):
             front = thinning(self.problem.surface, kept=answer.X, least=int(answer.F[-1] / 2), stop=stop)
-        rows = _rungs(front, most, None)
+        rows = rungs(front, most)
         extra = self.eliminate_duplicates.do(Population.new(X=np.array([front.kept(k) for k in rows])), self.pop)
         extra = extra[np.sort(spread(len(extra))[:most])] if len(extra) > most else extra
         if len(extra):
@@ -215,26 +225,33 @@ class TargetedSearch(Algorithm):
         by, limit = self._choice, self._limit()
         stop = np.zeros(1, np.bool_)
 
-        def back(inserted: NestedFront, **how: Any) -> NestedFront:
-            return thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop, **how)
+        def around(inserted_in: Surface, insert: dict[str, Any], **back: Any) -> Start:
+            """Insert vertices, and thin them around the wish only: each removal looks at much where few are left."""
+            try:
+                inserted = greedy_insertion(inserted_in, stop=stop, **insert)
+            except ValueError:  # the pinned vertices span no triangle: it has nothing to begin with
+                return Start.of(thinning(inserted_in, stop=stop))
+            self.begun = Start.of(inserted)
+            thinned = thinning(inserted_in, kept=inserted.kept(len(inserted) - 1), stop=stop, **back)
+            return Start.of(inserted, thinned)
 
         starts = []
         with stopping(stop, seconds_given(self)):
-            # thinned around the wish only: where few vertices are left each removal looks at much of the model
             if "triangles" in self.limits:
                 size = self.limits["triangles"]
-                inserted = greedy_insertion(surface, choose=by, most=int(MORE_TRIANGLES * size / 2) + 8, stop=stop)
-                starts.append(Start.of(inserted, back(inserted, least=int(size / MORE_TRIANGLES))))
+                most = int(MORE_TRIANGLES * size / 2) + 8  # about two triangles for each vertex
+                starts.append(around(surface, {"choose": by, "most": most}, least=int(size / MORE_TRIANGLES)))
             elif limit is not None:
-                inserted = greedy_insertion(surface, choose=by, least_error=LESS_ERROR * limit, stop=stop)
-                starts.append(Start.of(inserted, back(inserted, most_error=limit / LESS_ERROR)))
+                insert = {"choose": by, "least_error": LESS_ERROR * limit}
+                starts.append(around(surface, insert, most_error=limit / LESS_ERROR))
             if "max_error" in self.within:
                 tight, least = self._tight()
-                inserted = greedy_insertion(tight, choose="point", least_error=least, stop=stop)
-                front = thinning(tight, kept=inserted.kept(len(inserted) - 1), most_error=least, stop=stop)
+                front = around(tight, {"choose": "point", "least_error": least}, most_error=least)
+                k = int(np.flatnonzero(front.error <= least)[0]) if (front.error <= least).any() else len(front) - 1
                 # in the measure that is searched, and somewhat below, where the maximum does not hold
-                back_to = int(front.triangles[0] / MORE_TRIANGLES)
-                starts.append(Start.of(thinning(surface, kept=front.kept(0), least=back_to, stop=stop)))
+                back_to = int(front.triangles[k] / MORE_TRIANGLES)
+                starts.append(Start.of(thinning(surface, kept=front.kept(k), least=back_to, stop=stop)))
+        self.begun = None
         return starts
 
     def _limit(self) -> float | None:
@@ -360,7 +377,7 @@ class TargetedSearch(Algorithm):
         parents = [self._parent(size) for size in sizes]
         kept = self.pop.get("X")[parents]
         work = np.maximum((kept & ~self.problem.pinned).sum(axis=1), 1)
-        moves = self._moves(shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        moves = self._moves(sizes, shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
         return (kept, sizes, moves) if moves.any() else None
 
     def _parent(self, size: int) -> int:
@@ -371,7 +388,7 @@ class TargetedSearch(Algorithm):
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
 
-    def _moves(self, weights: FloatArray, work: float) -> IntArray:
+    def _moves(self, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
         budget, seconds = part_of(self.termination, Moves), self._seconds_left()
         at_once = "triangles" in self.limits and not self.within
@@ -379,8 +396,14 @@ class TargetedSearch(Algorithm):
         if budget is not None:
             most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))
         if seconds is not None:
-            a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
-            most.append(_next_share(self.moves_done, seconds / a_move, at_once))
+            in_a_triangle = self.problem.n_var / max(float(sizes.mean()), 1.0)
+            guess = SECONDS_A_MOVE[0] + SECONDS_A_MOVE[1] * in_a_triangle
+            a_move = self.seconds / self.moves_done if self.moves_done and self.seconds > 0.0 else guess
+            begin = SECONDS_TO_BEGIN * self.problem.n_var * len(sizes) / 2.0
+            if begin > LONG_BEGIN * seconds:
+                most.append(max(seconds - begin, 0.1 * seconds) / a_move)
+            else:
+                most.append(_next_share(self.moves_done, seconds / a_move, at_once))
         if len(most) == 1:
             most.append(max(PILOT * work, self.moves_done))
         whole = int(min(most))
@@ -445,7 +468,7 @@ def _survivors(pop: Any, limits: dict[str, float], within: dict[str, float], mos
     return pop[np.unique([*rows, answer])]
 
 
-def _rungs(front: NestedFront | Start, n: int, wanted: int | None) -> list[int]:
+def rungs(front: NestedFront | Start, n: int, wanted: int | None = None) -> list[int]:
     """Return subsets of a nested front spread evenly over the logarithm of their size, with the one that is wanted."""
     rows = np.flatnonzero(front.triangles > 0)
     spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1

@@ -145,7 +145,8 @@ def test_a_wish_and_another_measure_are_refused(problems):
         simplify_to(problems["rms_error"], max_error=3.0)
     with pytest.raises(ValueError, match="a wish for mean_error lowers that measure, and max_error was named"):
         minimize(problems["max_error"], targeted(mean_error=3.0), ("n_gen", 1))
-    assert measure_for({"max_error": 1.0, "rms_error": 1.0}) == "rms_error"
+    assert measure_for({"rms_error": 1.0, "max_error": 1.0}) == "rms_error"
+    assert measure_for({"mean_error": 1.0, "max_error": 1.0}) == "error"
     assert measure_for({"max_error": 1.0, "rms_error": 1.0}, "max_error") == "max_error"
     assert measure_for({"triangles": 9, "max_error": 1.0}, "rms_error") == "rms_error"
 
