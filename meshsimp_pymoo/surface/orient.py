@@ -138,7 +138,10 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
 
     def seen_from(direction: FloatArray) -> SurfaceFacts:
         rotation = upright_rotation(direction)
-        return sheet.seen(points @ rotation.T, FOLD_SHARE, _blur(source, source.points @ rotation.T))
+        # grids and clouds were triangulated in the plane that is seen then: no face lies below another
+        is_plane = source.sort != "mesh" and abs(float(direction[2])) == 1.0
+        blur = _blur(source, source.points @ rotation.T)
+        return sheet.seen(points @ rotation.T, FOLD_SHARE, blur, is_plane=is_plane)
 
     given = source.up if _is_auto(up) else up
     if given is not None:
@@ -590,8 +593,11 @@ class _Sheet:
             "inconsistent_edges": int((flat[first] == flat[second]).sum()),
         }
 
-    def seen(self, upright: FloatArray, until: float, blur: float) -> SurfaceFacts:
-        """Describe it as seen from above; see :func:`surface_facts` and :func:`_blur`."""
+    def seen(self, upright: FloatArray, until: float, blur: float, *, is_plane: bool = False) -> SurfaceFacts:
+        """Describe it as seen from above; see :func:`surface_facts` and :func:`_blur`.
+
+        With ``is_plane`` it is known that no face lies below another.
+        """
         faces = self.source.faces
         normals = area_vectors(upright, faces)
         areas = np.linalg.norm(normals, axis=1)
@@ -605,7 +611,7 @@ class _Sheet:
         folds = int(folded.sum())
         most = int(until * len(faces)) - folds  # hidden faces that do not matter
         hidden = np.zeros(len(faces), bool)
-        if most >= 0:
+        if most >= 0 and not is_plane:
             facing = np.flatnonzero(~vertical & ~folded)
             edges = None if flipped or folds else self.edges
             below = hidden_faces(upright, faces[facing], tolerance=blur, most=most, edges=edges, name=self.source.name)

@@ -11,11 +11,12 @@ import trimesh
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from samples import check_open_surface
+from samples import check_open_surface, holey_grid
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.source.points import cloud_source
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
 from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.surface.orient import (
@@ -621,3 +622,16 @@ def test_spikes_far_out_make_no_line_of_a_sheet():
     points[[45, 150, 300], 2] += [1e12, -1e12, 1e12]
     spiked = build_source(points, source.faces, name="spiked")
     assert_array_equal(up_direction(spiked), [0, 0, 1])
+
+
+@pytest.mark.parametrize("sort", ["grid", "cloud"])
+def test_what_was_triangulated_in_its_plane_is_not_asked_what_lies_below_what(sort, monkeypatch):
+    source = holey_grid()
+    if sort == "cloud":
+        source = cloud_source(np.random.default_rng(1).random((200, 3)), max_edge=0.2)
+    facts = surface_facts(source, source.points)
+    assert (source.sort, facts.hidden, facts.folds) == (sort, 0, 0)
+    monkeypatch.setattr("meshsimp_pymoo.surface.orient.hidden_faces", None)
+    assert seen_upright(source)[1] == facts
+    with pytest.raises(TypeError):  # from another side it is
+        seen_upright(source, "0.001,0,1")
