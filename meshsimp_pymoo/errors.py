@@ -67,6 +67,9 @@ class Missed(LookupError):
         super().__init__(message)
         self.nearest: Any = nearest
 
+    def __reduce__(self) -> Any:
+        return Missed, (*self.args, self.nearest)
+
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return which of the known words was meant, most likely; None if none is near.

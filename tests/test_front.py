@@ -586,3 +586,8 @@ def test_a_grid_with_gaps_and_weights_without_numbers_there_is_read_again(tmp_pa
     again = Front.load(tmp_path / "out").problem
     assert again.options == problem.options == Options(nodata=-LARGEST)
     assert again.model.hash == problem.model.hash
+
+
+def test_a_missed_wish_goes_from_process_to_process():
+    missed = pickle.loads(pickle.dumps(Missed("none is so good", "the nearest")))
+    assert (str(missed), missed.nearest) == ("none is so good", "the nearest")

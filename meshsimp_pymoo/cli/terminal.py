@@ -147,6 +147,8 @@ def answering(*answers: str) -> Iterator[None]:
     now can end; if there are still more, it is raised again.
     """
     before = _Signals.part
+    if before.answers and before.came >= len(before.answers):
+        raise KeyboardInterrupt  # a library has swallowed it, while it was imported, say
     _Signals.part = _Part(answers)
     try:
         yield

@@ -357,7 +357,17 @@ def thin(
             _sift_down(heap, at, key, 0, n)
             continue
         if not key[2 * v] < np.inf or key[2 * v] > limit:
-            break
+            # A hub that waits may cost less by now.
+            n_waiting = 0
+            for k in range(n):
+                if patience[heap[k]] < 0:
+                    _cost_again(g, live, heap[k], key, patience)
+                    n_waiting += 1
+            if n_waiting == 0:
+                break
+            for k in range(n // 2 - 1, -1, -1):
+                _sift_down(heap, at, key, k, n)
+            continue
         n -= 1
         heap[0] = heap[n]
         at[heap[0]] = 0

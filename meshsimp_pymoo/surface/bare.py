@@ -33,7 +33,7 @@ from meshsimp_pymoo.surface.books import (
     SEGMENT,
     Live,
 )
-from meshsimp_pymoo.surface.costs import bare_deviation, enter_peak, noted_cost
+from meshsimp_pymoo.surface.costs import bare_deviation, counts, enter_peak, noted_cost
 from meshsimp_pymoo.surface.evaluate import REACH
 from meshsimp_pymoo.surface.ground import Ground
 
@@ -447,6 +447,7 @@ def _house(g: Ground, live: Live, i: int, h: int, gap: float) -> None:
     live.bare[i] = HOUSED
     live.bare_gap[i] = gap
     _stir(live, i)
+    d = 0.0
     cost = 0.0
     if h != NONE:
         at = slot(h)
@@ -460,8 +461,8 @@ def _house(g: Ground, live: Live, i: int, h: int, gap: float) -> None:
         a, b, c = corners_of(live.mesh, h)
         d = bare_deviation(g, a, b, c, i, gap)
         cost = noted_cost(g, live, d, i)
-        if len(live.peaks) > 0:
-            enter_peak(live, len(live.kind) + i, d if len(g.weight) == 0 or g.weight[i] > 0.0 else 0.0)
+    if len(live.peaks) > 0:
+        enter_peak(live, len(live.kind) + i, d if counts(g, i) else 0.0)
     live.amount[BARE_ERROR] += cost - live.cost[i]
     live.cost[i] = cost
 

@@ -28,12 +28,18 @@ def weighed_cost(g: Ground, d: float, i: int) -> float:
     return g.own * d + beyond
 
 
+@inner(inline=True)
+def counts(g: Ground, i: int) -> bool:
+    """Whether vertex i counts in the maximum: its weight is not 0."""
+    return len(g.weight) == 0 or g.weight[i] > 0.0
+
+
 @inner
 def noted_cost(g: Ground, live: Live, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, and note d if it is the largest so far (``LARGEST``)."""
     if not g.weighed:
         return d
-    if d > live.amount[LARGEST] and (len(g.weight) == 0 or g.weight[i] > 0.0):
+    if d > live.amount[LARGEST] and counts(g, i):
         live.amount[LARGEST] = d
     return weighed_cost(g, d, i)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -117,7 +118,9 @@ class HeightSurface:
         return self._ground
 
     def bounded(self, most: float, *, own: float = 0.0) -> HeightSurface:
-        """Return this surface with another cost of moves: what deviations exceed ``most`` by, and a share of its own.
+        """Return this surface with another cost of moves: what exceeds ``most``, and ``own`` times its own.
+
+        See `Surface.bounded`.
 
         Raises
         ------
@@ -127,6 +130,7 @@ class HeightSurface:
         if not most >= 0:
             raise ValueError(f"most = {most} is no deviation of at least 0")
         other = copy.copy(self)
+        other.rules = replace(self.rules, measure="error")  # the sum of these costs
         other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
         return other
 

@@ -46,7 +46,7 @@ from meshsimp_pymoo.surface.books import (
     VISITED,
     Live,
 )
-from meshsimp_pymoo.surface.costs import deviation_in, enter_peak, is_inside, is_thin, noted_cost, weighed_cost
+from meshsimp_pymoo.surface.costs import counts, deviation_in, enter_peak, is_inside, is_thin, noted_cost, weighed_cost
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.moves import answers
 from meshsimp_pymoo.surface.trial import is_solid, tried
@@ -312,7 +312,7 @@ def peak_in(g: Ground, live: Live, t: int) -> float:
     peak = 0.0
     i = live.head[t >> 3] if live.kind[t >> 3] & EMITTED else -1
     while i >= 0:
-        if len(g.weight) == 0 or g.weight[i] > 0.0:
+        if counts(g, i):
             peak = max(peak, deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i))
         i = live.following[i]
     return peak
@@ -695,7 +695,7 @@ def _worst_in(g: Ground, live: Live, cell: int) -> tuple[int, float, float]:
         if emitted:
             d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
             if len(live.peaks) > 0:
-                d = d if len(g.weight) == 0 or g.weight[i] > 0.0 else 0.0
+                d = d if counts(g, i) else 0.0
             elif g.weighed:
                 d = weighed_cost(g, d, i)
         elif live.tally[N_EMITTED] == 0:

@@ -13,6 +13,7 @@ from meshsimp_pymoo.surface.books import EMITTED, END, N_EMITTED, PEAK, make_liv
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.live import build, exchange_once, try_exchange_once
+from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.surface import error_of, movable_ground
 
 
@@ -148,7 +149,7 @@ class LiveTriangulation:
 
     def _try_exchange(self, v: int, w: int) -> tuple[float, int]:
         """Return the change of the error and of the number of triangles if v went and w came; -1: none."""
-        if self.ground.by_peak:  # the largest deviation of all is known once it is done
+        if self.ground.by_peak or not self.triangles:  # the largest deviation of all is known once it is done
             before, n = self.error, self.triangles
             if not exchange_once(self.ground, self.live, v, w):
                 return np.inf, 0
@@ -156,7 +157,9 @@ class LiveTriangulation:
             exchange_once(self.ground, self.live, w, v)
             return found
         change, triangles = try_exchange_once(self.ground, self.live, v, w)
-        return float(error_of(self.surface, self._total() + change) - self.error), int(triangles)
+        if OBJECTIVES[self.surface.rules.measure].power == 2:
+            change = error_of(self.surface, self._total() + change) - self.error
+        return float(change), int(triangles)
 
     def _tried(self, do: Callable[[], float], undo: Callable[[], float]) -> tuple[float, int]:
         before, triangles = self.error, self.triangles

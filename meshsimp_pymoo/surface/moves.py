@@ -91,8 +91,8 @@ def error_now(ground: Any, books: Any) -> float:
 def ranked(ground: Any, books: Any, change: float) -> tuple[float, float]:
     """Return the rank of a removal whose `try_exchange`, the last one, has found this change: lowest first, and ties.
 
-    The change where the measure is a sum; the largest deviation that the removal leaves, then the change, where it is
-    the maximum.
+    The change where the measure is a sum; the largest deviation among the vertices that the removal concerns, then the
+    change, where it is the maximum; the change, then that deviation, where costs are what deviations exceed a bound by.
     """
     return _unanswered()
 

@@ -281,7 +281,7 @@ class Surface(Protocol):
         """Return this surface for moves that bring all deviations down to ``most`` [model units].
 
         Their cost is the sum of what the deviations exceed it by, of vertices whose weight is not 0, and ``own`` times
-        what they cost here. All else is as here.
+        what they cost by this surface's measure. All else is as here.
         """
         ...
 

@@ -7,7 +7,7 @@ import pytest
 from pymoo.optimize import minimize
 from samples import holey_grid, surface
 
-from meshsimp_pymoo import MeshProblem, Moves, greedy_insertion, memetic, thinning
+from meshsimp_pymoo import LiveTriangulation, MeshProblem, Moves, greedy_insertion, memetic, thinning
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.search.local_search import relocate
 from meshsimp_pymoo.surface.model import build_model
@@ -119,3 +119,30 @@ def test_the_memetic_search_lowers_the_maximum_below_that_of_thinning():
     at = [(result.F[result.F[:, 1] <= size, 0].min(), size) for size in (20, 40, 80)]
     thin = [by_thinning.error[(by_thinning.triangles > 0) & (by_thinning.triangles <= size)].min() for _, size in at]
     assert np.mean([error / other for (error, _), other in zip(at, thin, strict=True)]) < 0.95
+
+
+@pytest.mark.parametrize("measure", ["error", "rms_error", "max_error"])
+def test_a_bounded_surface_s_error_is_what_exceeds_the_bound_whatever_the_measure(measure):
+    rated = surface(MODELS["terrain"], measure=measure)
+    kept = rated.pinned.copy()
+    kept[::5] = True
+    deviation = rated.simplify(kept).deviation
+    bound = float(np.median(deviation))
+    front = thinning(rated.bounded(bound), kept=kept)
+    assert front.error[-1] == pytest.approx(np.maximum(deviation - bound, 0.0).sum())
+    live = LiveTriangulation(rated.bounded(bound), kept)
+    assert live.error == pytest.approx(front.error[-1])
+    v = int(np.flatnonzero(kept & ~rated.pinned)[0])
+    tried = live.try_remove(v)[0]
+    assert tried == pytest.approx(live.remove(v))
+
+
+@pytest.mark.parametrize("measure", ["error", "rms_error", "max_error"])
+def test_what_begins_a_mesh_is_tried_as_it_is_done(measure):
+    model = build_model(load("horseshoe:120"), up="z")
+    live = LiveTriangulation(surface(model, measure=measure), surface(model).pinned)
+    assert (live.triangles, live.error) == (0, np.inf)
+    begins = [v for v in np.flatnonzero(~live.kept) if live.try_insert(int(v))[1] > 0]
+    assert live.try_insert(int(begins[0])) == (-np.inf, 1)
+    assert live.insert(int(begins[0])) == -np.inf
+    assert np.isfinite(live.error)

@@ -12,7 +12,7 @@ import hashlib
 import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -183,6 +183,7 @@ class Circle:
     def bounded(self, most: float, *, own: float = 0.0) -> Surface:
         """Return the circle for moves that bring all distances down to the most."""
         other = copy.copy(self)
+        other.rules = replace(self.rules, measure="error")
         other._ground = self.ground()._replace(bound=float(most), own=float(own), is_sum=True)
         return other
 

@@ -11,7 +11,9 @@ from counts import tried
 from nasty import SOURCES, nasty_model
 from samples import subset, surface
 
+from meshsimp_pymoo.formats.source import build_source
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
 
 RULES = list(itertools.product(FOOTPRINTS, OUTSIDES))
@@ -76,6 +78,30 @@ def test_what_is_tried_is_what_is_done_and_what_is_done_is_as_from_scratch(name,
                 if measure != "beyond":
                     expected = getattr(scratch.quality, measure)
                 assert live.error == pytest.approx(expected, rel=1e-9, abs=rounding)
+
+
+@pytest.mark.filterwarnings("ignore::meshsimp_pymoo.errors.ModelWarning")
+def test_what_is_covered_no_longer_and_costs_nothing_leaves_nothing_in_the_maximum():
+    """On a turned raster vertices lie a rounding beside the outline, where they count as covered."""
+    side = 13
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    cells = np.array([[[0, 1, side + 1], [0, side + 1, side]]]) + corner[:, None, None]
+    y, x = np.divmod(np.arange(side * side), side)
+    c, s = np.cos(0.3), np.sin(0.3)
+    for which, seed, moves in ((2, 0, 320), (7, 1, 370), (11, 1, 90)):
+        rng = np.random.default_rng(which)
+        faces = cells[rng.random(len(corner)) > 0.25].reshape(-1, 3)
+        points = np.column_stack([c * x - s * y, s * x + c * y, rng.normal(size=side * side)])
+        model = build_model(build_source(points, faces, name="turned"), up="z")
+        rated = surface(model, outside="ignore", measure="max_error")
+        rng = np.random.default_rng(seed)
+        kept = rng.random(model.n_vertices) < rng.random()
+        kept[model.corners] = True
+        live = LiveTriangulation(rated, kept)
+        for step, _, _ in walk(live, moves, rng):
+            if step % 10 == 9 and live.triangles:
+                expected = rated.simplify(live.kept).quality.max_error
+                assert live.error == pytest.approx(expected, rel=1e-9, abs=1e-9 * model.diagonal)
 
 
 def test_the_models_are_as_many_as_they_should_be_and_most_have_bare_vertices():

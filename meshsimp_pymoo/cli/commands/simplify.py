@@ -157,11 +157,12 @@ def run(args: argparse.Namespace) -> int:
     from pathlib import Path
 
     from meshsimp_pymoo.cli.requests import request_of
-    from meshsimp_pymoo.cli.terminal import Stages
+    from meshsimp_pymoo.cli.terminal import Stages, stop_if_interrupted
 
     request = request_of(args)
     plan = STAGES if request.search.time is None else STAGES | {"searching": request.search.time}
     with Stages(request.output.quiet, Path(request.model).name, plan) as shown:
         with shown.stage("starting", "starting"):  # what is imported takes longer than a person waits without a sign
             from meshsimp_pymoo.cli.searching import simplify
+        stop_if_interrupted()
         return simplify(request, shown)
