@@ -522,6 +522,18 @@ def test_a_signal_gets_the_word_of_the_part_that_it_stops_though_that_is_past(ca
     assert capsys.readouterr().err == 20 * "meshsimp: stopping the part\n"
 
 
+def test_a_signal_that_a_library_has_swallowed_is_raised_where_the_next_part_begins():
+    with interruptible(), answering("first", "second"):
+        signal.raise_signal(signal.SIGINT)  # only answered
+        with answering("stopping"):
+            with contextlib.suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            with pytest.raises(KeyboardInterrupt), answering("too late"):
+                raise AssertionError("the part was begun")
+        with answering("another part"):
+            assert not is_interrupted()
+
+
 # -------------------------------------------------------------------------------------------- disk and folder: simplify
 
 
