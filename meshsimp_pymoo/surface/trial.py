@@ -415,8 +415,13 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, n_candidates: int, i
             # What was nearest of those that there are still is.
             near, gap = _nearest_coming(g, live, n_coming, i, own, live.bare_gap[i])
             if near >= 0:
-                return bare_cost(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap), guess
-            return live.cost[i], guess
+                d = bare_deviation(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap)
+            elif own == NONE:
+                return 0.0, guess
+            else:
+                a, b, c = corners_of(live.mesh, own)
+                d = bare_deviation(g, a, b, c, i, gap)
+            return noted_cost(g, live, d, i), guess
     x = g.xy[2 * i]
     y = g.xy[2 * i + 1]
     near, gap = _nearest_coming(g, live, n_coming, i, NONE, farthest(g))
