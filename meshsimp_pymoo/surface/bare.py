@@ -329,25 +329,22 @@ def nearest_of(
 
 
 @inner(inline=True)
-def may_reach(g: Ground, live: Live, node: int, a: int, b: int) -> bool:
-    """Whether a vertex of a node may be nearer to the segment a-b than to its own."""
-    reach = live.reach[node]
-    if reach < 0.0:
+def may_reach(boxes: np.ndarray, reach: np.ndarray, node: int, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether a vertex of a node may be nearer to the segment from (ax, ay) to (bx, by) than to its own."""
+    gap = reach[node]
+    if gap < 0.0:
         return False
-    xy = g.xy
-    boxes = g.boxes
-    ax, ay, bx, by = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1]
-    if between_boxes(boxes, node, min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)) > reach:
+    if between_boxes(boxes, node, min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)) > gap:
         return False
     # A long segment's box says little: how far is the node's from the line?
     ex = bx - ax
     ey = by - ay
-    length = np.sqrt(ex * ex + ey * ey)
+    square = ex * ex + ey * ey
     x = 0.5 * (boxes[node, 0] + boxes[node, 1])
     y = 0.5 * (boxes[node, 2] + boxes[node, 3])
     half = 0.5 * ((boxes[node, 1] - boxes[node, 0]) * abs(ey) + (boxes[node, 3] - boxes[node, 2]) * abs(ex))
-    away = max((abs((x - ax) * ey - (y - ay) * ex) - half) / length - ROUNDING, 0.0)
-    return away * away * (1.0 - 1e-9) <= reach
+    away = max(abs((x - ax) * ey - (y - ay) * ex) - half - 2.0 * ROUNDING * (abs(ex) + abs(ey)), 0.0)
+    return away * away * (1.0 - 1e-9) <= gap * square
 
 
 # ------------------------------------------------------------------------------------------- segments and bare vertices
@@ -474,13 +471,16 @@ def _draw_near(g: Ground, live: Live, h: int) -> None:
     mesh = live.mesh
     nodes = live.nodes
     n_leaves = len(live.first_segment)
+    reach = live.reach
+    boxes = g.boxes
     a, b, c = corners_of(mesh, h)
+    ax, ay, bx, by = xy[2 * a], xy[2 * a + 1], xy[2 * b], xy[2 * b + 1]
     nodes[0] = 1
     depth = 1
     while depth > 0:
         depth -= 1
         node = nodes[depth]
-        if not may_reach(g, live, node, a, b):
+        if not may_reach(boxes, reach, node, ax, ay, bx, by):
             continue
         if node < n_leaves:
             nodes[depth] = 2 * node

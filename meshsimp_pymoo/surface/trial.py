@@ -79,27 +79,30 @@ def _enter_form(
 
 
 @inner(inline=True)
-def _inward(forms: np.ndarray, k: int, x: float, y: float) -> float:
-    """How far inside triangle k (x, y) lies, twice the least area with a side; negative outside."""
-    return min(
-        forms[k, 0] * x + forms[k, 1] * y + forms[k, 2],
-        min(forms[k, 3] * x + forms[k, 4] * y + forms[k, 5], forms[k, 6] * x + forms[k, 7] * y + forms[k, 8]),
-    )
+def _holder(forms: np.ndarray, n: int, best: int, x: float, y: float) -> tuple[int, bool]:
+    """Return the triangle of n that holds (x, y), or nearly, if there is one; ``best`` is tried first.
 
-
-@inner(inline=True)
-def _holder(forms: np.ndarray, n: int, best: int, x: float, y: float) -> tuple[int, float]:
-    """Return the triangle of n that holds (x, y), or nearly, and how far inside it lies; ``best`` is tried first."""
-    most = _inward(forms, best, x, y)
-    if most < 0.0:
-        for q in range(n):
-            amount = _inward(forms, q, x, y)
-            if amount > most:
-                most = amount
-                best = q
-                if most >= 0.0:
-                    break
-    return best, most
+    How far inside a triangle it lies is twice the least area with a side; where one side says no, the others are not
+    asked.
+    """
+    most = -2.0 * ROUNDED_AREA
+    found = False
+    for k in range(-1, n):
+        q = best if k < 0 else k
+        amount = forms[q, 0] * x + forms[q, 1] * y + forms[q, 2]
+        if not amount > most:
+            continue
+        amount = min(amount, forms[q, 3] * x + forms[q, 4] * y + forms[q, 5])
+        if not amount > most:
+            continue
+        amount = min(amount, forms[q, 6] * x + forms[q, 7] * y + forms[q, 8])
+        if amount > most and amount >= -ROUNDED_AREA:
+            most = amount
+            best = q
+            found = True
+            if amount >= 0.0:
+                break
+    return best, found
 
 
 @inner(inline=True)
@@ -267,8 +270,8 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
             if i != w:
                 x = xy[2 * i] - x0
                 y = xy[2 * i + 1] - y0
-                best, most = _holder(forms, n, best, x, y)
-                if most < -ROUNDED_AREA:
+                best, found = _holder(forms, n, best, x, y)
+                if not found:
                     if not at_outline:
                         return unknown
                     change = _at_outline(g, live, v, w, limit, gone_change, n_gone, n_star, n_ears, n_rim, n)
@@ -295,6 +298,12 @@ def is_solid(mesh: np.ndarray, ears: np.ndarray, n_ears: int, rim: np.ndarray, m
 
 
 # ------------------------------------------------------------------------------------------------------ at the outline
+
+
+@inner(inline=True)
+def _is_ghost(mesh: np.ndarray, t: int) -> bool:
+    """Whether the vertex at infinity is a corner of triangle t."""
+    return (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX
 
 
 @inner
@@ -416,11 +425,12 @@ def _cost_if_homeless(g: Ground, live: Live, n_coming: int, n_candidates: int, i
             near, gap = _nearest_coming(g, live, n_coming, i, own, live.bare_gap[i])
             if near >= 0:
                 d = bare_deviation(g, coming[near, 0], coming[near, 1], coming[near, 2], i, gap)
-                return noted_cost(g, live, d, i), guess
-            if own == NONE or not g.weighed:
-                return live.cost[i], guess
-            a, b, c = corners_of(live.mesh, own)
-            return noted_cost(g, live, bare_deviation(g, a, b, c, i, gap), i), guess
+            elif own == NONE:
+                return 0.0, guess
+            else:
+                a, b, c = corners_of(live.mesh, own)
+                d = bare_deviation(g, a, b, c, i, gap)
+            return noted_cost(g, live, d, i), guess
     x = g.xy[2 * i]
     y = g.xy[2 * i + 1]
     near, gap = _nearest_coming(g, live, n_coming, i, NONE, farthest(g))
@@ -482,13 +492,17 @@ def _drawn_near(g: Ground, live: Live, n_coming: int, change: float, n_tried: in
     nodes = live.nodes
     coming = live.coming
     n_leaves = len(live.first_segment)
+    reach = live.reach
+    boxes = g.boxes
     for k in range(n_coming):
+        ax, ay = xy[2 * coming[k, 0]], xy[2 * coming[k, 0] + 1]
+        bx, by = xy[2 * coming[k, 1]], xy[2 * coming[k, 1] + 1]
         nodes[0] = 1
         depth = 1
         while depth > 0:
             depth -= 1
             node = nodes[depth]
-            if not may_reach(g, live, node, coming[k, 0], coming[k, 1]):
+            if not may_reach(boxes, reach, node, ax, ay, bx, by):
                 continue
             if node < n_leaves:
                 nodes[depth] = 2 * node
@@ -583,6 +597,8 @@ def _at_outline(
             used[a] -= 1
             used[b] -= 1
             used[c] -= 1
+    # What lies beyond the hull stays there unless a vertex comes there: the hull does not grow.
+    grows = w >= 0 and _is_ghost(mesh, np.int64(live.place[w]))
     # First all that may lower the cost: bare vertices that are placed anew, lose their segment or find a nearer one.
     n_going = 0
     n_coming = 0
@@ -611,12 +627,15 @@ def _at_outline(
     best = 0
     for k in range(-1, n_gone):
         i = np.int64(v) if k < 0 else np.int64(live.head[live.gone[k] >> 3])
+        is_beyond = k >= 0 and not grows and _is_ghost(mesh, live.gone[k])
         while i >= 0:
             if i != w:
                 x = xy[2 * i] - x0
                 y = xy[2 * i + 1] - y0
-                best, most = _holder(forms, n_forms, best, x, y)
-                if most >= -ROUNDED_AREA and forms[best, IS_SHOWN] != 0.0:
+                found = False
+                if not is_beyond:
+                    best, found = _holder(forms, n_forms, best, x, y)
+                if found and forms[best, IS_SHOWN] != 0.0:
                     d = abs(forms[best, 9] * x + forms[best, 10] * y + forms[best, 11] - z[i])
                     change += noted_cost(g, live, d, i)
                 else:

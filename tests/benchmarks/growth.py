@@ -1,7 +1,7 @@
 """How the cost of thinning grows with the size of models with long outlines, gaps and hubs; moves at an outline.
 
 Run ``python tests/benchmarks/growth.py`` (some minutes); ``--sizes 5000,10000`` and ``--kinds islands,comb`` for less,
-``--moves`` for the moves at the outline alone. Seconds are those of the thread's CPU, the least of three where short.
+``--moves`` for the moves at the outline alone. Seconds are those of the CPU, the least of three where they are few.
 Asked: exponents of at most 1.3; moves at the outline at least 0.6 times as many a second as on a grid without gaps.
 """
 
@@ -40,12 +40,12 @@ CONSOLE = Console(width=130)
 
 
 def seconds(call: Callable[[], Any]) -> float:
-    """Return the CPU seconds of this thread that a call takes; the least of three where they are few."""
+    """Return the CPU seconds that a call takes, on all of its threads; the least of three where they are few."""
     least = np.inf
     for _ in range(3):
-        start = time.thread_time()
+        start = time.process_time()
         call()
-        least = min(least, time.thread_time() - start)
+        least = min(least, time.process_time() - start)
         if least > SHORT:
             break
     return least
