@@ -217,6 +217,16 @@ def greedy_insertion(
     )
 
 
+def can_insert(surface: Surface) -> bool:
+    """Return whether the pinned vertices span a triangle, so that :func:`greedy_insertion` has something to begin with."""
+    movable_ground(surface, "thinning and insertion")
+    try:
+        with surface.books(surface.pinned, fixed=surface.pinned):
+            return True
+    except ValueError:  # what the books say of such vertices, and of nothing else
+        return False
+
+
 def _not_below_0(error: np.ndarray) -> np.ndarray:
     """Return running sums of costs without what rounding leaves of them below 0, where nothing costs anything."""
     return np.maximum(error, 0.0)
