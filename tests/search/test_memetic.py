@@ -249,7 +249,7 @@ def test_a_number_of_moves_that_is_none_is_refused(wrong):
 
 
 def test_moves_for_an_algorithm_that_makes_none_are_refused():
-    with pytest.raises(TypeError, match=r"Moves\(5\) is for memetic\(\), and NSGA2 makes no moves; give it"):
+    with pytest.raises(TypeError, match=r"Moves\(5\) is for memetic\(\) and targeted\(\), and NSGA2 makes no moves"):
         minimize(MeshProblem("roof:5"), nsga2_v1(10), Moves(5), seed=1)
 
 
