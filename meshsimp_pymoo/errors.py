@@ -51,7 +51,7 @@ class ModelWarning(UserWarning):
 
 
 class SearchWarning(UserWarning):
-    """A search could not begin as it does with more time; what it finds is right, but there is less of it."""
+    """A search could not do all that it does with more time; what it finds is right, but there is less of it."""
 
 
 class Missed(LookupError):

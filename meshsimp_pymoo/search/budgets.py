@@ -20,10 +20,11 @@ End = TypeVar("End", bound=Termination)
 
 
 class Moves(Termination):
-    """Ends a :func:`~meshsimp_pymoo.memetic` when its annealing has made so many moves, and lets it plan with them.
+    """Ends :func:`~meshsimp_pymoo.memetic` or :func:`~meshsimp_pymoo.targeted` after so many moves of its annealing.
 
-    Evaluations do not measure this algorithm and seconds are never the same twice; with a budget in moves the same seed
-    gives the same bytes on any machine of the same architecture. A million take about a second of one core.
+    They plan with them. Evaluations do not measure these algorithms and seconds are never the same twice; with a budget
+    in moves the same seed gives the same bytes on any machine of the same architecture. A million take about a second
+    of one core.
 
     Parameters
     ----------
@@ -57,8 +58,8 @@ class Moves(Termination):
         moves = moves_of(algorithm)
         if moves is None:
             raise TypeError(
-                f"Moves({self.n_max_moves}) is for memetic(), and {type(algorithm).__name__} makes no moves; give it "
-                "('n_gen', ...), ('n_eval', ...) or ('time', ...)"
+                f"Moves({self.n_max_moves}) is for memetic() and targeted(), and {type(algorithm).__name__} makes no "
+                "moves; give it ('n_gen', ...), ('n_eval', ...) or ('time', ...)"
             )
         return moves / self.n_max_moves
 

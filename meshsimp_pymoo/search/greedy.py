@@ -2,7 +2,8 @@
 
 Both give nested subsets, one of every size, so that a single pass is a whole front of (error, triangles):
 
-* *thinning* removes, again and again, the vertex whose removal adds the least to the exact error [1]_;
+* *thinning* removes, again and again, the vertex whose removal adds the least to the exact error [1]_, but that one in
+  more than 48 triangles may wait (see :func:`thin`);
 * *greedy insertion* starts from the pinned vertices and inserts the worst vertex of all [2]_, or the worst vertex of
   the triangle with the largest sum of errors [3]_.
 
@@ -96,7 +97,8 @@ def thinning(
     """Remove the vertex whose removal adds the least error, until only the pinned ones are left.
 
     Where the measure is the maximum, the vertex goes whose removal leaves the least maximum among the vertices around
-    it, and of such vertices the one that adds the least to the sum of the eighth powers.
+    it, and of such vertices the one that adds the least to the sum of the eighth powers. A vertex in more than 48
+    triangles may go later than it could: what its removal adds is found again only after so many removals beside it.
 
     Parameters
     ----------
@@ -215,6 +217,16 @@ def greedy_insertion(
         triangles[: n_inserted + 1].copy(),
         n_all,
     )
+
+
+def can_insert(surface: Surface) -> bool:
+    """Return whether the pinned vertices span a triangle: without one there is nothing to insert into."""
+    movable_ground(surface, "thinning and insertion")
+    try:
+        with surface.books(surface.pinned, fixed=surface.pinned):
+            return True
+    except ValueError:  # what the books say of such vertices, and of nothing else
+        return False
 
 
 def _not_below_0(error: np.ndarray) -> np.ndarray:

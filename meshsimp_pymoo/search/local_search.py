@@ -278,8 +278,9 @@ def relocate(
     Parameters
     ----------
     surface : Surface
-        The original mesh of N vertices and its rules, whose measure is what is lowered: the sum of w_p d_p, or of w_p
-        times the square of d_p.
+        The original mesh of N vertices and its rules, whose measure says what is lowered: the sum of w_p d_p, or of w_p
+        times the square of d_p, or for the maximum its eighth power; of one that is ``bounded`` the sum of
+        max(0, d_p - most) over the vertices whose w_p is not 0, with its own share of the measure's sum.
     kept : (N,) bool array
         Where to start; with what the surface pins it must span a triangle of the mesh.
     moves : int

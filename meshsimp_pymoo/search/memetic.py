@@ -31,7 +31,7 @@ from meshsimp_pymoo.search.greedy import NestedFront, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
-from meshsimp_pymoo.search.starting import Start, thinned
+from meshsimp_pymoo.search.starting import Start, at_hand
 from meshsimp_pymoo.surface.surface import Surface, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
@@ -362,7 +362,7 @@ def between_the_rungs(
     those of the thinned model that are better, of at most ``most`` triangles.
     """
     order = np.argsort(F[:, 1], kind="stable")
-    whole = thinned(surface, seconds)
+    whole = at_hand(surface, seconds)
     most_rows = max(int(ENTRIES / (X.shape[1] * len(X))), 1)
     if measured is not None:
         most_rows = min(most_rows, max(measured // len(X), 1))

@@ -20,7 +20,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.search.budgets import stopping
-from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
+from meshsimp_pymoo.search.greedy import NestedFront, can_insert, greedy_insertion, thinning
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.workers import on_threads
 
@@ -43,12 +43,13 @@ class Start:
     ----------
     parts : tuple of NestedFront
         That of the smallest meshes first; no mesh of one has as many triangles as the least of the next.
-    is_whole : bool
-        Whether this is the thinning from all vertices down to the pinned ones.
+    seconds : float
+        Searches of at most so long start from it: inf for the thinning from all vertices down to the pinned ones, and 0
+        for what an interruption has left [s].
     """
 
     parts: tuple[NestedFront, ...]
-    is_whole: bool
+    seconds: float = 0.0
 
     @classmethod
     def of(cls, *fronts: NestedFront) -> Start:
@@ -63,7 +64,12 @@ class Start:
                     0, replace(front, order=front.order[: n - 1], error=front.error[:n], triangles=front.triangles[:n])
                 )
                 least = float(front.triangles[:n].min())
-        return cls(tuple(parts), False)
+        return cls(tuple(parts))
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether this is the thinning from all vertices down to the pinned ones."""
+        return self.seconds == np.inf
 
     @cached_property
     def error(self) -> FloatArray:
@@ -100,32 +106,26 @@ def begun(surface: Surface) -> Start | None:
 
 
 def thinned(surface: Surface, seconds: float | None = None) -> Start:
-    """Return the thinning of a surface, computed once as long as the surface is there.
+    """Return the thinning of a surface, or what fits into the time; computed once as long as the surface is there.
 
     Parameters
     ----------
     surface : Surface
         What is thinned.
     seconds : float, optional
-        What the search has as a whole: then it is what fits into a share of that, or what is there already.
+        What the search has as a whole: then it is what fits into a share of that. What is there already is taken where
+        it was made for a search of at least as long.
 
     Warns
     -----
     SearchWarning
         If it is not whole.
     """
+    seconds = np.inf if seconds is None else seconds
     start = begun(surface)
-    if start is not None and (start.is_whole or seconds is not None):
+    if start is not None and start.seconds >= seconds:
         return start
-    # the second entry is set by Ctrl-C alone
-    stop = np.zeros(2, np.bool_)
-
-    def work(_: None) -> Start:
-        # kept although Ctrl-C is raised when it comes back
-        start = _STARTS[surface] = _begin(surface, stop, seconds)
-        return start
-
-    (start,) = on_threads(work, [None], stop=stop)
+    start = _made(surface, seconds)
     if not start.is_whole:
         warnings.warn(
             f"{surface.model.name}: {seconds:g} s are too short to thin all {surface.n_vertices:,} vertices; the "
@@ -136,33 +136,59 @@ def thinned(surface: Surface, seconds: float | None = None) -> Start:
     return start
 
 
-def _begin(surface: Surface, stop: BoolArray, seconds: float | None) -> Start:
+def at_hand(surface: Surface, seconds: float | None = None) -> Start:
+    """Return the start of a surface for the end of a search, which did not begin with it where it is made now.
+
+    Parameters
+    ----------
+    surface : Surface
+        What is thinned.
+    seconds : float, optional
+        What the search has left: where there is nothing of a start, as in one that was resumed, what fits into a share
+        of that. Without it the start is whole.
+    """
+    if seconds is None:
+        return thinned(surface)
+    start = begun(surface)
+    return _made(surface, seconds) if start is None else start
+
+
+def _made(surface: Surface, seconds: float) -> Start:
+    """Make the start for a search of so many seconds, and keep it, although Ctrl-C is raised when it comes back."""
+    # the second entry is set by Ctrl-C alone
+    stop = np.zeros(2, np.bool_)
+
+    def work(_: None) -> Start:
+        start = _begin(surface, stop, seconds)
+        start = _STARTS[surface] = start if start.is_whole or stop[1] else replace(start, seconds=seconds)
+        return start
+
+    return on_threads(work, [None], stop=stop)[0]
+
+
+def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
     """Thin from all vertices, or from those that insertion finds, as far as the time goes."""
-    limit = None if seconds is None else START_SHARE * seconds
+    limit = START_SHARE * seconds
     fronts: list[NestedFront] = []
 
-    def timed(seconds: float | None, work: Callable[[], NestedFront]) -> None:
-        stop[0] = False
-        with stopping(stop, seconds):
-            fronts.insert(0, work())
+    def timed(share: float, work: Callable[[], NestedFront]) -> None:
+        if fronts:  # the one before was stopped; after Ctrl-C, which may come at any time, this one is not waited for
+            stop[0] = False
+        seconds = share * (min(QUICK, limit) if fronts and stop[1] else limit)
+        with stopping(stop, seconds if seconds < np.inf else None):
+            fronts.append(work())
 
-    if limit is None or surface.n_vertices * SECONDS_A_REMOVAL <= limit:
-        timed(limit, lambda: thinning(surface, stop=stop))
+    is_spanned = can_insert(surface)
+    if not is_spanned or surface.n_vertices * SECONDS_A_REMOVAL <= limit:
+        timed(1.0, lambda: thinning(surface, stop=stop))
         if not stop[0]:
-            return Start((fronts[0],), True)
-        left = QUICK if limit is None else min(QUICK, KEPT_SHARE * limit)
-    else:
-        left = limit
-    try:
-        timed(INSERT_SHARE * left, lambda: greedy_insertion(surface, choose="triangle", stop=stop))
-    except ValueError:  # the pinned vertices span no triangle: it has nothing to begin with
-        if not fronts:
-            timed(left, lambda: thinning(surface, stop=stop))
-        return Start.of(*fronts)
-    inserted = fronts[0]
-    # with Ctrl-C meanwhile this is not waited for
-    left = min(QUICK, left) if stop[1] else left
-    timed((1.0 - INSERT_SHARE) * left, lambda: thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
+            return Start((fronts[0],), np.inf)
+        if not is_spanned:
+            return Start.of(*fronts)
+        limit = min(QUICK, KEPT_SHARE * limit)
+    timed(INSERT_SHARE, lambda: greedy_insertion(surface, choose="triangle", stop=stop))
+    inserted = fronts[-1]
+    timed(1.0 - INSERT_SHARE, lambda: thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
     # thinned meshes are better than those inserted, as far down as they go
-    fronts[0], fronts[1] = fronts[1], fronts[0]
-    return Start.of(*fronts)
+    *large, inserted, back = fronts
+    return Start.of(inserted, back, *large)

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import json
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import asdict
@@ -36,7 +37,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.errors import ResultError, reason_of
+from meshsimp_pymoo.errors import ResultError, SearchWarning, reason_of
 from meshsimp_pymoo.files import new_file
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.search.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
@@ -221,6 +222,11 @@ def tiled_front(
     -------
     Front
         Of which :meth:`~meshsimp_pymoo.front.Front.best` makes a mesh of nearly any number of triangles.
+
+    Warns
+    -----
+    SearchWarning
+        If there was not the time to move the vertices of all small solutions.
     """
     what = identity(grid, tile=tile, most=most)
     work = _Phases(grid, tile, engine or Serial(), store or InMemory(), progress or (lambda share, text: None))
@@ -486,13 +492,22 @@ class _Phases:
         for place, rows in self.engine.each(_move, tasks):
             self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
+        n_left = 0
         for k in small:
             piece = self.store.get(f"moved_{k:04d}")
-            if piece is None and until is not None:
-                continue
-            if piece is None:
+            if piece is not None:
+                moved[k] = piece["samples"]
+            elif until is None:
                 raise ResultError(f"{self.grid.name}: {LOST}")
-            moved[k] = piece["samples"]
+            else:
+                n_left += 1
+        if n_left:
+            warnings.warn(
+                f"{self.grid.name}: the time was up before the vertices of {n_left} of {len(small)} small solutions "
+                "were moved, which makes them better; give more time",
+                SearchWarning,
+                stacklevel=2,
+            )
         return moved
 
     def measure(self, solutions: list[IntArray], threads: int) -> list[Quality]:

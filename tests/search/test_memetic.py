@@ -125,7 +125,7 @@ def test_beyond_the_last_rung_come_meshes_of_thinning_up_to_its_best_one(monkeyp
     front = thinning(surface)
     best = 100  # as if larger meshes were worse, as where an outline is not covered
     error = np.where(np.arange(len(front)) > best, front.error[best] + 1, front.error)
-    monkeypatch.setattr(module, "thinned", lambda *_: dataclasses.replace(front, error=error))
+    monkeypatch.setattr(module, "at_hand", lambda *_: dataclasses.replace(front, error=error))
     X = front.kept(20)[None]
     found = module.between_the_rungs(surface, X, np.array([[front.error[20], front.triangles[20]]]), most=np.inf)
     assert len(found) == module.BETWEEN
@@ -249,7 +249,7 @@ def test_a_number_of_moves_that_is_none_is_refused(wrong):
 
 
 def test_moves_for_an_algorithm_that_makes_none_are_refused():
-    with pytest.raises(TypeError, match=r"Moves\(5\) is for memetic\(\), and NSGA2 makes no moves; give it"):
+    with pytest.raises(TypeError, match=r"Moves\(5\) is for memetic\(\) and targeted\(\), and NSGA2 makes no moves"):
         minimize(MeshProblem("roof:5"), nsga2_v1(10), Moves(5), seed=1)
 
 

@@ -8,14 +8,14 @@ import pytest
 from pymoo.optimize import minimize
 from samples import surface
 
-from meshsimp_pymoo import MeshProblem, memetic
+from meshsimp_pymoo import MeshProblem, RandomSubset, memetic
 from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search import starting
 from meshsimp_pymoo.search.budgets import seconds_given
-from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
-from meshsimp_pymoo.search.starting import Start, begun, thinned
+from meshsimp_pymoo.search.greedy import NestedFront, can_insert, greedy_insertion, thinning
+from meshsimp_pymoo.search.starting import Start, at_hand, begun, thinned
 
 
 def rough(side, seed=1):
@@ -71,9 +71,15 @@ def test_where_thinning_takes_too_long_what_insertion_finds_is_thinned(monkeypat
     assert not start.is_whole
     assert begun(model) is start
     assert thinned(model, 0.6) is start  # what there is
+    assert thinned(model, 0.5) is start
     assert (np.diff(start.triangles) >= 0).all()
     same_meshes(model, start, np.unique(np.linspace(0, len(start) - 1, 20).astype(int)))
-    # without a limit it is not enough
+    # for a longer search it is not enough, and that is said again
+    with pytest.warns(SearchWarning, match=r"0.7 s are too short"):
+        longer = thinned(model, 0.7)
+    assert longer is not start
+    assert at_hand(model, 3600.0) is longer is begun(model)  # the end of a search takes what there is
+    # without a limit neither
     again = thinned(model)
     assert again.is_whole
     assert again.error.tobytes() == thinning(model).error.tobytes()
@@ -111,17 +117,47 @@ def test_the_clock_ends_thinning_and_the_small_meshes_come_from_insertion(monkey
     same_meshes(model, start, np.unique(np.geomspace(1, len(start), 20).astype(int) - 1))
 
 
-def test_pinned_vertices_that_span_nothing_leave_thinning_alone(monkeypatch):
-    model = rough(20)
-
-    def refused(*_, **__):
-        raise ValueError("span no triangle")
-
-    monkeypatch.setattr(starting, "greedy_insertion", refused)
+def test_pinned_vertices_that_span_nothing_leave_thinning_alone(monkeypatch, recwarn):
+    model, other = rough(20), rough(20)
+    model.pinned[:] = False
+    assert [can_insert(model), can_insert(other)] == [False, True]
     monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
-    with pytest.warns(SearchWarning, match="too short"):
-        start = thinned(model, 2.0)
+    start = thinned(model, 20.0)  # it is done long before
+    assert start.is_whole
+    assert not recwarn
     assert start.error.tobytes() == thinning(model).error.tobytes()
+    # another fault is none of those vertices': it is not taken for one
+
+    def broken(*_, **__):
+        raise ValueError("something else")
+
+    monkeypatch.setattr(starting, "greedy_insertion", broken)
+    with pytest.raises(ValueError, match="something else"):
+        thinned(other, 20.0)
+
+
+def test_ctrl_c_before_the_first_removal_is_not_lost():
+    start = starting._begin(rough(20), np.ones(2, bool), np.inf)
+    assert not start.is_whole
+    assert len(start.parts[-1]) == 1  # all vertices, and what insertion finds
+    assert start.triangles[0] == 2
+
+
+def test_what_ctrl_c_has_left_is_for_no_later_search(monkeypatch):
+    model = rough(20)
+    real = starting.thinning
+
+    def interrupted(surface, *, stop, kept=None):
+        stop[:] = True  # as `on_threads` does
+        return real(surface, kept=kept, stop=stop)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(starting, "thinning", interrupted)
+        left = starting._made(model, 3600.0)
+    assert begun(model) is left
+    assert not left.is_whole
+    assert at_hand(model, 1.0) is left
+    assert thinned(model, 3600.0).is_whole
 
 
 def test_a_search_by_time_begins_with_fewer_meshes_where_time_is_short(monkeypatch):
@@ -139,6 +175,17 @@ def test_a_search_by_time_begins_with_fewer_meshes_where_time_is_short(monkeypat
     assert seconds_given(result.algorithm) == 0.3
     assert result.F[:, 1].min() >= 1
     assert seconds_given(minimize(problem, memetic(10), ("n_gen", 1), seed=1).algorithm) is None
+
+
+def test_a_search_by_time_that_began_otherwise_makes_in_the_end_what_its_end_has_time_for(monkeypatch, recwarn):
+    problem, given = MeshProblem("face:400"), []
+    real = starting._begin
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
+    monkeypatch.setattr(starting, "_begin", lambda *how: given.append(how[-1]) or real(*how))
+    minimize(problem, memetic(12, sampling=RandomSubset()), ("time", 0.4), seed=1)
+    assert len(given) == 1
+    assert given[0] < 0.2  # seconds that are left
+    assert not recwarn  # nothing starts from it
 
 
 @pytest.mark.parametrize("method", [thinning, greedy_insertion])

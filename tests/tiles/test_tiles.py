@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.errors import ModelError, ResultError, SearchWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.opening import count_samples, open_grid, open_model
 from meshsimp_pymoo.search.coarse import SEARCHED, CoarseGrid, move, slope_of
 from meshsimp_pymoo.search.greedy import thinning
 from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import MEASURES, quality_of
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.weld import measure, pieces, weld
 from meshsimp_pymoo.tiles.front import Folder, InMemory, _Phases, cut_axis, identity, tiled_front
@@ -311,7 +312,16 @@ def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size
 
 
 def test_vertices_are_moved_only_as_far_as_the_time_goes(front):
-    late = tiled_front(GRID, tile=64, until=0.0)
+    store = InMemory()
+    with pytest.warns(SearchWarning) as said:
+        late = tiled_front(GRID, tile=64, until=0.0, store=store)
+    numbers = [piece["numbers"] for name, piece in store.pieces.items() if name.startswith("quality")]
+    small = sum(2 < quality_of(zip(MEASURES, row, strict=True)).triangles <= SEARCHED for row in numbers)
+    assert len(said) == 1
+    assert f"before the vertices of {small} of {small} small solutions were moved" in str(said[0].message)
+    store.put(f"moved_{len(numbers) - 2:04d}", samples=GRID.corners)
+    with pytest.warns(SearchWarning, match=f" {small - 1} of {small} small solutions "):
+        tiled_front(GRID, tile=64, until=0.0, store=store)
     assert all(moved is None for moved in late._kept.moved)
     assert any(moved is not None for moved in front._kept.moved)
     assert late[0].triangles == front[0].triangles == 2
