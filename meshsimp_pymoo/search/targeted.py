@@ -19,6 +19,8 @@ References
 from __future__ import annotations
 
 import time
+import warnings
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -29,6 +31,7 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
+from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
@@ -37,7 +40,7 @@ from meshsimp_pymoo.search.memetic import measurable
 from meshsimp_pymoo.search.operators import PackedDuplicates
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start
-from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
+from meshsimp_pymoo.search.wishes import SEARCHED, USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
@@ -108,8 +111,8 @@ class TargetedSearch(Algorithm):
         self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
-        #: What there is of the first answer while it is looked for.
-        self.begun: Start | None = None
+        #: What there is of the first answer until it is measured.
+        self.begun: list[Start] = []
 
     @property
     def moves(self) -> int:
@@ -141,12 +144,14 @@ class TargetedSearch(Algorithm):
         super()._setup(problem, **kwargs)
 
     def _initialize_infill(self) -> Population:
-        starts = self._direct()
+        self._direct()
+        starts = self.begun
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
         X = [start.kept(k) for start in starts for k in rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
+        self.begun = []
         self.pop = _survivors(infills, self.limits, self.within, self.pop_size)
 
     def _infill(self) -> Population:
@@ -219,40 +224,111 @@ class TargetedSearch(Algorithm):
 
     # ------------------------------------------------------------------------------------------------- the first answer
 
-    def _direct(self) -> list[Start]:
-        """Return nested meshes that reach beyond the wish, if anything does, and down to the smallest one."""
-        surface: Surface = self.problem.surface
-        by, limit = self._choice, self._limit()
-        stop = np.zeros(1, np.bool_)
+    def _direct(self) -> None:
+        """Find nested meshes that reach beyond the wish, if anything does, and down to the smallest one.
 
-        def around(inserted_in: Surface, insert: dict[str, Any], **back: Any) -> Start:
+        Warns
+        -----
+        SearchWarning
+            If the time was up meanwhile.
+        """
+        # the second entry is set by Ctrl-C alone
+        stop = np.zeros(2, np.bool_)
+        (is_cut,) = on_threads(lambda _: self._begin(stop), [None], stop=stop)
+        if is_cut:
+            warnings.warn(
+                f"{self.problem.model.name}: {seconds_given(self):g} s are too short for the first answer, which is not "
+                f"as good as it could be; the search starts from {' and '.join(map(str, self.begun))}",
+                SearchWarning,
+                stacklevel=2,
+            )
+
+    def _begin(self, stop: BoolArray) -> bool:
+        """Look for the first answer and store what there is as it grows; tell whether the time cut it short.
+
+        Each pass may take an even share of the time that is left for it and those after it.
+        """
+        surface: Surface = self.problem.surface
+        ways = self._ways()
+        passes = 2 * len(ways) + sum(holding is not None for *_, holding in ways)
+        is_cut = False
+
+        def timed(work: Callable[[], NestedFront]) -> NestedFront:
+            nonlocal passes, is_cut
+            left = self._seconds_left()
+            stop[0] = False
+            if stop[1]:  # looked at after the other was cleared, so that no Ctrl-C is lost
+                stop[0] = True
+            with stopping(stop, None if left is None else max(left, 0.0) / max(passes, 1)):
+                front = work()
+            passes -= 1
+            is_cut = is_cut or bool(stop[0] and not stop[1])
+            return front
+
+        def thinned(by: Surface, kept: BoolArray | None = None, **back: Any) -> NestedFront:
+            return timed(lambda: thinning(by, kept=kept, stop=stop, **back))
+
+        def around(by: Surface, insert: dict[str, Any], back: dict[str, Any]) -> Start:
             """Insert vertices, and thin them around the wish only: each removal looks at much where few are left."""
             try:
-                inserted = greedy_insertion(inserted_in, stop=stop, **insert)
+                inserted = timed(lambda: greedy_insertion(by, stop=stop, **insert))
             except ValueError:  # the pinned vertices span no triangle: it has nothing to begin with
-                return Start.of(thinning(inserted_in, stop=stop))
-            self.begun = Start.of(inserted)
-            thinned = thinning(inserted_in, kept=inserted.kept(len(inserted) - 1), stop=stop, **back)
-            return Start.of(inserted, thinned)
+                return Start.of(thinned(by))
+            if not inserted.triangles.any():  # stopped before the first triangle
+                return Start.of(thinned(by))
+            start = Start.of(inserted)
+            self.begun = [*starts, start]
+            return start if stop[1] else Start.of(inserted, thinned(by, inserted.kept(len(inserted) - 1), **back))
 
-        starts = []
-        with stopping(stop, seconds_given(self)):
-            if "triangles" in self.limits:
-                size = self.limits["triangles"]
-                most = int(MORE_TRIANGLES * size / 2) + 8  # about two triangles for each vertex
-                starts.append(around(surface, {"choose": by, "most": most}, least=int(size / MORE_TRIANGLES)))
-            elif limit is not None:
-                insert = {"choose": by, "least_error": LESS_ERROR * limit}
-                starts.append(around(surface, insert, most_error=limit / LESS_ERROR))
-            if "max_error" in self.within:
-                tight, least = self._tight()
-                front = around(tight, {"choose": "point", "least_error": least}, most_error=least)
-                k = int(np.flatnonzero(front.error <= least)[0]) if (front.error <= least).any() else len(front) - 1
-                # in the measure that is searched, and somewhat below, where the maximum does not hold
-                back_to = int(front.triangles[k] / MORE_TRIANGLES)
-                starts.append(Start.of(thinning(surface, kept=front.kept(k), least=back_to, stop=stop)))
-        self.begun = None
-        return starts
+        starts: list[Start] = []
+        for by, insert, back, holding in ways:
+            start = around(by, insert, back)
+            self.begun = [*starts, start]
+            if stop[1]:
+                break
+            if holding is not None:
+                k = int(np.argmax(start.error <= holding)) if (start.error <= holding).any() else len(start) - 1
+                # in the measure that is searched, and somewhat below, where this limit does not hold
+                start = Start.of(thinned(surface, start.kept(k), least=int(start.triangles[k] / MORE_TRIANGLES)))
+            starts.append(start)
+            self.begun = starts
+        return is_cut
+
+    def _ways(self) -> list[tuple[Any, dict[str, Any], dict[str, Any], float | None]]:
+        """Return how the first answer is looked for: what counts, how vertices are inserted and thinned back.
+
+        Where it counts another measure than the one that is searched, the error up to which its limit holds too.
+        """
+        surface, limit = self.problem.surface, self._limit()
+        found: list[tuple[Any, dict[str, Any], dict[str, Any], float | None]] = []
+        if "triangles" in self.limits:
+            size = self.limits["triangles"]
+            most = int(MORE_TRIANGLES * size / 2) + 8  # about two triangles for each vertex
+            back = {"least": int(size / MORE_TRIANGLES)}
+            found.append((surface, {"choose": self._choice, "most": most}, back, None))
+            if "max_error" in self.within:  # of so many triangles what comes nearest to it
+                found.append((surface.measuring("max_error"), {"choose": "point", "most": most}, back, None))
+        elif limit is not None:
+            insert = {"choose": self._choice, "least_error": LESS_ERROR * limit}
+            found.append((surface, insert, {"most_error": limit / LESS_ERROR}, None))
+        for by, choose, most_error in self._beside():
+            is_sum = choose == "triangle"
+            insert = {"choose": choose, "least_error": (LESS_ERROR if is_sum else 1.0) * most_error}
+            found.append((by, insert, {"most_error": most_error}, most_error))
+        return found
+
+    def _beside(self) -> list[tuple[Any, str, float]]:
+        """Return for each limit beside the objectives what counts it, which vertex is inserted, and what holds it."""
+        surface = self.problem.surface
+        found = []
+        for name, limit in self.within.items():
+            if name == "max_error":
+                by, most = self._tight()
+                found.append((by, "point", most))
+            else:
+                by = surface.measuring(SEARCHED[name])
+                found.append((by, "triangle", limit * (surface.total_weight if SEARCHED[name] == "error" else 1.0)))
+        return found
 
     def _limit(self) -> float | None:
         """Return the limit of the measure that is searched, as nested fronts count it; None if there is none."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -128,6 +129,15 @@ class HeightSurface:
             raise ValueError(f"most = {most} is no deviation of at least 0")
         other = copy.copy(self)
         other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
+        return other
+
+    def measuring(self, measure: str) -> HeightSurface:
+        """Return this surface with another measure of the error, or itself."""
+        if measure == self.rules.measure:
+            return self
+        other = copy.copy(self)
+        other.rules = replace(self.rules, measure=measure)
+        other.__dict__.pop("_ground", None)
         return other
 
     @contextmanager

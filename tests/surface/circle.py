@@ -12,7 +12,7 @@ import hashlib
 import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -179,6 +179,12 @@ class Circle:
             return self._ground
         measure = OBJECTIVES[self.rules.measure]
         return Round(np.ascontiguousarray(self.places.ravel()), measure.power, measure.is_sum)
+
+    def measuring(self, measure: str) -> Surface:
+        """Return the circle with another measure."""
+        other = copy.copy(self)
+        other.rules = replace(self.rules, measure=measure)
+        return other
 
     def bounded(self, most: float, *, own: float = 0.0) -> Surface:
         """Return the circle for moves that bring all distances down to the most."""
