@@ -156,7 +156,7 @@ class TargetedSearch(Algorithm):
 
     def _infill(self) -> Population:
         left = self._seconds_left()
-        plan = self._plan() if left is None or left > 0.0 else None
+        plan = self._plan(left) if left is None or left > 0.0 else None
         if plan is None:
             self.termination.force_termination = True
             return Population.create()
@@ -171,15 +171,13 @@ class TargetedSearch(Algorithm):
             moves,
             self.random_state,
             triangles=sizes,
-            seconds=left,
+            seconds=None if left is None else max(left - self._settling(len(sizes)), 0.0),
             made=made,
             **(AGAIN if again else FRESH),
         )
         self.is_annealed = "triangles" in goal and self.moves_done > 0
         if "triangles" not in goal:
-            settled = on_threads(self._settled, children)
-            children = np.array([kept for kept, _ in settled])
-            self._adapt(np.array([triangles for _, triangles in settled]))
+            children = self._all_settled(children)
         self.seconds += self._clock() - begun
         self.moves_done += int(made.sum())
         offspring = self.eliminate_duplicates.do(Population.new(X=children), self.pop)
@@ -237,8 +235,8 @@ class TargetedSearch(Algorithm):
         (is_cut,) = on_threads(lambda _: self._begin(stop), [None], stop=stop)
         if is_cut:
             warnings.warn(
-                f"{self.problem.model.name}: {seconds_given(self):g} s are too short for the first answer, which is not "
-                f"as good as it could be; the search starts from {' and '.join(map(str, self.begun))}",
+                f"{self.problem.model.name}: {seconds_given(self):g} s are too short for the whole of the first "
+                f"answer; the search starts from {' and '.join(map(str, self.begun))}",
                 SearchWarning,
                 stacklevel=2,
             )
@@ -318,10 +316,13 @@ class TargetedSearch(Algorithm):
         return found
 
     def _beside(self) -> list[tuple[Any, str, float]]:
-        """Return for each limit beside the objectives what counts it, which vertex is inserted, and what holds it."""
+        """Return what counts each limit beside the objectives, which vertex is inserted, and the error that holds it.
+
+        The maximum is the first.
+        """
         surface = self.problem.surface
-        found = []
-        for name, limit in self.within.items():
+        found: list[tuple[Any, str, float]] = []
+        for name, limit in sorted(self.within.items(), key=lambda item: item[0] != "max_error"):
             if name == "max_error":
                 by, most = self._tight()
                 found.append((by, "point", most))
@@ -392,24 +393,37 @@ class TargetedSearch(Algorithm):
         factor = (best + 1) / 2.0 if triangles[best] < now else 0.5
         self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
 
-    def _settled(self, kept: BoolArray) -> tuple[BoolArray, float]:
-        """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles."""
-        limit, surface = self._limit(), self.problem.surface
-        by, most = surface, limit
-        if "max_error" in self.within:
-            by, most = self._tight()
-            grown = greedy_insertion(by, kept, choose="point", least_error=most)
-            kept = grown.kept(len(grown) - 1)
-        if limit is not None:
-            grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
-            kept = grown.kept(len(grown) - 1)
-        assert most is not None
-        front = thinning(by, kept=kept, most_error=most)
-        wanted = self._smallest(front) if self.within else self._wanted(front)
-        return (kept, np.inf) if wanted is None else (front.kept(wanted), float(front.triangles[wanted]))
+    def _all_settled(self, children: BoolArray) -> BoolArray:
+        """Return the subsets that hold the wish, one of each child for which there is time."""
+        left, stop = self._seconds_left(), np.zeros(1, np.bool_)
+        with stopping(stop, None if left is None else max(left, 0.0)):
+            settled = on_threads(lambda kept: self._settled(kept, stop), children, stop=stop)
+        if not stop[0]:
+            self._adapt(np.array([triangles for _, triangles in settled]))
+        done = [kept for kept, _ in settled if kept is not None]
+        return np.array(done, np.bool_).reshape(len(done), children.shape[1])
 
-    def _smallest(self, front: NestedFront) -> int | None:
-        """Return the smallest subset that holds all limits but the triangles, by measuring some of them."""
+    def _settled(self, kept: BoolArray, stop: BoolArray) -> tuple[BoolArray | None, float]:
+        """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles.
+
+        Where it was stopped before anything held there is none.
+        """
+        limit, surface = self._limit(), self.problem.surface
+        ways = self._beside() + ([] if limit is None else [(surface, self._choice, limit)])
+        for by, choose, most in ways:
+            grown = greedy_insertion(by, kept, choose=choose, least_error=most, stop=stop)
+            kept = grown.kept(len(grown) - 1)
+            if stop[0]:
+                return None, np.inf
+        by, _, most = ways[0] if "max_error" in self.within else ways[-1]
+        front = thinning(by, kept=kept, most_error=most, stop=stop)
+        wanted = self._smallest(front, stop) if self.within else self._wanted(front)
+        if wanted is not None:
+            return front.kept(wanted), float(front.triangles[wanted])
+        return None if stop[0] else kept, np.inf
+
+    def _smallest(self, front: NestedFront, stop: BoolArray) -> int | None:
+        """Return the smallest subset that holds all limits but the triangles, by measuring some until it is stopped."""
 
         def holds(k: int) -> bool:
             quality = self.problem.as_quality(self.problem.surface.evaluate(front.kept(k)[None])[0])
@@ -417,9 +431,11 @@ class TargetedSearch(Algorithm):
 
         errors = {name: limit for name, limit in self.limits.items() if name != "triangles"}
         low, high = 0, len(front) - 1
-        if not holds(high):
+        if holds(low):
+            return low
+        if stop[0] or not holds(high):
             return None
-        while low < high:
+        while low < high and not stop[0]:
             middle = (low + high) // 2
             low, high = (low, middle) if holds(middle) else (middle + 1, high)
         return high
@@ -429,7 +445,7 @@ class TargetedSearch(Algorithm):
         """Which vertex is inserted for the measure that is searched."""
         return "point" if self.problem.objectives[0] == "max_error" else "triangle"
 
-    def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
+    def _plan(self, seconds: float | None) -> tuple[BoolArray, IntArray, IntArray] | None:
         """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
         T, goal = self.pop.get("F")[:, -1], self._goal
         if "triangles" in goal:
@@ -453,7 +469,7 @@ class TargetedSearch(Algorithm):
         parents = [self._parent(size) for size in sizes]
         kept = self.pop.get("X")[parents]
         work = np.maximum((kept & ~self.problem.pinned).sum(axis=1), 1)
-        moves = self._moves(sizes, shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        moves = self._moves(seconds, sizes, shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
         return (kept, sizes, moves) if moves.any() else None
 
     def _parent(self, size: int) -> int:
@@ -464,9 +480,9 @@ class TargetedSearch(Algorithm):
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
 
-    def _moves(self, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
+    def _moves(self, seconds: float | None, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
-        budget, seconds = part_of(self.termination, Moves), self._seconds_left()
+        budget = part_of(self.termination, Moves)
         at_once = "triangles" in self.limits and not self.within
         most = [SLOWEST * work]
         if budget is not None:
@@ -477,7 +493,7 @@ class TargetedSearch(Algorithm):
             a_move = self.seconds / self.moves_done if self.moves_done and self.seconds > 0.0 else guess
             begin = SECONDS_TO_BEGIN * self.problem.n_var * len(sizes) / 2.0
             if begin > LONG_BEGIN * seconds:
-                most.append(max(seconds - begin, 0.1 * seconds) / a_move)
+                most.append(max(seconds - begin - self._settling(len(sizes)), 0.0) / a_move)
             else:
                 most.append(_next_share(self.moves_done, seconds / a_move, at_once))
         if len(most) == 1:
@@ -485,6 +501,12 @@ class TargetedSearch(Algorithm):
         whole = int(min(most))
         moves = np.diff(np.round(np.cumsum(weights) / weights.sum() * whole), prepend=0.0)
         return moves.astype(np.int64)
+
+    def _settling(self, n: int) -> float:
+        """Return about how long it takes until so many annealed meshes hold the wish [s]."""
+        if "triangles" in self._goal:
+            return 0.0
+        return SECONDS_TO_BEGIN * self.problem.n_var * n / 2.0 * (2 + len(self.within))
 
     def _seconds_left(self, *, whole: bool = False) -> float | None:
         """Return the seconds left for the search, or for its end too; None: there is no limit."""

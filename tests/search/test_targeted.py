@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import count
+
 import numpy as np
 import pytest
 from pymoo.optimize import minimize
@@ -239,11 +241,35 @@ def test_a_first_answer_that_is_cut_short_is_said_and_is_a_mesh(monkeypatch, mod
         return greedy_insertion(*args, stop=stop, **how)
 
     monkeypatch.setattr(search, "greedy_insertion", late)
-    with pytest.warns(SearchWarning, match=r"60 s are too short for the first answer, .* starts from meshes of \d"):
+    with pytest.warns(SearchWarning, match=r"60 s are too short for the whole of the .* starts from meshes of \d"):
         algorithm = minimize(
             MeshProblem(model), targeted(triangles=50), ("time", 60), seed=1, callback=_ended
         ).algorithm
     assert algorithm.answer.F[1] > 0
+
+
+def test_what_is_settled_when_the_time_is_up_is_handed_over(monkeypatch):
+    problem = MeshProblem(MODEL)
+    algorithm = targeted(mean_error=6.0, max_error=25.0).setup(problem, termination=Moves(QUICK), seed=1)
+    algorithm.next()
+    kept = algorithm.answer.X
+    done = algorithm._settled(kept, np.zeros(1, bool))[0]
+    assert shortfall(vars(problem.quality(done)), algorithm.limits) == 0.0
+    assert algorithm._settled(kept, np.ones(1, bool)) == (None, np.inf)
+    children = np.array([kept] * 4)
+    assert algorithm._all_settled(children).tolist() == [done.tolist()] * 4
+    monkeypatch.setattr(algorithm, "_seconds_left", lambda: 0.0)
+    begun = count()
+
+    def slow(kept, stop):
+        if next(begun) < 2:
+            return kept, 1.0
+        while not stop[0]:
+            pass
+        return None, np.inf
+
+    monkeypatch.setattr(algorithm, "_settled", slow)
+    assert len(algorithm._all_settled(children)) == 2
 
 
 def _ended(algorithm):
