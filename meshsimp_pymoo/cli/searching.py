@@ -250,8 +250,8 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             stop_if_interrupted()
     except KeyboardInterrupt:
         interrupted, until = True, time.perf_counter() + WAIT_SECONDS
-        if found is None and (start_so_far := begun(problem.surface)) is not None:
-            say(f"the search had not begun yet; the front is of {start_so_far}, of its start")
+        if found is None and (starts := _begun(problem, algorithm)):
+            say(f"the search had not begun yet; the front is of {' and '.join(map(str, starts))}, of its start")
     X = np.asarray(found.get("X"), dtype=bool) if found is not None else _subsets_begun(problem, algorithm)
     if X is None:
         return None
@@ -282,23 +282,34 @@ def _answer_in_words(algorithm: Any, *, first: bool) -> str:
     return f"{'first answer' if first else 'best so far'}: {', '.join(said)}"
 
 
+def _begun(problem: MeshProblem, algorithm: Any) -> list[Start]:
+    """Return what there is of a search's start."""
+    if isinstance(algorithm, TargetedSearch):
+        return algorithm.begun
+    start = begun(problem.surface) if isinstance(_sampling(algorithm), NestedSubsets) else None
+    return [] if start is None else [start]
+
+
+def _sampling(algorithm: Any) -> Any:
+    return getattr(getattr(algorithm, "initialization", None), "sampling", None)
+
+
 def _subsets_begun(problem: MeshProblem, algorithm: Any) -> NDArray[np.bool_] | None:
     """Return subsets of what there is of a search's start, as many as can be measured soon; None if there is none."""
-    start: Start | None
-    if isinstance(algorithm, TargetedSearch):
-        start = algorithm.begun
-        rows = None if start is None else np.array(rungs(start, algorithm.pop_size))
-    else:
-        sampling: Any = getattr(getattr(algorithm, "initialization", None), "sampling", None)
-        start = begun(problem.surface) if isinstance(sampling, NestedSubsets) else None
-        rows = None if start is None else np.unique(sampling.rows(start, algorithm.pop_size))
-    if start is None or rows is None:
+    starts = _begun(problem, algorithm)
+    if not starts:
         return None
-    seconds = SECONDS_A_VERTEX * problem.n_var + SECONDS_A_TRIANGLE * start.triangles[rows]
+    if isinstance(algorithm, TargetedSearch):
+        n = -(-algorithm.pop_size // len(starts))
+        rows = [(start, k) for start in starts for k in rungs(start, n)]
+    else:
+        rows = [(starts[0], int(k)) for k in np.unique(_sampling(algorithm).rows(starts[0], algorithm.pop_size))]
+    triangles = np.array([start.triangles[k] for start, k in rows])
+    seconds = SECONDS_A_VERTEX * problem.n_var + SECONDS_A_TRIANGLE * triangles
     order = spread(len(rows))
     in_time = np.cumsum(seconds[order]) <= MEASURED_SHARE * WAIT_SECONDS
     chosen = [row for row, fits in zip(order, in_time, strict=True) if fits] or [0]
-    return np.array([start.kept(int(rows[row])) for row in sorted(chosen)])
+    return np.array([rows[row][0].kept(rows[row][1]) for row in sorted(chosen)])
 
 
 class Keeper:

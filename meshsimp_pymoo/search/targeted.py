@@ -19,6 +19,8 @@ References
 from __future__ import annotations
 
 import time
+import warnings
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
@@ -29,6 +31,7 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
+from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
@@ -37,7 +40,7 @@ from meshsimp_pymoo.search.memetic import measurable
 from meshsimp_pymoo.search.operators import PackedDuplicates
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start
-from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
+from meshsimp_pymoo.search.wishes import SEARCHED, USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
@@ -108,8 +111,8 @@ class TargetedSearch(Algorithm):
         self.is_annealed = False
         self.moves_done = 0
         self.seconds = 0.0
-        #: What there is of the first answer while it is looked for.
-        self.begun: Start | None = None
+        #: What there is of the first answer until it is measured.
+        self.begun: list[Start] = []
 
     @property
     def moves(self) -> int:
@@ -141,17 +144,19 @@ class TargetedSearch(Algorithm):
         super()._setup(problem, **kwargs)
 
     def _initialize_infill(self) -> Population:
-        starts = self._direct()
+        self._direct()
+        starts = self.begun
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
         X = [start.kept(k) for start in starts for k in rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
+        self.begun = []
         self.pop = _survivors(infills, self.limits, self.within, self.pop_size)
 
     def _infill(self) -> Population:
         left = self._seconds_left()
-        plan = self._plan() if left is None or left > 0.0 else None
+        plan = self._plan(left) if left is None or left > 0.0 else None
         if plan is None:
             self.termination.force_termination = True
             return Population.create()
@@ -166,15 +171,13 @@ class TargetedSearch(Algorithm):
             moves,
             self.random_state,
             triangles=sizes,
-            seconds=left,
+            seconds=None if left is None else max(left - self._settling(len(sizes)), 0.0),
             made=made,
             **(AGAIN if again else FRESH),
         )
         self.is_annealed = "triangles" in goal and self.moves_done > 0
         if "triangles" not in goal:
-            settled = on_threads(self._settled, children)
-            children = np.array([kept for kept, _ in settled])
-            self._adapt(np.array([triangles for _, triangles in settled]))
+            children = self._all_settled(children)
         self.seconds += self._clock() - begun
         self.moves_done += int(made.sum())
         offspring = self.eliminate_duplicates.do(Population.new(X=children), self.pop)
@@ -219,40 +222,114 @@ class TargetedSearch(Algorithm):
 
     # ------------------------------------------------------------------------------------------------- the first answer
 
-    def _direct(self) -> list[Start]:
-        """Return nested meshes that reach beyond the wish, if anything does, and down to the smallest one."""
-        surface: Surface = self.problem.surface
-        by, limit = self._choice, self._limit()
-        stop = np.zeros(1, np.bool_)
+    def _direct(self) -> None:
+        """Find nested meshes that reach beyond the wish, if anything does, and down to the smallest one.
 
-        def around(inserted_in: Surface, insert: dict[str, Any], **back: Any) -> Start:
+        Warns
+        -----
+        SearchWarning
+            If the time was up meanwhile.
+        """
+        # the second entry is set by Ctrl-C alone
+        stop = np.zeros(2, np.bool_)
+        (is_cut,) = on_threads(lambda _: self._begin(stop), [None], stop=stop)
+        if is_cut:
+            warnings.warn(
+                f"{self.problem.model.name}: {seconds_given(self):g} s are too short for the whole of the first "
+                f"answer; the search starts from {' and '.join(map(str, self.begun))}",
+                SearchWarning,
+                stacklevel=2,
+            )
+
+    def _begin(self, stop: BoolArray) -> bool:
+        """Look for the first answer and store what there is as it grows; tell whether the time cut it short.
+
+        Each pass may take an even share of the time that is left for it and those after it.
+        """
+        surface: Surface = self.problem.surface
+        ways = self._ways()
+        passes = 2 * len(ways) + sum(holding is not None for *_, holding in ways)
+        is_cut = False
+
+        def timed(work: Callable[[], NestedFront]) -> NestedFront:
+            nonlocal passes, is_cut
+            left = self._seconds_left()
+            stop[0] = False
+            if stop[1]:  # looked at after the other was cleared, so that no Ctrl-C is lost
+                stop[0] = True
+            with stopping(stop, None if left is None else max(left, 0.0) / max(passes, 1)):
+                front = work()
+            passes -= 1
+            is_cut = is_cut or bool(stop[0] and not stop[1])
+            return front
+
+        def thinned(by: Surface, kept: BoolArray | None = None, **back: Any) -> NestedFront:
+            return timed(lambda: thinning(by, kept=kept, stop=stop, **back))
+
+        def around(by: Surface, insert: dict[str, Any], back: dict[str, Any]) -> Start:
             """Insert vertices, and thin them around the wish only: each removal looks at much where few are left."""
             try:
-                inserted = greedy_insertion(inserted_in, stop=stop, **insert)
+                inserted = timed(lambda: greedy_insertion(by, stop=stop, **insert))
             except ValueError:  # the pinned vertices span no triangle: it has nothing to begin with
-                return Start.of(thinning(inserted_in, stop=stop))
-            self.begun = Start.of(inserted)
-            thinned = thinning(inserted_in, kept=inserted.kept(len(inserted) - 1), stop=stop, **back)
-            return Start.of(inserted, thinned)
+                return Start.of(thinned(by))
+            if not inserted.triangles.any():  # stopped before the first triangle
+                return Start.of(thinned(by))
+            start = Start.of(inserted)
+            self.begun = [*starts, start]
+            return start if stop[1] else Start.of(inserted, thinned(by, inserted.kept(len(inserted) - 1), **back))
 
-        starts = []
-        with stopping(stop, seconds_given(self)):
-            if "triangles" in self.limits:
-                size = self.limits["triangles"]
-                most = int(MORE_TRIANGLES * size / 2) + 8  # about two triangles for each vertex
-                starts.append(around(surface, {"choose": by, "most": most}, least=int(size / MORE_TRIANGLES)))
-            elif limit is not None:
-                insert = {"choose": by, "least_error": LESS_ERROR * limit}
-                starts.append(around(surface, insert, most_error=limit / LESS_ERROR))
-            if "max_error" in self.within:
-                tight, least = self._tight()
-                front = around(tight, {"choose": "point", "least_error": least}, most_error=least)
-                k = int(np.flatnonzero(front.error <= least)[0]) if (front.error <= least).any() else len(front) - 1
-                # in the measure that is searched, and somewhat below, where the maximum does not hold
-                back_to = int(front.triangles[k] / MORE_TRIANGLES)
-                starts.append(Start.of(thinning(surface, kept=front.kept(k), least=back_to, stop=stop)))
-        self.begun = None
-        return starts
+        starts: list[Start] = []
+        for by, insert, back, holding in ways:
+            start = around(by, insert, back)
+            self.begun = [*starts, start]
+            if stop[1]:
+                break
+            if holding is not None:
+                k = int(np.argmax(start.error <= holding)) if (start.error <= holding).any() else len(start) - 1
+                # in the measure that is searched, and somewhat below, where this limit does not hold
+                start = Start.of(thinned(surface, start.kept(k), least=int(start.triangles[k] / MORE_TRIANGLES)))
+            starts.append(start)
+            self.begun = starts
+        return is_cut
+
+    def _ways(self) -> list[tuple[Any, dict[str, Any], dict[str, Any], float | None]]:
+        """Return how the first answer is looked for: what counts, how vertices are inserted and thinned back.
+
+        Where it counts another measure than the one that is searched, the error up to which its limit holds too.
+        """
+        surface, limit = self.problem.surface, self._limit()
+        found: list[tuple[Any, dict[str, Any], dict[str, Any], float | None]] = []
+        if "triangles" in self.limits:
+            size = self.limits["triangles"]
+            most = int(MORE_TRIANGLES * size / 2) + 8  # about two triangles for each vertex
+            back = {"least": int(size / MORE_TRIANGLES)}
+            found.append((surface, {"choose": self._choice, "most": most}, back, None))
+            if "max_error" in self.within:  # of so many triangles what comes nearest to it
+                found.append((surface.measuring("max_error"), {"choose": "point", "most": most}, back, None))
+        elif limit is not None:
+            insert = {"choose": self._choice, "least_error": LESS_ERROR * limit}
+            found.append((surface, insert, {"most_error": limit / LESS_ERROR}, None))
+        for by, choose, most_error in self._beside():
+            is_sum = choose == "triangle"
+            insert = {"choose": choose, "least_error": (LESS_ERROR if is_sum else 1.0) * most_error}
+            found.append((by, insert, {"most_error": most_error}, most_error))
+        return found
+
+    def _beside(self) -> list[tuple[Any, str, float]]:
+        """Return what counts each limit beside the objectives, which vertex is inserted, and the error that holds it.
+
+        The maximum is the first.
+        """
+        surface = self.problem.surface
+        found: list[tuple[Any, str, float]] = []
+        for name, limit in sorted(self.within.items(), key=lambda item: item[0] != "max_error"):
+            if name == "max_error":
+                by, most = self._tight()
+                found.append((by, "point", most))
+            else:
+                by = surface.measuring(SEARCHED[name])
+                found.append((by, "triangle", limit * (surface.total_weight if SEARCHED[name] == "error" else 1.0)))
+        return found
 
     def _limit(self) -> float | None:
         """Return the limit of the measure that is searched, as nested fronts count it; None if there is none."""
@@ -316,24 +393,37 @@ class TargetedSearch(Algorithm):
         factor = (best + 1) / 2.0 if triangles[best] < now else 0.5
         self.step = min(max(factor * self.step, STEPS[0]), STEPS[1])
 
-    def _settled(self, kept: BoolArray) -> tuple[BoolArray, float]:
-        """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles."""
-        limit, surface = self._limit(), self.problem.surface
-        by, most = surface, limit
-        if "max_error" in self.within:
-            by, most = self._tight()
-            grown = greedy_insertion(by, kept, choose="point", least_error=most)
-            kept = grown.kept(len(grown) - 1)
-        if limit is not None:
-            grown = greedy_insertion(surface, kept, choose=self._choice, least_error=limit)
-            kept = grown.kept(len(grown) - 1)
-        assert most is not None
-        front = thinning(by, kept=kept, most_error=most)
-        wanted = self._smallest(front) if self.within else self._wanted(front)
-        return (kept, np.inf) if wanted is None else (front.kept(wanted), float(front.triangles[wanted]))
+    def _all_settled(self, children: BoolArray) -> BoolArray:
+        """Return the subsets that hold the wish, one of each child for which there is time."""
+        left, stop = self._seconds_left(), np.zeros(1, np.bool_)
+        with stopping(stop, None if left is None else max(left, 0.0)):
+            settled = on_threads(lambda kept: self._settled(kept, stop), children, stop=stop)
+        if not stop[0]:
+            self._adapt(np.array([triangles for _, triangles in settled]))
+        done = [kept for kept, _ in settled if kept is not None]
+        return np.array(done, np.bool_).reshape(len(done), children.shape[1])
 
-    def _smallest(self, front: NestedFront) -> int | None:
-        """Return the smallest subset that holds all limits but the triangles, by measuring some of them."""
+    def _settled(self, kept: BoolArray, stop: BoolArray) -> tuple[BoolArray | None, float]:
+        """Return a subset with vertices inserted until it holds, and thinned while it does, and its triangles.
+
+        Where it was stopped before anything held there is none.
+        """
+        limit, surface = self._limit(), self.problem.surface
+        ways = self._beside() + ([] if limit is None else [(surface, self._choice, limit)])
+        for by, choose, most in ways:
+            grown = greedy_insertion(by, kept, choose=choose, least_error=most, stop=stop)
+            kept = grown.kept(len(grown) - 1)
+            if stop[0]:
+                return None, np.inf
+        by, _, most = ways[0] if "max_error" in self.within else ways[-1]
+        front = thinning(by, kept=kept, most_error=most, stop=stop)
+        wanted = self._smallest(front, stop) if self.within else self._wanted(front)
+        if wanted is not None:
+            return front.kept(wanted), float(front.triangles[wanted])
+        return None if stop[0] else kept, np.inf
+
+    def _smallest(self, front: NestedFront, stop: BoolArray) -> int | None:
+        """Return the smallest subset that holds all limits but the triangles, by measuring some until it is stopped."""
 
         def holds(k: int) -> bool:
             quality = self.problem.as_quality(self.problem.surface.evaluate(front.kept(k)[None])[0])
@@ -341,9 +431,11 @@ class TargetedSearch(Algorithm):
 
         errors = {name: limit for name, limit in self.limits.items() if name != "triangles"}
         low, high = 0, len(front) - 1
-        if not holds(high):
+        if holds(low):
+            return low
+        if stop[0] or not holds(high):
             return None
-        while low < high:
+        while low < high and not stop[0]:
             middle = (low + high) // 2
             low, high = (low, middle) if holds(middle) else (middle + 1, high)
         return high
@@ -353,7 +445,7 @@ class TargetedSearch(Algorithm):
         """Which vertex is inserted for the measure that is searched."""
         return "point" if self.problem.objectives[0] == "max_error" else "triangle"
 
-    def _plan(self) -> tuple[BoolArray, IntArray, IntArray] | None:
+    def _plan(self, seconds: float | None) -> tuple[BoolArray, IntArray, IntArray] | None:
         """Return where the next generation begins, its numbers of triangles, and its moves; None: nothing is left."""
         T, goal = self.pop.get("F")[:, -1], self._goal
         if "triangles" in goal:
@@ -377,7 +469,7 @@ class TargetedSearch(Algorithm):
         parents = [self._parent(size) for size in sizes]
         kept = self.pop.get("X")[parents]
         work = np.maximum((kept & ~self.problem.pinned).sum(axis=1), 1)
-        moves = self._moves(sizes, shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
+        moves = self._moves(seconds, sizes, shares * np.minimum(work, 2.0 * sizes), shares.sum() * float(work.max()))
         return (kept, sizes, moves) if moves.any() else None
 
     def _parent(self, size: int) -> int:
@@ -388,9 +480,9 @@ class TargetedSearch(Algorithm):
         larger = np.flatnonzero(size <= T)
         return int(larger[np.argmin(T[larger])]) if len(larger) else int(np.argmax(T))
 
-    def _moves(self, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
+    def _moves(self, seconds: float | None, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
-        budget, seconds = part_of(self.termination, Moves), self._seconds_left()
+        budget = part_of(self.termination, Moves)
         at_once = "triangles" in self.limits and not self.within
         most = [SLOWEST * work]
         if budget is not None:
@@ -401,7 +493,7 @@ class TargetedSearch(Algorithm):
             a_move = self.seconds / self.moves_done if self.moves_done and self.seconds > 0.0 else guess
             begin = SECONDS_TO_BEGIN * self.problem.n_var * len(sizes) / 2.0
             if begin > LONG_BEGIN * seconds:
-                most.append(max(seconds - begin, 0.1 * seconds) / a_move)
+                most.append(max(seconds - begin - self._settling(len(sizes)), 0.0) / a_move)
             else:
                 most.append(_next_share(self.moves_done, seconds / a_move, at_once))
         if len(most) == 1:
@@ -409,6 +501,12 @@ class TargetedSearch(Algorithm):
         whole = int(min(most))
         moves = np.diff(np.round(np.cumsum(weights) / weights.sum() * whole), prepend=0.0)
         return moves.astype(np.int64)
+
+    def _settling(self, n: int) -> float:
+        """Return about how long it takes until so many annealed meshes hold the wish [s]."""
+        if "triangles" in self._goal:
+            return 0.0
+        return SECONDS_TO_BEGIN * self.problem.n_var * n / 2.0 * (2 + len(self.within))
 
     def _seconds_left(self, *, whole: bool = False) -> float | None:
         """Return the seconds left for the search, or for its end too; None: there is no limit."""

@@ -190,6 +190,10 @@ class GridSurface:
     def ground(self) -> None:
         """Return that meshes are evaluated here, but not moved."""
 
+    def measuring(self, measure: str) -> Surface:
+        """Refuse, as :meth:`ground` says."""
+        raise self._no_moves()
+
     def bounded(self, most: float, *, own: float = 0.0) -> Surface:
         """Refuse, as :meth:`ground` says."""
         raise self._no_moves()

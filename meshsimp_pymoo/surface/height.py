@@ -134,6 +134,15 @@ class HeightSurface:
         other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
         return other
 
+    def measuring(self, measure: str) -> HeightSurface:
+        """Return this surface with another measure of the error, or itself."""
+        if measure == self.rules.measure:
+            return self
+        other = copy.copy(self)
+        other.rules = replace(self.rules, measure=measure)
+        other.__dict__.pop("_ground", None)
+        return other
+
     @contextmanager
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Live]:
         """Lend the live triangulation of a subset; of several kept vertices at one place, a fixed one is the site."""

@@ -277,6 +277,10 @@ class Surface(Protocol):
         """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
         ...
 
+    def measuring(self, measure: str) -> Surface:
+        """Return this surface with another measure of the error for moves, or itself where it is that one."""
+        ...
+
     def bounded(self, most: float, *, own: float = 0.0) -> Surface:
         """Return this surface for moves that bring all deviations down to ``most`` [model units].
 

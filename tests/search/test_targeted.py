@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import count
+
 import numpy as np
 import pytest
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo import Front, HeightSurface, MeshProblem, Missed, Moves, simplify_to, targeted
+from meshsimp_pymoo.errors import SearchWarning
+from meshsimp_pymoo.search import targeted as search
 from meshsimp_pymoo.search.checkpoint import Checkpoints, read_checkpoint, restore
+from meshsimp_pymoo.search.greedy import greedy_insertion
 from meshsimp_pymoo.search.wishes import beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.workers import thread_pool
 
@@ -184,3 +189,88 @@ def test_limits_are_put_in_order():
     assert shortfall(
         {"max_error": np.array([1.0, 3.0]), "triangles": np.array([5, 4])}, {"max_error": 2.0, "triangles": 4}
     ).tolist() == [0.25, 0.5]
+
+
+# -------------------------------------------------------------------------------- time and Ctrl-C in the first answer
+
+
+@pytest.mark.parametrize(
+    ("limits", "passes"),
+    [({"triangles": 90}, 1), ({"triangles": 90}, 2), *(({"mean_error": 6.0, "max_error": 25.0}, n) for n in (1, 3, 4))],
+)
+def test_ctrl_c_in_any_pass_of_the_first_answer_leaves_what_there_is(monkeypatch, limits, passes):
+    problem = MeshProblem(MODEL)
+    begun = []
+
+    def interrupted(work):
+        def one(*args, stop, **how):
+            begun.append(len(begun))
+            if len(begun) == passes:
+                stop[:] = True  # as on_threads does
+            return work(*args, stop=stop, **how)
+
+        return one
+
+    for name in ("greedy_insertion", "thinning"):
+        monkeypatch.setattr(search, name, interrupted(getattr(search, name)))
+    algorithm = targeted(**limits).setup(problem, termination=Moves(QUICK), seed=1)
+    algorithm._direct()
+    assert len(begun) == passes  # what else was to be done is left
+    start = algorithm.begun[-1]
+    k = search.rungs(start, 5)[-1]
+    assert problem.quality(start.kept(k)).triangles == start.triangles[k] > 0
+
+
+def test_ctrl_c_while_the_first_answer_is_measured_leaves_it(monkeypatch):
+    problem = MeshProblem(MODEL)
+    algorithm = targeted(triangles=90).setup(problem, termination=Moves(QUICK), seed=1)
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(algorithm.evaluator, "eval", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        algorithm.next()
+    assert any((start.triangles == 90).any() for start in algorithm.begun)
+
+
+@pytest.mark.parametrize("model", ["horseshoe", MODEL])
+def test_a_first_answer_that_is_cut_short_is_said_and_is_a_mesh(monkeypatch, model):
+    def late(*args, stop, **how):
+        stop[0] = True
+        return greedy_insertion(*args, stop=stop, **how)
+
+    monkeypatch.setattr(search, "greedy_insertion", late)
+    with pytest.warns(SearchWarning, match=r"60 s are too short for the whole of the .* starts from meshes of \d"):
+        algorithm = minimize(
+            MeshProblem(model), targeted(triangles=50), ("time", 60), seed=1, callback=_ended
+        ).algorithm
+    assert algorithm.answer.F[1] > 0
+
+
+def test_what_is_settled_when_the_time_is_up_is_handed_over(monkeypatch):
+    problem = MeshProblem(MODEL)
+    algorithm = targeted(mean_error=6.0, max_error=25.0).setup(problem, termination=Moves(QUICK), seed=1)
+    algorithm.next()
+    kept = algorithm.answer.X
+    done = algorithm._settled(kept, np.zeros(1, bool))[0]
+    assert shortfall(vars(problem.quality(done)), algorithm.limits) == 0.0
+    assert algorithm._settled(kept, np.ones(1, bool)) == (None, np.inf)
+    children = np.array([kept] * 4)
+    assert algorithm._all_settled(children).tolist() == [done.tolist()] * 4
+    monkeypatch.setattr(algorithm, "_seconds_left", lambda: 0.0)
+    begun = count()
+
+    def slow(kept, stop):
+        if next(begun) < 2:
+            return kept, 1.0
+        while not stop[0]:
+            pass
+        return None, np.inf
+
+    monkeypatch.setattr(algorithm, "_settled", slow)
+    assert len(algorithm._all_settled(children)) == 2
+
+
+def _ended(algorithm):
+    algorithm.termination.force_termination = True

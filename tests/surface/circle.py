@@ -180,6 +180,12 @@ class Circle:
         measure = OBJECTIVES[self.rules.measure]
         return Round(np.ascontiguousarray(self.places.ravel()), measure.power, measure.is_sum)
 
+    def measuring(self, measure: str) -> Surface:
+        """Return the circle with another measure."""
+        other = copy.copy(self)
+        other.rules = replace(self.rules, measure=measure)
+        return other
+
     def bounded(self, most: float, *, own: float = 0.0) -> Surface:
         """Return the circle for moves that bring all distances down to the most."""
         other = copy.copy(self)
