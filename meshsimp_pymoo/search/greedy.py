@@ -244,6 +244,8 @@ def _fixed(surface: Surface, pinned: BoolArray | None) -> BoolArray:
 # A site of more cells than this is a hub; it is costed again after this share of them has seen a removal.
 HUB = 48
 PATIENCE = 0.125
+# How often all sites are costed again where the one that adds the least adds too much.
+MOST_PASSES = 4
 
 # ------------------------------------------------------------------------------------------------- a heap of keys
 
@@ -361,6 +363,8 @@ def thin(
     error[0] = error_now(g, live)
     triangles[0] = n_triangles(g, live)
     n_removed = 0
+    is_fresh = True  # whether all sites were costed since the last removal
+    n_passes = 0
     around = np.empty(2 * n_all + 8, np.int64)
     while n > 0 and triangles[n_removed] > least and not stop[0]:
         v = heap[0]
@@ -394,9 +398,27 @@ def thin(
         error[n_removed] = error_now(g, live)
         triangles[n_removed] = n_triangles(g, live)
         if error[n_removed] > most:
+            # Too much; but at an outline a site may cost something else since it was costed, as others went.
             exchange(g, live, -1, v)
             n_removed -= 1
-            break
+            before = key[2 * v]
+            _cost_again(g, live, v, key, patience)
+            heap[n] = v
+            at[v] = n
+            n += 1
+            _sift_up(heap, at, key, n - 1)
+            if key[2 * v] > before:
+                continue
+            if is_fresh or n_passes == MOST_PASSES:
+                break
+            for k in range(n):
+                _cost_again(g, live, heap[k], key, patience)
+            for k in range(n // 2 - 1, -1, -1):
+                _sift_down(heap, at, key, k, n)
+            is_fresh = True
+            n_passes += 1
+            continue
+        is_fresh = False
         if triangles[n_removed] == 0:
             # The last mesh was the smallest one there is.
             n_removed -= 1

@@ -307,7 +307,9 @@ class TargetedSearch(Algorithm):
             if "max_error" in self.within:  # of so many triangles what comes nearest to it
                 found.append((surface.measuring("max_error"), {"choose": "point", "most": most}, back, None))
         elif limit is not None:
-            insert = {"choose": self._choice, "least_error": LESS_ERROR * limit}
+            # by the worst point what is inserted beyond the wish is not what would be left by thinning
+            less = 1.0 if self._choice == "point" else LESS_ERROR
+            insert = {"choose": self._choice, "least_error": less * limit}
             found.append((surface, insert, {"most_error": limit / LESS_ERROR}, None))
         for by, choose, most_error in self._beside():
             is_sum = choose == "triangle"

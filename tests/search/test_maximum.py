@@ -9,6 +9,7 @@ from samples import holey_grid, surface
 
 from meshsimp_pymoo import LiveTriangulation, MeshProblem, Moves, greedy_insertion, memetic, thinning
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.search.local_search import relocate
 from meshsimp_pymoo.surface.model import build_model
 
@@ -146,3 +147,18 @@ def test_what_begins_a_mesh_is_tried_as_it_is_done(measure):
     assert live.try_insert(int(begins[0])) == (-np.inf, 1)
     assert live.insert(int(begins[0])) == -np.inf
     assert np.isfinite(live.error)
+
+
+@pytest.mark.parametrize("measure", ["error", "max_error"])
+def test_where_thinning_ends_before_an_error_no_removal_holds_it_though_outlines_change_what_others_cost(measure):
+    rng = np.random.default_rng(3)
+    heights = rng.normal(size=(20, 20)).cumsum(0).cumsum(1) * 0.03
+    heights[rng.random(heights.shape) < 0.2] = np.nan
+    rated = surface(build_model(grid_source(heights, 1.0, 1.0), up="z"), measure=measure)
+    most = 0.3 if measure == "max_error" else 10.0
+    front = thinning(rated, most_error=most)
+    live = LiveTriangulation(rated, front.kept(0))
+    assert live.error <= most
+    left = [live.try_remove(int(v))[0] for v in np.flatnonzero(live.kept & ~rated.pinned)]
+    assert live.error + min(left) > most
+    assert live.triangles < len(rated.faces) / 2
