@@ -149,6 +149,7 @@ def test_what_begins_a_mesh_is_tried_as_it_is_done(measure):
     assert np.isfinite(live.error)
 
 
+@pytest.mark.filterwarnings("ignore:.* belong to no face")
 @pytest.mark.parametrize("measure", ["error", "max_error"])
 def test_where_thinning_ends_before_an_error_no_removal_holds_it_though_outlines_change_what_others_cost(measure):
     rng = np.random.default_rng(3)
