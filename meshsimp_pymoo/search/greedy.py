@@ -130,8 +130,8 @@ def thinning(
     ground = movable_ground(surface, "thinning and insertion")
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
-    flag = np.zeros(1, np.bool_) if stop is None else stop
-    most = cost_of(surface, most_error)
+    flag = stop_flag(stop)
+    most = cost_of(surface, _error(most_error, "most_error"))
 
     def work(kept: BoolArray | None) -> tuple[Any, ...]:
         with surface.books(np.ones(n_all, bool) if kept is None else kept | fixed, fixed=fixed) as books:
@@ -197,7 +197,8 @@ def greedy_insertion(
         raise ValueError(f"most={most} is no number of vertices; give 0 or more")
     fixed = _fixed(surface, pinned)
     n_all = surface.n_vertices
-    flag = np.zeros(1, np.bool_) if stop is None else stop
+    flag = stop_flag(stop)
+    _error(least_error, "least_error")
     # 0 means to the end: where nothing deviates there is nothing to insert, and rounding may leave a little
     least = cost_of(surface, least_error) if least_error > 0.0 else -np.inf
 
@@ -227,6 +228,23 @@ def can_insert(surface: Surface) -> bool:
             return True
     except ValueError:  # what the books say of such vertices, and of nothing else
         return False
+
+
+def _error(given: Any, name: str) -> float:
+    """Return an error that is one, or raise a ValueError."""
+    if not isinstance(given, (int, float, np.number)) or not given >= 0:
+        raise ValueError(f"{name}={given!r} is no error; give 0 or more")
+    return float(given)
+
+
+def stop_flag(stop: BoolArray | None) -> BoolArray:
+    """Return a flag that another thread can set: the one that is given, or one that nobody knows."""
+    if stop is None:
+        return np.zeros(1, np.bool_)
+    flag = require_bool(stop, "stop is a flag that another thread sets", "give np.zeros(1, dtype=bool)")
+    if flag.ndim != 1 or not len(flag):
+        raise ValueError(f"stop has shape {flag.shape}; give np.zeros(1, dtype=bool)")
+    return flag
 
 
 def _not_below_0(error: np.ndarray) -> np.ndarray:

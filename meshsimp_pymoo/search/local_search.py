@@ -16,7 +16,7 @@ from meshsimp_pymoo.arrays import BoolArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.search.budgets import stopping
-from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.search.greedy import stop_flag, thin
 from meshsimp_pymoo.surface.moves import (
     exchange,
     is_site,
@@ -320,7 +320,7 @@ def relocate(
     state = np.array([seed], np.uint64)
     made = np.empty(1, np.int64) if made is None else made
     made[0] = moves
-    flag = np.zeros(1, np.bool_) if stop is None else stop
+    flag = stop_flag(stop)
 
     def work(kept: BoolArray) -> BoolArray:
         if flag[0]:

@@ -125,10 +125,12 @@ class HeightSurface:
         Raises
         ------
         ValueError
-            If ``most`` is negative or no number.
+            If ``most`` or ``own`` is negative or no number.
         """
-        if not most >= 0:
-            raise ValueError(f"most = {most} is no deviation of at least 0")
+        numbers: dict[str, Any] = {"most": most, "own": own}
+        for name, value in numbers.items():
+            if not isinstance(value, (int, float, np.number)) or not value >= 0:
+                raise ValueError(f"{name} = {value!r} is no number of at least 0")
         other = copy.copy(self)
         other.rules = replace(self.rules, measure="error")  # the sum of these costs
         other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)

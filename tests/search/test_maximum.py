@@ -105,9 +105,20 @@ def test_a_share_of_the_own_cost_lowers_the_sum_below_the_bound_too():
     assert both.error < 0.9 * alone.error
 
 
-def test_a_bound_is_no_negative_number():
-    with pytest.raises(ValueError, match="most = -1 is no deviation of at least 0"):
-        surface(MODELS["face"]).bounded(-1)
+def test_what_is_no_bound_no_error_and_no_flag_is_refused():
+    rated = surface(MODELS["face"])
+    for bound in ({"most": -1}, {"most": 1, "own": np.nan}, {"most": "5"}):
+        with pytest.raises(ValueError, match="is no number of at least 0"):
+            rated.bounded(**bound)
+    for value in (-1.0, np.nan, "5"):
+        with pytest.raises(ValueError, match=f"most_error={value!r} is no error; give 0 or more"):
+            thinning(rated, most_error=value)
+        with pytest.raises(ValueError, match=f"least_error={value!r} is no error; give 0 or more"):
+            greedy_insertion(rated, least_error=value)
+    with pytest.raises(TypeError, match="stop is a flag that another thread sets, not int64"):
+        thinning(rated, stop=np.zeros(1, int))
+    with pytest.raises(ValueError, match=r"stop has shape \(0,\)"):
+        greedy_insertion(rated, stop=np.zeros(0, bool))
 
 
 def test_the_memetic_search_lowers_the_maximum_below_that_of_thinning():
