@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from meshsimp_pymoo.arrays import are_distinct
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, NoFullGrid, warn_of
 from meshsimp_pymoo.files import is_there
@@ -274,7 +275,7 @@ def _grid_of_model(model: OpenModel, options: Options) -> HeightGrid:
     y, row = np.unique(model.xy[:, 1], return_inverse=True)
     number = (len(y) - 1 - row) * len(x) + column
     n_cells = 2 * (len(x) - 1) * (len(y) - 1)
-    if model.n_vertices != len(x) * len(y) or len(np.unique(number)) != len(number) or len(model.faces) != n_cells:
+    if model.n_vertices != len(x) * len(y) or not are_distinct(number) or len(model.faces) != n_cells:
         raise NoFullGrid(
             f"{model.name}: its {model.n_vertices} vertices are not all crossings of {len(y)} rows and {len(x)} "
             "columns; only a height grid without gaps can be cut into tiles: leave the tiles out"

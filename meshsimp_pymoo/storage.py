@@ -43,7 +43,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray, spread
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray, are_distinct, spread
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import (
     new_folder,
@@ -630,7 +630,7 @@ def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, I
         raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
     if packed.dtype != np.uint8:
         raise ResultError(f"{path}: kept has the type {packed.dtype} instead of packed bits (uint8)")
-    if len(np.unique(source_index)) != len(source_index) or source_index.min(initial=0) < 0:
+    if not are_distinct(source_index) or source_index.min(initial=0) < 0:
         raise ResultError(f"{path}: source_index is not a list of different rows")
     n = len(source_index)
     if packed.shape != (count, -(-n // 8)):

@@ -36,8 +36,9 @@ from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import known_units, reference_system
 
-# How long results take at most after Ctrl-C, about, and what drawing takes for each vertex of the model [s].
-WAIT_SECONDS = 4.0
+# How long results take at most once the search has come back after Ctrl-C, for which its start may take another 1.2 s;
+# and what drawing takes for each vertex of the model [s]. Together with the rest of the folder that is within five.
+WAIT_SECONDS = 3.0
 DRAWING_SECONDS = 5e-5
 
 # What of a record the summary says again.

@@ -40,6 +40,7 @@ from meshsimp_pymoo.comparison.meshlab import (
     vertex_clustering,
 )
 from meshsimp_pymoo.errors import ToolUnavailable, raise_if_memory, reason_of, way_to_install
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, quality_of
 from meshsimp_pymoo.surface.model import OpenModel
@@ -394,8 +395,8 @@ def _by_pydelatin(model: OpenModel) -> Simplify:
 
 def _of_vertices(model: OpenModel, faces: IntArray) -> Mesh:
     """Return triangles of some of the model's vertices as a mesh of these alone."""
-    used, corners = np.unique(faces, return_inverse=True)
-    return model.file_points[used], corners.reshape(-1, 3)
+    used, corners = used_rows(faces)
+    return model.file_points[used], corners
 
 
 def grid_rows(model: OpenModel) -> IntArray | None:

@@ -24,6 +24,20 @@ def canonical_faces(faces: IntArray) -> IntArray:
     return turned[np.lexsort((turned[:, 2], turned[:, 1], turned[:, 0]))]
 
 
+def used_rows(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertices (V,) that triangles (M, 3) use, ascending, and the triangles as rows of these.
+
+    Examples
+    --------
+    >>> used, compact = used_rows(np.array([[3, 1, 2], [2, 5, 3]]))
+    >>> used.tolist(), compact.tolist()
+    ([1, 2, 3, 5], [[2, 0, 1], [1, 3, 2]])
+    """
+    is_used = np.zeros(int(faces.max(initial=0)) + 1, np.bool_)
+    is_used[faces] = True
+    return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[faces]
+
+
 class EdgeTable(NamedTuple):
     """The edges of triangles.
 

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import printable
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, require_rules
 from meshsimp_pymoo.surface.units import length_unit, reference_system
@@ -557,9 +558,9 @@ def _plot_rows(surface: Surface, faces: IntArray, ax: Axes) -> None:
 
 def _rows_of(surface: Surface, faces: IntArray) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:
     """Return points, triangles and colours of those vertices of a surface alone that triangles (M, 3) use."""
-    used, compact = np.unique(faces, return_inverse=True)
+    used, compact = used_rows(np.asarray(faces))
     colour = surface.model.attributes.get("color")
-    return surface.points[used], compact.reshape(-1, 3), None if colour is None else colour[used]
+    return surface.points[used], compact, None if colour is None else colour[used]
 
 
 def _turned(points: FloatArray, elevation: float, turn: float) -> FloatArray:
