@@ -22,7 +22,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pymoo.core.algorithm import Algorithm
@@ -83,6 +83,8 @@ OWN = 0.01
 SLACK = 1e-3
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
 IDLE = 12
+
+Found = TypeVar("Found")
 
 
 class TargetedSearch(Algorithm):
@@ -248,20 +250,21 @@ class TargetedSearch(Algorithm):
         """
         surface: Surface = self.problem.surface
         ways = self._ways()
-        passes = 2 * len(ways) + sum(holding is not None for *_, holding in ways)
+        is_settled = "triangles" not in self.limits
+        passes = 2 * len(ways) + (1 + is_settled) * sum(holding is not None for *_, holding in ways)
         is_cut = False
 
-        def timed(work: Callable[[], NestedFront]) -> NestedFront:
+        def timed(work: Callable[[], Found]) -> Found:
             nonlocal passes, is_cut
             left = self._seconds_left()
             stop[0] = False
             if stop[1]:  # looked at after the other was cleared, so that no Ctrl-C is lost
                 stop[0] = True
             with stopping(stop, None if left is None else max(left, 0.0) / max(passes, 1)):
-                front = work()
+                found = work()
             passes -= 1
             is_cut = is_cut or bool(stop[0] and not stop[1])
-            return front
+            return found
 
         def thinned(by: Surface, kept: BoolArray | None = None, **back: Any) -> NestedFront:
             return timed(lambda: thinning(by, kept=kept, stop=stop, **back))
@@ -286,8 +289,12 @@ class TargetedSearch(Algorithm):
                 break
             if holding is not None:
                 k = int(np.argmax(start.error <= holding)) if (start.error <= holding).any() else len(start) - 1
+                kept, back_to = start.kept(k), int(start.triangles[k] / MORE_TRIANGLES)
+                if is_settled:  # so that the other limits hold too
+                    settled = timed(lambda kept=kept: self._settled(kept, stop)[0])  # type: ignore[misc]
+                    kept = kept if settled is None else settled
                 # in the measure that is searched, and somewhat below, where this limit does not hold
-                start = Start.of(thinned(surface, start.kept(k), least=int(start.triangles[k] / MORE_TRIANGLES)))
+                start = Start.of(thinned(surface, kept, least=back_to))
             starts.append(start)
             self.begun = starts
         return is_cut
