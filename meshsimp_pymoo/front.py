@@ -40,7 +40,7 @@ from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import begun, thinned
 from meshsimp_pymoo.search.targeted import TargetedSearch, targeted
-from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
+from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, require_numbers, shortfall
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
@@ -537,10 +537,12 @@ class Front(Sequence[FrontSolution]):
             raise TypeError(f"best() knows no limit {unknown[0]!r}; it takes {', '.join(MEASURES)}")
         if not limits:
             raise TypeError("best() takes limits, such as triangles=500 or max_error=0.1; none is given")
+        require_numbers(limits)
         missed = shortfall({name: np.array([getattr(q, name) for q in self.quality]) for name in limits}, limits)
         fitting = np.flatnonzero(missed == 0.0)
         if "triangles" in limits:
-            between = None if limits["triangles"] < 2 else self._between(int(limits["triangles"]))
+            most = min(self.quality[-1].triangles, limits["triangles"])
+            between = None if most < 2 else self._between(int(most))
             if between is not None and shortfall(asdict(between.quality), limits) > 0.0:
                 between = None
             best = self[int(fitting[np.argmin(self.F[fitting, 0])])] if len(fitting) else between

@@ -22,7 +22,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pymoo.core.algorithm import Algorithm
@@ -79,10 +79,16 @@ FRESH: dict[str, Any] = {"temperature": 0.3, "cooling": 0.03}
 AGAIN: dict[str, Any] = {"temperature": 0.06, "cooling": 0.15}
 # Where a maximum holds beside a sum: what the sum counts against what exceeds the maximum.
 OWN = 0.01
+# Where a maximum is missed at so many triangles: the share of the present one that it is brought down to next, and of
+# the moves of such a generation, as finding the smallest mesh that holds it is what meets most wishes.
+LOWERED = 0.9
+AT_SIZE = 0.3
 # By how much it is lowered where the sum decides among what holds it, as a share.
 SLACK = 1e-3
 # Generations without a better mesh, beyond the budget's, after which nothing more is expected.
 IDLE = 12
+
+Found = TypeVar("Found")
 
 
 class TargetedSearch(Algorithm):
@@ -248,20 +254,21 @@ class TargetedSearch(Algorithm):
         """
         surface: Surface = self.problem.surface
         ways = self._ways()
-        passes = 2 * len(ways) + sum(holding is not None for *_, holding in ways)
+        is_settled = "triangles" not in self.limits
+        passes = 2 * len(ways) + (1 + is_settled) * sum(holding is not None for *_, holding in ways)
         is_cut = False
 
-        def timed(work: Callable[[], NestedFront]) -> NestedFront:
+        def timed(work: Callable[[], Found]) -> Found:
             nonlocal passes, is_cut
             left = self._seconds_left()
             stop[0] = False
             if stop[1]:  # looked at after the other was cleared, so that no Ctrl-C is lost
                 stop[0] = True
             with stopping(stop, None if left is None else max(left, 0.0) / max(passes, 1)):
-                front = work()
+                found = work()
             passes -= 1
             is_cut = is_cut or bool(stop[0] and not stop[1])
-            return front
+            return found
 
         def thinned(by: Surface, kept: BoolArray | None = None, **back: Any) -> NestedFront:
             return timed(lambda: thinning(by, kept=kept, stop=stop, **back))
@@ -286,8 +293,12 @@ class TargetedSearch(Algorithm):
                 break
             if holding is not None:
                 k = int(np.argmax(start.error <= holding)) if (start.error <= holding).any() else len(start) - 1
+                kept, back_to = start.kept(k), int(start.triangles[k] / MORE_TRIANGLES)
+                if is_settled:  # so that the other limits hold too
+                    settled = timed(lambda kept=kept: self._settled(kept, stop)[0])  # type: ignore[misc]
+                    kept = kept if settled is None else settled
                 # in the measure that is searched, and somewhat below, where this limit does not hold
-                start = Start.of(thinned(surface, start.kept(k), least=int(start.triangles[k] / MORE_TRIANGLES)))
+                start = Start.of(thinned(surface, kept, least=back_to))
             starts.append(start)
             self.begun = starts
         return is_cut
@@ -356,8 +367,12 @@ class TargetedSearch(Algorithm):
 
     @property
     def _goal(self) -> dict[str, float]:
-        """What the next generation is for: the smallest mesh that holds a maximum, until one is as small as wished."""
-        if "max_error" not in self.within or self.missed == 0.0:
+        """What the next generation is for: the wish; or every second time, until a mesh holds it, a part of it.
+
+        Where a maximum holds beside so many triangles that is the smallest mesh that holds it.
+        """
+        is_second = (self.n_iter or 0) % 2 == 0
+        if not ("triangles" in self.limits and "max_error" in self.within and is_second and self.missed > 0.0):
             return self.limits
         return {name: limit for name, limit in self.limits.items() if name != "triangles"}
 
@@ -366,15 +381,22 @@ class TargetedSearch(Algorithm):
         surface, measure, bound = self.problem.surface, self.problem.objectives[0], self.within.get("max_error")
         if measure == "max_error" and "triangles" not in self.limits:
             return surface.bounded(self.limits["max_error"])
+        now = _values(self.pop[_order(self.pop, self.limits)[:1]], self.within)
+        if "triangles" in self.limits:  # a sum that is too large is lowered until it is not
+            missed = [name for name in self.within if name != "max_error" and now[name][0] > self.limits[name]]
+            surface = surface.measuring(SEARCHED[missed[0]] if missed else measure)
         if bound is None:
             return surface
         if "triangles" not in self._goal and self._limit() is None:
             return surface.bounded(bound)
-        return surface.bounded(bound, own=OWN / self._scale(bound))
+        if "triangles" in self._goal:  # a maximum that is too large is lowered step by step
+            bound = max(bound, LOWERED * float(now["max_error"][0]))
+        return surface.bounded(bound, own=OWN / self._scale(bound, surface.rules.measure))
 
-    def _scale(self, bound: float) -> float:
+    @staticmethod
+    def _scale(bound: float, measure: str) -> float:
         """Return what makes the cost of a vertex by the measure a deviation again, where it is at most ``bound``."""
-        return 1.0 if self.problem.objectives[0] == "error" else max(bound, 1e-300)
+        return 1.0 if measure == "error" else max(bound, 1e-300)
 
     def _tight(self) -> tuple[Any, float]:
         """Return a surface by which first what exceeds the maximum counts, then the sum; and the error that holds.
@@ -382,7 +404,8 @@ class TargetedSearch(Algorithm):
         All sums together count no more than the maximum is lowered by.
         """
         surface, bound = self.problem.surface, self.within["max_error"]
-        tight = surface.bounded(bound * (1.0 - SLACK), own=SLACK / (surface.total_weight * self._scale(bound)))
+        scale = self._scale(bound, self.problem.objectives[0])
+        tight = surface.bounded(bound * (1.0 - SLACK), own=SLACK / (surface.total_weight * scale))
         return tight, float(error_of(tight, SLACK * bound))
 
     def _adapt(self, triangles: FloatArray) -> None:
@@ -485,7 +508,7 @@ class TargetedSearch(Algorithm):
     def _moves(self, seconds: float | None, sizes: IntArray, weights: FloatArray, work: float) -> IntArray:
         """Return the moves of each row of a generation."""
         budget = part_of(self.termination, Moves)
-        at_once = "triangles" in self.limits and not self.within
+        at_once = "triangles" in self.limits and "max_error" not in self.within
         most = [SLOWEST * work]
         if budget is not None:
             most.append(_next_share(self.moves_done, budget.n_max_moves - self.moves_done, at_once))
@@ -501,6 +524,8 @@ class TargetedSearch(Algorithm):
         if len(most) == 1:
             most.append(max(PILOT * work, self.moves_done))
         whole = int(min(most))
+        if "max_error" in self.within and "triangles" in self._goal and self.missed > 0.0:
+            whole = int(np.ceil(AT_SIZE * whole))
         moves = np.diff(np.round(np.cumsum(weights) / weights.sum() * whole), prepend=0.0)
         return moves.astype(np.int64)
 

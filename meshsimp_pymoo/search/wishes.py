@@ -7,7 +7,9 @@ is imported here, because ``meshsimp --help`` reads it.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
@@ -24,18 +26,18 @@ def checked_limits(limits: Mapping[str, float | None]) -> dict[str, float]:
     Raises
     ------
     TypeError
-        If none is given.
+        If none is given, or one is no number.
     ValueError
         If one is no number of triangles or no error.
     """
     given = {name: limits[name] for name in MEASURES if limits.get(name) is not None}
     if not given:
         raise TypeError(f"nothing is wished for; give one or more of {', '.join(wished())}, such as triangles=500")
+    require_numbers(given)
     found: dict[str, float] = {}
     for name, limit in given.items():
-        assert limit is not None
         if name == "triangles":
-            if not (limit >= 1 and limit == int(limit)):
+            if not (1 <= limit < math.inf and limit == int(limit)):
                 raise ValueError(f"triangles={limit} is no number of triangles; give 1 or more")
             found[name] = int(limit)
         else:
@@ -43,6 +45,13 @@ def checked_limits(limits: Mapping[str, float | None]) -> dict[str, float]:
                 raise ValueError(f"{name}={limit} is no error; give 0 or more")
             found[name] = float(limit)
     return found
+
+
+def require_numbers(limits: Mapping[str, Any]) -> None:
+    """Raise a TypeError if a limit is no number."""
+    for name, limit in limits.items():
+        if not isinstance(limit, Real):
+            raise TypeError(f"{name}={limit!r} is no number; give one, such as {name}=500")
 
 
 def wished() -> list[str]:
@@ -53,8 +62,8 @@ def wished() -> list[str]:
 def measure_for(limits: Mapping[str, float], given: str | None = None) -> str:
     """Return the measure that is searched for these limits.
 
-    With a number of triangles it is the one that is given, by default the sum, and limits of errors hold beside it.
-    Else it is that of the wish; of several wishes a sum, beside which the maximum holds.
+    It is that of the wish; of several wishes a sum, beside which the others hold. With a number of triangles it is the
+    one that is given, if one is, and all limits of other measures hold beside it; a maximum does so anyway.
 
     Raises
     ------
@@ -62,10 +71,10 @@ def measure_for(limits: Mapping[str, float], given: str | None = None) -> str:
         If another measure is given than one that is wished for.
     """
     searched = [SEARCHED[name] for name in limits if name in SEARCHED]
+    sums = [name for name in searched if OBJECTIVES[name].is_sum]
     if "triangles" in limits or not searched:
-        return given or "error"
+        return given or (sums or ["error"])[-1]
     if given is None:
-        sums = [name for name in searched if OBJECTIVES[name].is_sum]
         return (sums or searched)[-1]
     if given not in searched:
         names = " and ".join(name for name in limits if name in SEARCHED)
@@ -110,6 +119,6 @@ def shortfall(values: Mapping[str, Any], limits: Mapping[str, float]) -> Any:
     """
     missed: Any = 0.0
     for name, limit in limits.items():
-        over = values[name] - limit
+        over = values[name] - min(limit, sys.float_info.max)  # with one that is infinite it would be no number
         missed = missed + over * (over > 0) / max(limit, 1e-300)
     return missed

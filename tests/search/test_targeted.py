@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import count
 
 import numpy as np
@@ -12,7 +13,7 @@ from meshsimp_pymoo import Front, HeightSurface, MeshProblem, Missed, Moves, sim
 from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.search import targeted as search
 from meshsimp_pymoo.search.checkpoint import Checkpoints, read_checkpoint, restore
-from meshsimp_pymoo.search.greedy import greedy_insertion
+from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
 from meshsimp_pymoo.search.wishes import beside, checked_limits, measure_for, shortfall
 from meshsimp_pymoo.workers import thread_pool
 
@@ -131,6 +132,38 @@ def test_evaluations_and_seconds_end_it(problems):
     assert result.exec_time < 3.0
 
 
+@pytest.mark.parametrize("searched", ["error", "rms_error"])
+def test_a_sum_beside_a_number_of_triangles_is_lowered_until_it_holds(problems, searched):
+    limits = {"triangles": 90, "rms_error": 58.2}
+    assert measure_for(limits) == "rms_error"
+    algorithm = minimize(problems[searched], targeted(**limits), Moves(100_000), seed=1).algorithm
+    assert algorithm.missed == 0.0
+    assert simplify_to(MODEL, **limits, moves=100_000).rms_error <= 58.2
+
+
+def test_the_tighter_of_two_sums_decides():
+    found = simplify_to(MODEL, rms_error=100.0, mean_error=3.0, moves=QUICK)
+    assert 2.5 < found.mean_error <= 3.0
+
+
+def test_a_maximum_that_is_missed_at_so_many_triangles_is_lowered_there(problems):
+    by_maximum = simplify_to(problems["max_error"], triangles=90, moves=20_000)
+    with pytest.raises(Missed) as missed:
+        simplify_to(MODEL, triangles=90, max_error=100.0, moves=20_000)
+    assert missed.value.nearest.triangles <= 90
+    assert missed.value.nearest.max_error <= 1.1 * by_maximum.max_error  # where the sum is lowered it is 250
+    assert simplify_to(MODEL, triangles=90, max_error=160.0, moves=100_000).max_error <= 160.0
+
+
+def test_a_limit_that_is_infinite_always_holds(problems):
+    front = simplify_to("roof:9", triangles=4, moves=500).front
+    assert front.best(max_error=np.inf) == front[0]
+    assert front.best(triangles=np.inf).error == 0.0
+    assert shortfall({"max_error": np.array([1.0, 9.0])}, {"max_error": np.inf}).tolist() == [0.0, 0.0]
+    with pytest.raises(TypeError, match="triangles='5' is no number"):
+        front.best(triangles="5")
+
+
 # ------------------------------------------------------------------------------------------------------------ refusals
 
 
@@ -163,6 +196,9 @@ def test_a_wish_and_another_measure_are_refused(problems):
         ({"triangles": 0}, ValueError, "triangles=0 is no number of triangles"),
         ({"triangles": 2.5}, ValueError, "triangles=2.5 is no number of triangles"),
         ({"max_error": -1.0}, ValueError, "max_error=-1.0 is no error; give 0 or more"),
+        ({"triangles": float("inf")}, ValueError, "triangles=inf is no number of triangles"),
+        ({"triangles": "5"}, TypeError, "triangles='5' is no number; give one, such as triangles=500"),
+        ({"max_error": "5"}, TypeError, "max_error='5' is no number; give one, such as max_error=500"),
         ({"rms_error": float("nan")}, ValueError, "rms_error=nan is no error"),
         ({"triangles": 5, "pop_size": 1}, ValueError, "pop_size = 1 keeps no front"),
     ],
@@ -236,11 +272,12 @@ def test_ctrl_c_while_the_first_answer_is_measured_leaves_it(monkeypatch):
 
 @pytest.mark.parametrize("model", ["horseshoe", MODEL])
 def test_a_first_answer_that_is_cut_short_is_said_and_is_a_mesh(monkeypatch, model):
-    def late(*args, stop, **how):
+    def late(work, *args, stop, **how):
         stop[0] = True
-        return greedy_insertion(*args, stop=stop, **how)
+        return work(*args, stop=stop, **how)
 
-    monkeypatch.setattr(search, "greedy_insertion", late)
+    for work in (greedy_insertion, thinning):
+        monkeypatch.setattr(search, work.__name__, partial(late, work))
     with pytest.warns(SearchWarning, match=r"60 s are too short for the whole of the .* starts from meshes of \d"):
         algorithm = minimize(
             MeshProblem(model), targeted(triangles=50), ("time", 60), seed=1, callback=_ended
