@@ -298,8 +298,10 @@ def write_front(
             if refit is not None:
                 (partial / "refitted").mkdir()
         todo = sorted(with_mesh.union([] if chosen is None else np.flatnonzero(order == chosen).tolist()))
-        if until is not None:  # as many as there is time for, spread over the front
-            todo = [todo[k] for k in spread(len(todo))]
+        if (
+            until is not None
+        ):  # as many as there is time for, spread over the front; the largest takes longest: it is last
+            todo = [todo[k] for k in spread(len(todo) - 1)] + todo[-1:]
         for solution in todo:
             row, path, fitted = order[solution], "", ["", ""]
             begun, size = time.perf_counter(), model.n_vertices + quality[row].triangles

@@ -270,6 +270,19 @@ def test_meshes_that_would_be_late_are_left_out_but_the_chosen_one_is_written(tm
     stored = read_front(late)
     assert [Path(path).name for path in stored.meshes if path] == names[late]
     np.testing.assert_array_equal(stored.kept, read_front(plain).kept)
+    # what takes longest is last
+    kept, simplified = solutions
+    quality, asked = [s.quality for s in simplified], []
+
+    def faces(row):
+        asked.append(quality[row].triangles)
+        return simplified[row].faces
+
+    how = {"faces": faces, "until": time.perf_counter() + 60.0}
+    write_front(tmp_path / "order", HeightSurface(model), quality, kept, **how)
+    assert asked[-1] == max(q.triangles for q in quality)
+    assert asked[0] == min(q.triangles for q in quality)
+    assert asked[1:-1] != sorted(asked[1:-1])
 
 
 def test_a_model_in_place_of_a_surface_is_told_apart(tmp_path, model, solutions):

@@ -17,7 +17,6 @@ is quick.
 
 from __future__ import annotations
 
-import gc
 import os
 import signal
 import sys
@@ -96,8 +95,6 @@ def program() -> NoReturn:
     code = main()
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
-    # Python need not look for half a second through all objects for those that only refer to each other
-    gc.freeze()
     sys.exit(code)
 
 

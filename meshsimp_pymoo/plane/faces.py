@@ -32,8 +32,14 @@ def used_rows(faces: IntArray) -> tuple[IntArray, IntArray]:
     >>> used, compact = used_rows(np.array([[3, 1, 2], [2, 5, 3]]))
     >>> used.tolist(), compact.tolist()
     ([1, 2, 3, 5], [[2, 0, 1], [1, 3, 2]])
+    >>> used_rows(np.array([[9, 7, 8]]))[1].tolist()
+    [[2, 0, 1]]
     """
-    is_used = np.zeros(int(faces.max(initial=0)) + 1, np.bool_)
+    most = int(faces.max(initial=0))
+    if most > faces.size:  # few of very many
+        used, compact = np.unique(faces, return_inverse=True)
+        return used, compact.reshape(-1, 3)
+    is_used = np.zeros(most + 1, np.bool_)
     is_used[faces] = True
     return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[faces]
 
