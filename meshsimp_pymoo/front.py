@@ -18,7 +18,7 @@ import operator
 import os
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
@@ -39,7 +39,7 @@ from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import begun, thinned
-from meshsimp_pymoo.search.targeted import TargetedSearch, targeted
+from meshsimp_pymoo.search.targeted import TargetedSearch, require_for_a_wish, targeted
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, require_numbers, shortfall
 from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
@@ -938,10 +938,11 @@ def simplify_to(
     Parameters
     ----------
     problem : MeshProblem, or what it takes as its model
-        What is simplified. A wish for an error lowers that error, so a problem of another measure is set up anew with
-        it; one whose measure was chosen, which "error" counts as none, is refused.
+        What is simplified. A wish for an error lowers that error, so of a problem of another measure a copy is
+        searched that minimises it; one whose measure was chosen, which "error" counts as none, is refused.
     triangles : int, optional
-        The most triangles: then the most accurate such mesh by the problem's measure.
+        The most triangles: then the most accurate such mesh by the problem's measure, or by the mean or root mean
+        square that is wished for too.
     max_error, mean_error, rms_error : float, optional
         The most that any original vertex may deviate by, the mean of these, and their root mean square [model units].
         Where several limits are given all of them hold.
@@ -964,7 +965,8 @@ def simplify_to(
     TypeError
         If nothing is wished for.
     ValueError
-        If a limit makes no sense, or the problem minimises another measure than is wished for.
+        If a limit makes no sense, or the problem minimises another measure than is wished for, has three objectives
+        or constraints.
 
     Examples
     --------
@@ -982,14 +984,10 @@ def simplify_to(
         raise ValueError(f"time={time} is no time to search for; give seconds")
     if not isinstance(problem, MeshProblem):
         problem = MeshProblem(problem)
-    if problem.n_obj == 2:
-        measure = problem.objectives[0]
-        # nobody need have asked for what is minimised unless told otherwise
-        wanted = measure_for(limits, None if measure == Rules().measure else measure)
-        if wanted != measure and isinstance(problem.surface, HeightSurface):
-            rules = replace(problem.surface.rules, measure=wanted)
-            options, problem = problem.options, MeshProblem(HeightSurface(problem.surface.model, rules))
-            problem.options = options
+    require_for_a_wish(problem)
+    measure = problem.objectives[0]
+    # nobody need have asked for what is minimised unless told otherwise
+    problem = problem.minimising(measure_for(limits, None if measure == Rules().measure else measure))
     budget = ("time", time) if time is not None else Moves(USUAL_BUDGET if moves is None else moves)
     result = minimize(problem, targeted(**limits), budget, seed=seed)  # type: ignore[arg-type]
     return Front.from_result(result).best(**limits)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import inspect
 import os
@@ -207,6 +208,16 @@ class MeshProblem(ElementwiseProblem):
             elementwise_runner=elementwise_runner if elementwise_runner is not None else ThreadRunner(n_threads),
             **kwargs,
         )
+
+    def minimising(self, measure: str) -> MeshProblem:
+        """Return this problem of two objectives with another measure of the error, or itself; all else is as here."""
+        if measure == self.objectives[0]:
+            return self
+        other = copy.copy(self)
+        other.surface = self.surface.measuring(measure)
+        other.objectives = checked_objectives((measure, "triangles"))
+        other._memo = OrderedDict()
+        return other
 
     @property
     def model(self) -> Any:

@@ -1174,8 +1174,13 @@ def test_refitted_meshes_stand_beside_the_others_and_the_referee_agrees(tmp_path
         (["--measure", "l2"], "--measure: invalid choice: 'l2' (choose from l1, rms, max); did you mean l1?"),
         (
             ["--max-error", "1", "--measure", "rms"],
-            "--max-error does not go with --measure rms: a wish for an error lowers that error; leave --measure out, "
-            "or take the mesh out of a front that was searched by it (meshsimp pick)",
+            "--max-error does not go with --measure rms: a wish for an error lowers that error, as --measure max does; "
+            "leave --measure out, or take the mesh out of a front that was searched by it (meshsimp pick)",
+        ),
+        (
+            ["--max-error", "1", "--mean-error", "1", "--measure", "rms"],
+            "--mean-error and --max-error do not go with --measure rms: a wish for an error lowers that error, as "
+            "--measure l1 or max does; leave",
         ),
         (["--weights", "sharpness"], "no per-vertex attribute 'sharpness' to weigh by; it has: none"),
     ],

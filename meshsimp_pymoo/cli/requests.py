@@ -14,7 +14,7 @@ from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.search.presets import DEFAULT
-from meshsimp_pymoo.search.wishes import measure_for
+from meshsimp_pymoo.search.wishes import SEARCHED, measure_for
 from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -146,7 +146,10 @@ def request_of(args: argparse.Namespace) -> Request:
     )
     for (one, other), (meets, why) in REFUSED.items():
         if meets(request):
-            raise UsageError(f"{_filled(one, request)} does not go with {_filled(other, request)}: {why}")
+            do = "do" if one == "{wish}" and len(request.wish.limits) > 1 else "does"
+            raise UsageError(
+                f"{_filled(one, request)} {do} not go with {_filled(other, request)}: {_filled(why, request)}"
+            )
     if not request.is_targeted:
         return request
     return replace(request, rules=replace(request.rules, measure=measure_for(request.wish.limits, measure)))
@@ -170,15 +173,16 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
     ),
     ("{wish}", "--measure {measure}"): (
         _lowers_another,
-        "a wish for an error lowers that error; leave --measure out, or take the mesh out of a front that was searched "
-        "by it (meshsimp pick)",
+        "a wish for an error lowers that error, as --measure {wished} does; leave --measure out, or take the mesh out "
+        "of a front that was searched by it (meshsimp pick)",
     ),
 }
 
 
 def _filled(words: str, request: Request) -> str:
     spelled = MEASURES[request.measure].minimised if request.measure else ""
-    return words.format(wish=request.wish.options, measure=spelled)
+    wished = [OBJECTIVES[SEARCHED[name]].minimised for name in request.wish.limits if name in SEARCHED]
+    return words.format(wish=request.wish.options, measure=spelled, wished=listed(wished, "or") if wished else "")
 
 
 def _part(kind: type[Part], args: argparse.Namespace, **others: Any) -> Part:

@@ -138,10 +138,7 @@ class TargetedSearch(Algorithm):
     # ------------------------------------------------------------------------------------------------ for pymoo's loop
 
     def _setup(self, problem: Any, **kwargs: Any) -> None:
-        if problem.n_obj != 2:
-            raise ValueError(f"a wish is for two objectives and the problem has {problem.n_obj}; use nsga3()")
-        if problem.has_constraints():
-            raise ValueError("a wish takes no constraints; drop max_triangles= and max_objective= from the problem")
+        require_for_a_wish(problem)
         surface = surface_of(problem, self)
         measure = problem.objectives[0]
         measure_for(self.limits, measure)
@@ -153,6 +150,9 @@ class TargetedSearch(Algorithm):
         self._direct()
         starts = self.begun
         n = int(min(self.pop_size, max(MEASURED / self.problem.n_var, FEWEST)))
+        evaluations = part_of(self.termination, MaximumFunctionCallTermination)
+        if evaluations is not None:  # half of them for what is found later
+            n = min(n, -(-evaluations.n_max_evals // 2))
         X = [start.kept(k) for start in starts for k in rungs(start, -(-n // len(starts)), self._wanted(start))]
         return self.eliminate_duplicates.do(Population.new(X=np.array(X)))
 
@@ -547,6 +547,14 @@ class TargetedSearch(Algorithm):
         return float(time.time() - self.start_time)
 
 
+def require_for_a_wish(problem: Any) -> None:
+    """Raise a ValueError if one mesh cannot be searched for in a problem."""
+    if problem.n_obj != 2:
+        raise ValueError(f"a wish is for two objectives and the problem has {problem.n_obj}; use nsga3()")
+    if problem.has_constraints():
+        raise ValueError("a wish takes no constraints; drop max_triangles= and max_objective= from the problem")
+
+
 def _next_share(done: float, left: float, at_once: bool) -> float:
     """Return the part of a budget for the next generation: as much as was done, or all that is left."""
     planned = max(FIRST * left, done)
@@ -594,9 +602,9 @@ def _survivors(pop: Any, limits: dict[str, float], within: dict[str, float], mos
 
 
 def rungs(front: NestedFront | Start, n: int, wanted: int | None = None) -> list[int]:
-    """Return subsets of a nested front spread evenly over the logarithm of their size, with the one that is wanted."""
+    """Return n subsets of a nested front, the one that is wanted and others spread over the logarithm of the size."""
     rows = np.flatnonzero(front.triangles > 0)
-    spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n) - 1
+    spaced = np.geomspace(rows[0] + 1, rows[-1] + 1, n - (wanted is not None)) - 1
     chosen = set(np.clip(np.round(spaced).astype(int), rows[0], rows[-1]).tolist())
     return sorted(chosen | ({wanted} if wanted is not None else set()))
 

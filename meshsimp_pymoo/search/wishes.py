@@ -30,7 +30,7 @@ def checked_limits(limits: Mapping[str, float | None]) -> dict[str, float]:
     ValueError
         If one is no number of triangles or no error.
     """
-    given = {name: limits[name] for name in MEASURES if limits.get(name) is not None}
+    given = {name: limit for name in MEASURES if (limit := limits.get(name)) is not None}
     if not given:
         raise TypeError(f"nothing is wished for; give one or more of {', '.join(wished())}, such as triangles=500")
     require_numbers(given)

@@ -125,8 +125,14 @@ def test_the_same_on_one_thread_and_on_two_and_after_a_checkpoint(problems, monk
 
 def test_evaluations_and_seconds_end_it(problems):
     problem = problems["error"]
-    result = minimize(problem, targeted(triangles=90), ("n_eval", 70), seed=1)
-    assert 65 <= result.algorithm.evaluator.n_eval <= 74
+    few = minimize(problem, targeted(triangles=90), ("n_eval", 10), seed=1).algorithm
+    assert 10 <= few.evaluator.n_eval < 14
+    assert few.moves > 0
+    assert few.answer.F[1] <= 90
+    first = minimize(problem, targeted(triangles=90), ("n_eval", 1), seed=1).algorithm
+    assert (first.evaluator.n_eval, first.answer.F[1]) == (1, 90)
+    result = minimize(problem, targeted(triangles=90), ("n_eval", 40), seed=1)
+    assert 35 <= result.algorithm.evaluator.n_eval <= 44
     assert result.algorithm.answer.F[1] <= 90
     result = minimize(problem, targeted(mean_error=6.0), ("time", 0.3), seed=1)
     assert result.exec_time < 3.0
@@ -218,6 +224,22 @@ def test_what_does_not_go_with_a_wish_is_refused():
     three = MeshProblem("roof:5", objectives=("error", "max_error", "triangles"))
     with pytest.raises(ValueError, match=r"a wish is for two objectives and the problem has 3; use nsga3\(\)"):
         simplify_to(three, triangles=4)
+
+
+def test_a_problem_of_another_measure_keeps_all_else():
+    class Own(MeshProblem):
+        pass
+
+    problem = Own("roof:9", n_threads=1, memo=7, regions=3, pin="border")
+    front = simplify_to(problem, max_error=0.1, moves=500).front
+    assert front.objectives == ("max_error", "triangles")
+    assert (type(front.problem), front.problem.elementwise_runner.n_threads) == (Own, 1)
+    assert (front.problem.regions, front.problem._memo_size, front.surface.rules.pin) == (3, 7, "border")
+    assert problem.objectives == ("error", "triangles")
+    assert problem.surface.rules.measure == "error"
+    for limit in ({"max_triangles": 3}, {"max_objective": 1.0}):
+        with pytest.raises(ValueError, match="a wish takes no constraints; drop max_triangles= and max_objective="):
+            simplify_to(MeshProblem("roof:9", **limit), max_error=0.1, moves=500)
 
 
 def test_limits_are_put_in_order():
