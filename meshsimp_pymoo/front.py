@@ -38,7 +38,7 @@ from meshsimp_pymoo.problem import MeshProblem, mesh_of
 from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
-from meshsimp_pymoo.search.starting import begun, thinned
+from meshsimp_pymoo.search.starting import at_hand, begun
 from meshsimp_pymoo.search.targeted import TargetedSearch, require_for_a_wish, targeted
 from meshsimp_pymoo.search.wishes import USUAL_BUDGET, beside, checked_limits, measure_for, require_numbers, shortfall
 from meshsimp_pymoo.settings import plain, read_back
@@ -908,7 +908,7 @@ def starting_front(problem: MeshProblem, algorithm: Any, *, interrupted: bool = 
     sampling = getattr(getattr(algorithm, "initialization", None), "sampling", None)
     if not isinstance(sampling, NestedSubsets) or problem.n_obj != 2:
         return {}
-    start = begun(problem.surface) if interrupted else thinned(problem.surface, seconds_given(algorithm))
+    start = begun(problem.surface) if interrupted else at_hand(problem.surface, seconds_given(algorithm))
     if start is None:
         return {}
     F = np.column_stack([start.error, start.triangles])

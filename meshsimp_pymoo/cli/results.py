@@ -104,7 +104,13 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
         return INTERRUPTED
     missed = "" if front.run["chosen"] is not None else request.wish.of(front)[1]
     if missed:
-        longer = "; search longer (--generations, --time)" if "generations" in front.run else ""
+        budgets = "--moves, --time" if front.run.get("wish") else "--generations, --time"
+        longer = f"; search longer ({budgets})"
+        if "generations" not in front.run:  # tiles, which keep only so many
+            longer = (
+                f"; this front has no mesh of more than {front.quality[-1].triangles:,} triangles: name more beside it "
+                "(--triangles N), or do without tiles (--tile none)"
+            )
         say(f"{folder} holds a front, but no chosen mesh: {missed}{longer}")
         return TARGET_MISSED
     return OK

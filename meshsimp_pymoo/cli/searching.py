@@ -97,7 +97,7 @@ def _simplify(request: Request, shown: Stages) -> int:
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     else:
         refuse_alone(request.tiling)
-    _check_budget(search)
+    _check_budget(request)
     what = {"settings": request.recorded | budget(request), "seed": search.seed, "interrupted": False}
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
@@ -133,8 +133,9 @@ def _claim(output: Output, search: Search) -> None:
         claim_output(output.folder, overwrite=output.overwrite)
 
 
-def _check_budget(search: Search) -> None:
+def _check_budget(request: Request) -> None:
     """Refuse moves for an algorithm that makes none; warn where evaluations do not measure what is done."""
+    search = request.search
     measured_by = PRESETS[search.algorithm].measured_by
     if search.moves is not None and "moves" not in measured_by:
         movers = [name for name, preset in PRESETS.items() if "moves" in preset.measured_by]
@@ -144,7 +145,7 @@ def _check_budget(search: Search) -> None:
         )
     if search.evaluations is not None and "evaluations" not in measured_by:
         way_out = listed((f"--{kind}" for kind in (*measured_by, "time")), "or")
-        say(f"warning: evaluations do not measure {search.algorithm}, whose children cost any work; use {way_out}")
+        say(f"warning: evaluations do not measure {request.algorithm}, whose children cost any work; use {way_out}")
 
 
 def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None:
@@ -273,8 +274,9 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
 def _answer_in_words(algorithm: Any, *, first: bool) -> str:
     """Return what comes nearest to a wish so far, for the line of its progress."""
     answer, errors = algorithm.answer, [name for name in algorithm.limits if name != "triangles"]
+    searched = {"error": "mean_error"}.get(algorithm.problem.objectives[0], algorithm.problem.objectives[0])
     said = [f"{int(answer.F[-1]):,} triangles"]
-    said += [f"{MEASURES[name].label} {float(answer.get(name)):.4g}" for name in errors or ["mean_error"]]
+    said += [f"{MEASURES[name].label} {float(answer.get(name)):.4g}" for name in errors or [searched]]
     if len(answer.X) == int(answer.X.sum()):
         said.append("which takes all vertices")
     if algorithm.missed:

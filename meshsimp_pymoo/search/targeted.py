@@ -18,6 +18,7 @@ References
 
 from __future__ import annotations
 
+import inspect
 import time
 import warnings
 from collections.abc import Callable
@@ -31,7 +32,7 @@ from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
-from meshsimp_pymoo.errors import SearchWarning
+from meshsimp_pymoo.errors import SearchWarning, meant
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
@@ -661,5 +662,9 @@ def targeted(
     )
     if pop_size < 2:
         raise ValueError(f"pop_size = {pop_size} keeps no front; give 2 or more")
+    known = [*inspect.signature(Algorithm).parameters, *inspect.signature(targeted).parameters]
+    for name in kwargs:
+        if name not in known:
+            raise TypeError(f"targeted() has no argument {name!r}{meant(name, known)}")
     defaults: dict[str, Any] = {"output": MultiObjectiveOutput(), "termination": Moves(USUAL_BUDGET)}
     return TargetedSearch(limits, pop_size, **(defaults | kwargs))

@@ -16,6 +16,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.formats.material import Material
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -316,9 +317,9 @@ def mesh_arrays(model: Original, faces: IntArray) -> tuple[FloatArray, IntArray,
     attributes : dict of str to (V, ...) array
         Colours and whatever else the file says of those vertices.
     """
-    used, compact = np.unique(np.asarray(faces, dtype=np.int64), return_inverse=True)
+    used, compact = used_rows(np.asarray(faces))
     attributes = {name: values[used] for name, values in model.attributes.items()}
-    return model.file_points[used], compact.reshape(-1, 3), attributes
+    return model.file_points[used], compact, attributes
 
 
 def require_rules(surface: Any, who: str) -> None:
