@@ -436,11 +436,15 @@ class TargetedSearch(Algorithm):
         """
         limit, surface = self._limit(), self.problem.surface
         ways = self._beside() + ([] if limit is None else [(surface, self._choice, limit)])
-        for by, choose, most in ways:
+        n_holding = turn = 0
+        while n_holding < len(ways):  # in turn, as what is inserted for one limit may raise the error of another
+            by, choose, most = ways[turn % len(ways)]
             grown = greedy_insertion(by, kept, choose=choose, least_error=most, stop=stop)
             kept = grown.kept(len(grown) - 1)
             if stop[0]:
                 return None, np.inf
+            n_holding = n_holding + 1 if len(grown) == 1 else 1
+            turn += 1
         by, _, most = ways[0] if "max_error" in self.within else ways[-1]
         front = thinning(by, kept=kept, most_error=most, stop=stop)
         wanted = self._smallest(front, stop) if self.within else self._wanted(front)
