@@ -15,7 +15,9 @@ from meshsimp_pymoo.compiling.store import Stored
 from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
 
 # The specialisations that the first search compiles; how many is what it costs. If it has to be more, say why here.
-MOST_SPECIALISATIONS = 145
+# 145 until changes at an outline were costed without doing them (surface/bare.py, surface/trial.py, plane/stars.py) and
+# a search could begin with insertion: functions of their own, none of them twice.
+MOST_SPECIALISATIONS = 190
 
 
 def test_what_python_calls_is_in_one_part_each():
