@@ -63,7 +63,7 @@ from meshsimp_pymoo.storage import (
 )
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.surface import Refitted
-from meshsimp_pymoo.warming import SEARCH
+from meshsimp_pymoo.warming import SEARCH, WISH
 
 # Of the time that is given, the share kept for the best heights of the meshes.
 REFIT_SHARE = 0.3
@@ -102,7 +102,8 @@ def _simplify(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
-    with compiling((*SEARCH, "scores") if output.refit else SEARCH, shown) as compiled:
+    parts = (*(WISH if request.is_targeted else SEARCH), *(["scores"] if output.refit else []))
+    with compiling(parts, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
             format_to_write(output.format).check(problem.model)

@@ -346,7 +346,7 @@ def _lie_beside(live: Live, n_star: int, n_ears: int, n_rim: int, w: int) -> boo
 def _come_and_go(live: Live, n_gone: int, n_comers: int, n_rim: int, w: int) -> tuple[int, int]:
     """List the segments that would go and those that would come; return their numbers.
 
-    Those that go are taken for no segments until `_put_back`.
+    Those that go are taken for no segments until the trial ends.
     """
     mesh = live.mesh
     kind = live.kind
