@@ -311,6 +311,12 @@ def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int
 
 
 @inner
+def _make_heap(heap: np.ndarray, at: np.ndarray, key: np.ndarray, n: int) -> None:
+    for k in range(n // 2 - 1, -1, -1):
+        _sift_down(heap, at, key, k, n)
+
+
+@inner
 def _cost_again(g: Any, live: Any, v: int, key: np.ndarray, patience: np.ndarray) -> None:
     change, _ = try_exchange(g, live, v, -1, np.inf)
     cells = effort(g, live)
@@ -334,9 +340,10 @@ def thin(
 ) -> int:
     """Remove the vertex that adds the least while that is at most ``limit`` and triangles exceed ``least``.
 
-    What is removed has been costed exactly at that moment. Only a site of more than ``HUB`` cells may cost less than
-    is known, and go later than it could: it is costed again when it comes to the top of the heap, or ``PATIENCE`` of
-    its cells have seen a removal, as doing so after each would take the square of its cells.
+    The sites around one that went are costed again, exactly. Two kinds may cost something else than is known: one of
+    more than ``HUB`` cells, which is costed again when it comes to the top of the heap or ``PATIENCE`` of its cells
+    have seen a removal, as doing so after each would take the square of its cells; and one beside an outline that has
+    changed elsewhere, so that what no triangle covers is near to something else. The errors are exact in any case.
 
     Parameters
     ----------
@@ -376,8 +383,7 @@ def thin(
             heap[n] = v
             at[v] = n
             n += 1
-    for k in range(n // 2 - 1, -1, -1):
-        _sift_down(heap, at, key, k, n)
+    _make_heap(heap, at, key, n)
     error[0] = error_now(g, live)
     triangles[0] = n_triangles(g, live)
     n_removed = 0
@@ -399,8 +405,7 @@ def thin(
                     n_waiting += 1
             if n_waiting == 0:
                 break
-            for k in range(n // 2 - 1, -1, -1):
-                _sift_down(heap, at, key, k, n)
+            _make_heap(heap, at, key, n)
             continue
         n -= 1
         heap[0] = heap[n]
@@ -431,8 +436,7 @@ def thin(
                 break
             for k in range(n):
                 _cost_again(g, live, heap[k], key, patience)
-            for k in range(n // 2 - 1, -1, -1):
-                _sift_down(heap, at, key, k, n)
+            _make_heap(heap, at, key, n)
             is_fresh = True
             n_passes += 1
             continue
