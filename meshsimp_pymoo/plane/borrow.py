@@ -42,15 +42,20 @@ class _Members(AttributeTemplate):
     def generic_resolve(self, kind: Any, name: str) -> Any:
         """Return the type of a member."""
         fields = kind.record.fields
-        return kind.record.types[fields.index(name)] if name in fields else None
+        if name not in fields:
+            return None
+        member = kind.record.types[fields.index(name)]
+        return Borrowed(member) if isinstance(member, types.BaseNamedTuple) else member  # type: ignore[attr-defined]
 
 
 @lower_getattr_generic(Borrowed)
 def _member(context: Any, builder: Any, kind: Any, address: Any, name: str) -> Any:
-    """Load a member; an array without what counts its references."""
+    """Load a member; an array without what counts its references, of a record within the record the address."""
     k = kind.record.fields.index(name)
-    item = builder.load(cgutils.gep_inbounds(builder, address, 0, k))
-    return _without_references(context, builder, kind.record.types[k], item)
+    member, place = kind.record.types[k], cgutils.gep_inbounds(builder, address, 0, k)
+    if isinstance(member, types.BaseNamedTuple):  # type: ignore[attr-defined]
+        return place
+    return _without_references(context, builder, member, builder.load(place))
 
 
 def _without_references(context: Any, builder: Any, kind: Any, item: Any) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshsimp_pymoo.arrays import BoolArray, IntArray
+from meshsimp_pymoo.compiling.draws import below, unit
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.search.budgets import stopping
@@ -61,34 +62,13 @@ SIZE_TRIES = 12
 FIT_FAILURES = 20
 
 
-@inner(inline=True)
-def _next(state: np.ndarray) -> int:
-    """Advance a xorshift64* generator (Vigna 2016); 63 bits."""
-    x = state[0]
-    x ^= x >> np.uint64(12)
-    x ^= x << np.uint64(25)
-    x ^= x >> np.uint64(27)
-    state[0] = x
-    return np.int64((x * np.uint64(2685821657736338717)) >> np.uint64(1))
-
-
-@inner(inline=True)
-def _below(state: np.ndarray, n: int) -> int:
-    return _next(state) % n
-
-
-@inner(inline=True)
-def _unit(state: np.ndarray) -> float:
-    return ((_next(state) >> 10) + 1) * 2.0**-53
-
-
 @inner
 def _urgent(g: Any, live: Any, n: int, state: np.ndarray) -> int:
     """Draw a vertex that is no site, from the triangle with the largest error of a few; -1 if none was met."""
     best = -1
     most = -1.0
     for _ in range(FAR_TRIES):
-        i = _below(state, n)
+        i = below(state, n)
         if not is_site(g, live, i):
             amount = urgency(g, live, i)
             if amount > most:
@@ -148,23 +128,23 @@ def anneal(
                 made[0] = step
                 break
         slack = most - n_triangles(g, live)
-        kind = _unit(state)
-        q = _below(state, n_movable) if n_movable > 0 else 0
+        kind = unit(state)
+        q = below(state, n_movable) if n_movable > 0 else 0
         v = np.int64(-1)
         w = np.int64(-1)
         if slack > 0 and kind < (fill if slack > 1 else on_border):
             # Room for a vertex more; where there is room for one triangle only, it must be on the border.
-            w = _urgent(g, live, n, state) if slack > 1 else np.int64(border[_below(state, len(border))])
+            w = _urgent(g, live, n, state) if slack > 1 else np.int64(border[below(state, len(border))])
         elif n_movable == 0:
             continue
         else:
             v = movable[q]
             if kind < 1.0 - drop:
-                if _unit(state) < near:
+                if unit(state) < near:
                     w = v
-                    for _ in range(1 + _below(state, 2)):
+                    for _ in range(1 + below(state, 2)):
                         degree = indptr[w + 1] - indptr[w]
-                        w = np.int64(indices[indptr[w] + _below(state, degree)])
+                        w = np.int64(indices[indptr[w] + below(state, degree)])
                 else:
                     w = _urgent(g, live, n, state)
                 if w < 0:
@@ -173,7 +153,7 @@ def anneal(
             continue
         if v < 0 and w < 0:
             continue
-        limit = -temperature * np.log(_unit(state))
+        limit = -temperature * np.log(unit(state))
         change, triangles = try_exchange(g, live, v, w, limit)
         if not change <= limit or triangles > slack:
             continue
@@ -225,7 +205,7 @@ def fit_size(
         best_w = np.int64(-1)
         least = np.inf
         for _ in range(SIZE_TRIES):
-            i = np.int64(_below(state, n))
+            i = np.int64(below(state, n))
             v = np.int64(-1)
             w = np.int64(-1)
             if shrink:

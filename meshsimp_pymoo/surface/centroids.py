@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.plane.hilbert import hilbert_keys
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.model import OpenModel
 QUANTUM = 2.0**-52
 
 
-def centroids_of(model: OpenModel) -> tuple[FloatArray, FloatArray, FloatArray]:
+def centroids_of(model: OpenModel) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Return the centroids of the original faces that have an area in the plane, along the curve of the vertices.
 
     Returns
@@ -31,6 +31,8 @@ def centroids_of(model: OpenModel) -> tuple[FloatArray, FloatArray, FloatArray]:
         Height of the original surface there [model units].
     area : (K,) float array
         Area of each face in the plane, as a share of all; adds up to 1.
+    rows : (K,) int array
+        The faces.
     """
     xy, faces = model.xy, model.faces
     a, b, c = (xy[faces[:, k]] for k in range(3))
@@ -40,7 +42,7 @@ def centroids_of(model: OpenModel) -> tuple[FloatArray, FloatArray, FloatArray]:
     place = np.rint((a + b + c)[solid] / (3.0 * QUANTUM)) * QUANTUM
     order = np.argsort(hilbert_keys(place), kind="stable")
     solid = solid[order]
-    return place[order], model.points[faces[solid], 2].mean(axis=1), area[solid] / area[solid].sum()
+    return place[order], model.points[faces[solid], 2].mean(axis=1), area[solid] / area[solid].sum(), solid
 
 
 def with_centroids(ground: Ground, model: OpenModel) -> tuple[Ground, FloatArray]:
@@ -48,7 +50,7 @@ def with_centroids(ground: Ground, model: OpenModel) -> tuple[Ground, FloatArray
 
     Sites are vertices: what is exact of circles is so of these.
     """
-    place, z, area = centroids_of(model)
+    place, z, area, _ = centroids_of(model)
     xy = np.vstack([model.xy, place])
     both = ground._replace(
         xy=np.ascontiguousarray(xy).ravel(),

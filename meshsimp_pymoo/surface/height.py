@@ -15,6 +15,7 @@ from scipy import sparse
 from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.surface.books import Live, make_live, with_peaks
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
+from meshsimp_pymoo.surface.free import FreeGround
 from meshsimp_pymoo.surface.ground import Ground, make_ground
 from meshsimp_pymoo.surface.live import build
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
@@ -63,6 +64,7 @@ class HeightSurface:
         is_small = self.n_vertices < LARGE
         self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)
         self._books = Reserve(partial(make_live, self.n_vertices), is_small)
+        self._free: dict[bool, FreeGround] = {}
 
     @property
     def n_vertices(self) -> int:
@@ -133,6 +135,7 @@ class HeightSurface:
                 raise ValueError(f"{name} = {value!r} is no number of at least 0")
         other = copy.copy(self)
         other.rules = replace(self.rules, measure="error")  # the sum of these costs
+        other._free = {}
         other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
         return other
 
@@ -143,7 +146,16 @@ class HeightSurface:
         other = copy.copy(self)
         other.rules = replace(self.rules, measure=measure)
         other.__dict__.pop("_ground", None)
+        other._free = {}
         return other
+
+    def free_ground(self, *, centroids: bool = True) -> FreeGround:
+        """Return what the free meshes of this surface have in common; see :mod:`~meshsimp_pymoo.surface.free`."""
+        if centroids not in self._free:
+            self._free[centroids] = FreeGround(
+                self.model, self.rules, self._ground, self.pinned, centroids=centroids
+            )
+        return self._free[centroids]
 
     @contextmanager
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Live]:
@@ -264,7 +276,7 @@ class HeightSurface:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_ground", "view")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_ground", "view")} | {"_free": {}}
 
 
 def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float = TOLERANCE) -> Refitted:

@@ -63,7 +63,7 @@ RETAKEN_BELOW = 2.0**-20
 
 
 @inner
-def _collect(live: Live, triangles: np.ndarray, n: int) -> None:
+def collect(live: Live, triangles: np.ndarray, n: int) -> None:
     """Take triangles out of the books: their vertices into the pool, their errors, their segments."""
     count = live.tally
     kind = live.kind
@@ -117,7 +117,7 @@ def _turn_thin(live: Live, t: int) -> None:
     bits = live.kind[t >> 3]
     if not bits & IN_REGION:
         live.region[count[N_REGION]] = t
-        _collect(live, live.region[count[N_REGION] :], 1)
+        collect(live, live.region[count[N_REGION] :], 1)
         count[N_REGION] += 1
         count[N_THIN] += 1
     # The outline's segments have gone with the collecting.
@@ -177,21 +177,10 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
 
     With ``half`` a second operation follows at once, which settles the bare vertices of both.
     """
-    xy = g.xy
-    z = g.z
     mesh = live.mesh
     kind = live.kind
     count = live.tally
     region = live.region
-    head = live.head
-    subtotal = live.subtotal
-    place = live.place
-    used = live.used
-    touched = live.touched
-    pool = live.pool
-    following = live.following
-    amount = live.amount
-    weighed = g.weighed
     for q in range(count[N_REGION]):
         t = region[q]
         a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
@@ -224,6 +213,27 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
                     _settle_thin(live, s)
         for q in range(count[N_REGION]):
             kind[region[q] >> 3] &= ~IN_REGION
+    enter_region(g, live, half)
+
+
+@inner
+def enter_region(g: Ground, live: Live, half: bool) -> None:
+    """Enter the triangles of the region, whose kind is known, into the books and place the pooled vertices."""
+    xy = g.xy
+    z = g.z
+    mesh = live.mesh
+    kind = live.kind
+    count = live.tally
+    region = live.region
+    head = live.head
+    subtotal = live.subtotal
+    place = live.place
+    used = live.used
+    touched = live.touched
+    pool = live.pool
+    following = live.following
+    amount = live.amount
+    weighed = g.weighed
     for q in range(count[N_REGION]):
         t = region[q]
         head[t >> 3] = -1
@@ -302,7 +312,7 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
     if whole > amount[PEAK]:
         amount[PEAK] = whole
     elif whole < RETAKEN_BELOW * amount[PEAK]:
-        _retake(live, len(g.z))
+        retake(live, len(g.z))
 
 
 @inner
@@ -319,7 +329,7 @@ def peak_in(g: Ground, live: Live, t: int) -> float:
 
 
 @inner
-def _retake(live: Live, n: int) -> None:
+def retake(live: Live, n: int) -> None:
     """Add up the costs anew: of the emitted triangles, and of the bare ones among n vertices."""
     amount = live.amount
     amount[COVERED_ERROR] = 0.0
@@ -334,7 +344,8 @@ def _retake(live: Live, n: int) -> None:
 
 
 @inner(inline=True)
-def _new_record(live: Live) -> int:
+def new_record(live: Live) -> int:
+    """Return an unused record."""
     count = live.tally
     if count[N_FREE] > 0:
         count[N_FREE] -= 1
@@ -351,7 +362,7 @@ def _insert(g: Ground, live: Live, p: int, half: bool) -> None:
     count = live.tally
     t0 = live.place[p]
     n_cavity, n_rim = cavity_of(g.xy, mesh, t0, p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift)
-    _collect(live, live.cavity, n_cavity)
+    collect(live, live.cavity, n_cavity)
     # p itself leaves the pool: it is a site now.
     n = 0
     for q in range(count[N_POOL]):
@@ -366,7 +377,7 @@ def _insert(g: Ground, live: Live, p: int, half: bool) -> None:
     live.touched[count[N_TOUCHED]] = p
     count[N_TOUCHED] += 1
     for k in range(n_rim):
-        live.region[k] = live.cavity[k] if k < n_cavity else _new_record(live)
+        live.region[k] = live.cavity[k] if k < n_cavity else new_record(live)
     count[N_REGION] = n_rim
     # The rim's vertices are read before any record is written over.
     for k in range(n_rim):
@@ -414,7 +425,7 @@ def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
         )
     if n_ears == 0 or not is_solid(mesh, live.ears, n_ears, live.rim, m):
         return False
-    _collect(live, live.cavity, m)
+    collect(live, live.cavity, m)
     live.pool[count[N_POOL]] = p
     count[N_POOL] += 1
     forget_bare(live, p)

@@ -1,0 +1,818 @@
+"""Free triangulations: meshes whose edges are chosen for the error, as their vertices are, not by the Delaunay rule.
+
+A free mesh is a subset of the original vertices with a triangulation of its own. It begins as the Delaunay mesh of a
+subset and is annealed at equal triangles by three moves, each of them a fan (`fans`) whose effect on the error is
+exact: an edge flips, a vertex moves to another original one inside its star, one vertex collapses and another one
+comes. Beside the vertices the centroids of the original faces may be samples, so that the mesh does not merely fit the
+vertices.
+
+The plane outside the mesh is triangulated too, out to four corners far away, so that the same moves change the outline:
+a vertex on it goes to another one of the original's border, an edge of it flips, one collapses and another one comes.
+What a triangle may be is said once: inside the footprint it is emitted and has the least height that is asked for,
+outside it is not emitted and of any shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import BoolArray, IntArray
+from meshsimp_pymoo.compiling.draws import below, unit
+from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.plane.faces import canonical_faces
+from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.plane.stars import turn
+from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE
+from meshsimp_pymoo.surface import moves
+from meshsimp_pymoo.surface.books import (
+    BARE_ERROR,
+    COVERED,
+    COVERED_ERROR,
+    EMITTED,
+    END,
+    N_EMITTED,
+    N_THIN,
+    PLAIN,
+    SEGMENT,
+    Live,
+    make_live,
+)
+from meshsimp_pymoo.surface.centroids import centroids_of, with_centroids
+from meshsimp_pymoo.surface.costs import deviation_in
+from meshsimp_pymoo.surface.fans import (
+    N_CAVITY,
+    N_RING,
+    Fan,
+    Freedom,
+    at_least,
+    cost_at,
+    done,
+    done_outside,
+    fill_around,
+    fill_from,
+    has_shape,
+    is_covered,
+    is_inside_all,
+    is_shown,
+    make_fan,
+    side_of,
+    take_pair,
+    take_star,
+    take_triangle,
+    tried,
+    undone,
+)
+from meshsimp_pymoo.surface.ground import Ground
+from meshsimp_pymoo.surface.live import build, retake
+from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.moves import answers
+from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.workers import Reserve
+
+# How far the corners of the plane are from the unit square; their differences with all vertices are exact there.
+FAR = 0.5
+# No triangle that comes is lower than this in the unit square, whatever else is asked for: single precision holds it.
+LEAST_HEIGHT = 2.0**-21
+# Least height of triangles that come, as a share of their longest edge, where nothing is said.
+USUAL_RATIO = 0.1
+# Triangles compared where a vertex comes.
+TRIES = 4
+# Of so many flips outside the mesh one is made: they cost nothing and change what can come next.
+IDLE = 8
+# From so many samples on, books that are not used are given back: hundreds of bytes a sample each.
+LARGE = 900_000
+
+
+class FreeShares(NamedTuple):
+    """How often each move is tried.
+
+    Attributes
+    ----------
+    flip : float
+        An edge flips.
+    shift : float
+        A vertex moves inside its star. In the other moves one collapses, and another one comes elsewhere.
+    """
+
+    flip: float = 0.45
+    shift: float = 0.40
+
+
+USUAL_SHARES = FreeShares()
+
+
+# ------------------------------------------------------------------------------------------------------------- opening
+
+
+@inner
+def _quarter(dx: float, dy: float) -> int:
+    """Return which far corner is seen from an edge of the hull in direction (dx, dy), the outside on its left."""
+    if -dy >= 0.0:
+        return 0 if dx >= 0.0 else 3
+    return 1 if dx >= 0.0 else 2
+
+
+@entry
+def _open(ground: Ground, books: Live, n: int) -> None:
+    """Put triangles to far corners, the samples n to n + 3, in place of the ghosts; slivers are as others are."""
+    g = borrowed(ground)
+    live = borrowed(books)
+    mesh = live.mesh
+    kind = live.kind
+    xy = g.xy
+    end = live.tally[END]
+    for t in range(0, end, RECORD):
+        bits = kind[t >> 3]
+        kind[t >> 3] = (PLAIN | (bits & ~(SEGMENT - 1))) if bits & EMITTED else 0
+    live.tally[N_THIN] = 0
+    first = np.int64(-1)
+    strip = np.empty(end // RECORD + 5, np.int64)
+    for t in range(0, end, RECORD):
+        if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX:
+            first = t
+            # a, b, the vertex at infinity, in this order
+            k = 0 if mesh[t] > LAST_INDEX else (1 if mesh[t + 1] > LAST_INDEX else 2)
+            a, b = mesh[t + (k + 1) % 3], mesh[t + (k + 2) % 3]
+            across = mesh[t + (k + 1) % 3 + 4]
+            after = np.int64(mesh[t + (k + 2) % 3 + 4]) & TRIANGLE
+            mesh[t] = a
+            mesh[t + 1] = b
+            mesh[t + 4] = across
+            mesh[across + 4] = t
+            mesh[t + 7] = after  # the one that begins where this one ends
+            mesh[t + 2] = n + _quarter(xy[2 * b] - xy[2 * a], xy[2 * b + 1] - xy[2 * a + 1])
+    void = live.tally[END]
+    live.tally[END] += RECORD
+    for e in range(3):
+        mesh[void + e] = INFINITE
+        mesh[void + e + 4] = void + e
+    kind[void >> 3] = 0
+    live.head[void >> 3] = -1
+    live.subtotal[void >> 3] = 0.0
+    t = first
+    n_strip = 0
+    while True:
+        after = np.int64(mesh[t + 7])
+        strip[n_strip] = t
+        n_strip += 1
+        last = t + 1  # the halfedge from where it ends to its far corner
+        corner = np.int64(mesh[t + 2]) - n
+        while corner != np.int64(mesh[after + 2]) - n:
+            s = live.tally[END]
+            live.tally[END] += RECORD
+            mesh[s] = mesh[t + 1]
+            mesh[s + 1] = n + (corner + 3) % 4
+            mesh[s + 2] = n + corner
+            mesh[s + 5] = void
+            mesh[s + 6] = last
+            mesh[last + 4] = s + 2
+            kind[s >> 3] = 0
+            live.head[s >> 3] = -1
+            live.subtotal[s >> 3] = 0.0
+            strip[n_strip] = s
+            n_strip += 1
+            last = s
+            corner = (corner + 3) % 4
+        mesh[last + 4] = after + 2
+        mesh[after + 6] = last
+        t = after
+        if t == first:
+            break
+    # What lies beyond the hull is on the strip, near the edge that it was entered at.
+    for q in range(n_strip):
+        t = strip[q]
+        for e in range(3):
+            live.place[mesh[t + e]] = t
+    for q in range(n_strip):
+        t = strip[q]
+        i = np.int64(live.head[t >> 3])
+        live.head[t >> 3] = -1
+        while i >= 0:
+            after = np.int64(live.following[i])
+            live.pool[i] = q  # where the look begins
+            live.following[i] = -1
+            live.place[i] = t
+            i = after
+    for i in range(n):
+        if live.site[i] or live.bare[i] == COVERED or kind[live.place[i] >> 3] != 0:
+            continue
+        t = np.int64(live.place[i])
+        if max(mesh[t], max(mesh[t + 1], mesh[t + 2])) < n:
+            continue
+        q = np.int64(live.pool[i])
+        for step in range(n_strip + 1):
+            found = False
+            for sign in (1, -1):
+                s = strip[(q + sign * step) % n_strip]
+                if (
+                    turn(xy, mesh[s], mesh[s + 1], i, g.exact_area) >= 0
+                    and turn(xy, mesh[s + 1], mesh[s + 2], i, g.exact_area) >= 0
+                    and turn(xy, mesh[s + 2], mesh[s], i, g.exact_area) >= 0
+                ):
+                    t = s
+                    found = True
+                    break
+            if found:
+                break
+        live.place[i] = t
+        live.following[i] = live.head[t >> 3]
+        live.head[t >> 3] = i
+
+
+# --------------------------------------------------------------------------------------------------------------- moves
+
+
+@inner
+def _outside(free: Freedom, live: Live, fan: Fan, v: int, w: int, least: int, most: int, limit: float) -> float:
+    """Change what is not all emitted; return the change of cost, inf where nothing is changed.
+
+    There must be at least ``least`` more triangles after that, and at most ``most`` in all.
+    """
+    more = is_shown(free, live, fan)
+    if more < least or live.tally[N_EMITTED] + more > most or not at_least(free, live, fan, v, w, limit) < np.inf:
+        return np.inf
+    return done_outside(free, live, fan, v, w, limit)
+
+
+@inner
+def _inside(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -> float:
+    """Change what is all emitted; return the change of cost, inf where nothing is changed."""
+    if not has_shape(free, fan):
+        return np.inf
+    change = tried(free, live, fan, v, w, limit)
+    if not change <= limit or not is_inside_all(free, fan):
+        return np.inf
+    done(free, live, fan, v, w)
+    return change
+
+
+@inner
+def _flip(free: Freedom, live: Live, h: int, most: int, limit: float, state: np.ndarray) -> float:
+    """Flip the edge of halfedge h; return the change of cost, inf where it stays."""
+    mesh = live.mesh
+    t = h & TRIANGLE
+    s = np.int64(mesh[h + 4]) & TRIANGLE
+    if (mesh[t] | mesh[t + 1] | mesh[t + 2] | mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
+        return np.inf
+    fan = free.fan
+    take_pair(live, fan, h)
+    fill_from(fan, 0)
+    if live.kind[t >> 3] & live.kind[s >> 3] & EMITTED:
+        return _inside(free, live, fan, -1, -1, limit)
+    if not free.moves_outline:
+        return np.inf
+    if not (live.kind[t >> 3] | live.kind[s >> 3]) & EMITTED and below(state, IDLE) > 0:
+        return np.inf
+    return _outside(free, live, fan, -1, -1, 0, most, limit)
+
+
+@inner
+def _shift(free: Freedom, live: Live, v: int, inside: bool, most: int, limit: float, state: np.ndarray) -> int:
+    """Move site v, whose star is the cavity, to a vertex that comes instead; return that, -1 where v stays."""
+    if inside:
+        w = _stroll(free.indptr, free.indices, v, 1 + below(state, 3), state)
+    else:
+        w = _stroll(free.border_indptr, free.border_indices, v, 1 + below(state, 3), state)
+    if live.site[w]:
+        return -1
+    fill_around(free.fan, w)
+    if inside:
+        change = _inside(free, live, free.fan, v, w, limit)
+    else:
+        change = _outside(free, live, free.fan, v, w, 0, most, limit)
+    return w if change < np.inf else -1
+
+
+@inner
+def _stroll(indptr: np.ndarray, indices: np.ndarray, v: int, steps: int, state: np.ndarray) -> int:
+    """Walk at random on a graph."""
+    w = v
+    for _ in range(steps):
+        degree = indptr[w + 1] - indptr[w]
+        if degree == 0:
+            break
+        w = np.int64(indices[indptr[w] + below(state, degree)])
+    return w
+
+
+@inner
+def _take_around(g: Ground, live: Live, fan: Fan, t: int, w: int) -> bool:
+    """Let the cavity be triangle t, or the two at its side on which vertex w lies, and w the apex.
+
+    Returns False where w is at a corner.
+    """
+    mesh = live.mesh
+    on = -1
+    for e in range(3):
+        if turn(g.xy, mesh[t + e], mesh[t + (e + 1) % 3], w, g.exact_area) == 0:
+            if on >= 0:
+                return False
+            on = e
+    if on < 0:
+        take_triangle(live, fan, t)
+    else:
+        s = np.int64(mesh[t + on + 4]) & TRIANGLE
+        if (mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
+            return False
+        take_pair(live, fan, t + on)
+    fill_around(fan, w)
+    return True
+
+
+@inner
+def _wanted_in(free: Freedom, live: Live, t: int, state: np.ndarray) -> int:
+    """Draw a vertex of the list of emitted triangle t, or take the one that deviates most; -1: there is none."""
+    g = free.ground
+    mesh = live.mesh
+    a, b, c = np.int64(mesh[t]), np.int64(mesh[t + 1]), np.int64(mesh[t + 2])
+    worst = unit(state) < 0.5
+    found = np.int64(-1)
+    n = 0
+    most = -1.0
+    i = np.int64(live.head[t >> 3])
+    while i >= 0:
+        if i < free.n_vertices:
+            if worst:
+                d = deviation_in(g.xy, g.z, a, b, c, i)
+                if d > most:
+                    most = d
+                    found = i
+            else:
+                n += 1
+                if below(state, n) == 0:
+                    found = i
+        i = np.int64(live.following[i])
+    return found
+
+
+@inner
+def _meet(one: Fan, two: Fan) -> bool:
+    """Whether two cavities share a triangle."""
+    for q in range(one.count[N_CAVITY]):
+        for p in range(two.count[N_CAVITY]):
+            if one.cavity[q] == two.cavity[p]:
+                return True
+    return False
+
+
+@inner
+def _swap(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.ndarray) -> int:
+    """Let site v inside the mesh collapse and a vertex come where the cost is large; return that, -1: nothing changed.
+
+    The cavity is the star of v, which stays where there is room for two triangles more.
+    """
+    fan = free.fan
+    other = free.other
+    n_records = live.tally[END] >> 3
+    t = np.int64(-1)
+    for _ in range(TRIES):
+        r = below(state, n_records)
+        if live.kind[r] & EMITTED and (t < 0 or live.subtotal[r] > live.subtotal[t >> 3]):
+            t = r * RECORD
+    if t < 0:
+        return -1
+    w = _wanted_in(free, live, t, state)
+    if w < 0 or not _take_around(free.ground, live, other, t, w) or not is_covered(live, other):
+        return -1
+    if live.tally[N_EMITTED] + 2 <= most:
+        return w if _inside(free, live, other, -1, w, limit) < np.inf else -1
+    if _meet(fan, other) or not has_shape(free, other):
+        return -1
+    fill_from(fan, below(state, fan.count[N_RING]))
+    if not has_shape(free, fan):
+        return -1
+    gain = tried(free, live, other, -1, w, np.inf)
+    if not tried(free, live, fan, v, -1, limit - gain) < np.inf:
+        return -1
+    if not is_inside_all(free, fan) or not is_inside_all(free, other):
+        return -1
+    done(free, live, fan, v, -1)
+    _take_around(free.ground, live, other, t, w)  # what lies beyond its rim may be the fan that came
+    done(free, live, other, -1, w)
+    return w
+
+
+@inner
+def _swap_outline(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.ndarray) -> int:
+    """Let site v of the outline collapse along it and another vertex of the original's border come; as `_swap`."""
+    g = free.ground
+    fan = free.fan
+    other = free.other
+    mesh = live.mesh
+    w = np.int64(-1)
+    worst = -1.0
+    for _ in range(TRIES):
+        i = np.int64(free.border[below(state, len(free.border))])
+        if live.site[i]:
+            continue
+        amount = live.cost[i]
+        if live.bare[i] == COVERED:
+            t = np.int64(live.place[i])
+            amount = cost_at(free, i, deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i))
+        if amount > worst:
+            worst = amount
+            w = i
+    if w < 0 or not _take_around(g, live, other, np.int64(live.place[w]), w):
+        return -1
+    room = most - live.tally[N_EMITTED]
+    more = is_shown(free, live, other)
+    if more <= 0 or more > room + 2:
+        return -1
+    if more <= room:
+        return w if done_outside(free, live, other, -1, w, limit) < np.inf else -1
+    r = _along_outline(live, fan, state)
+    if r < 0 or fan.ring[r] >= free.n_vertices:
+        return -1
+    fill_from(fan, r)
+    if is_shown(free, live, fan) != -more:
+        return -1
+    # What both can do at best is known sooner than what they do.
+    least = at_least(free, live, other, -1, w, np.inf)
+    if not _meet(fan, other) and not at_least(free, live, fan, v, -1, limit - least) < np.inf:
+        return -1
+    u = fan.ring[r]
+    gain = done_outside(free, live, other, -1, w, np.inf)
+    if take_star(live, fan, v):
+        for q in range(fan.count[N_RING]):
+            if fan.ring[q] == u:
+                fill_from(fan, q)
+                if _outside(free, live, fan, v, -1, -more, most, limit - gain) < np.inf:
+                    return w
+                break
+    undone(free, live, other)
+    return -1
+
+
+@inner
+def _along_outline(live: Live, fan: Fan, state: np.ndarray) -> int:
+    """Draw a vertex of the ring of a site on the outline that follows it there; -1: the site is on none."""
+    m = fan.count[N_RING]
+    found = -1
+    n = 0
+    for r in range(m):
+        mine = live.kind[fan.cavity[r] >> 3] & EMITTED
+        theirs = live.kind[fan.cavity[r - 1 if r > 0 else m - 1] >> 3] & EMITTED
+        if mine != theirs:
+            n += 1
+            if below(state, n) == 0:
+                found = r
+    return found
+
+
+@entry
+def anneal_freely(
+    freedom: Freedom,
+    books: Live,
+    movable: np.ndarray,
+    n_movable: np.ndarray,
+    moves: int,
+    hot: float,
+    cold: float,
+    most: int,
+    shares: FreeShares,
+    state: np.ndarray,
+    stop: np.ndarray,
+    accepted: np.ndarray,
+) -> int:
+    """Walk among free meshes of at most ``most`` triangles; return the number of moves that were tried.
+
+    The temperature falls from ``hot`` to ``cold``; 0 accepts improvements only. ``movable[:n_movable[0]]`` are the
+    sites that may go, ``accepted`` counts flips, shifts and swaps.
+    """
+    free = borrowed(freedom)
+    live = borrowed(books)
+    state = borrowed(state)
+    movable = borrowed(movable)
+    temperature = hot
+    for step in range(moves):
+        if step % 64 == 0:
+            if stop[0]:
+                return step
+            temperature = hot * (cold / hot) ** (step / moves) if hot > 0.0 else 0.0
+        # what costs nothing is refused in the end: it would go on for ever
+        limit = -temperature * np.log(unit(state)) if hot > 0.0 else -1e-300
+        what = unit(state)
+        if what < shares.flip or n_movable[0] == 0:
+            h = below(state, 3 * (live.tally[END] >> 3))
+            accepted[0] += _flip(free, live, h // 3 * RECORD + h % 3, most, limit, state) < np.inf
+            continue
+        q = below(state, n_movable[0])
+        v = movable[q]
+        if not take_star(live, free.fan, v):
+            continue
+        inside = is_covered(live, free.fan)
+        if not inside and not free.moves_outline:
+            continue
+        if what < shares.flip + shares.shift:
+            w = _shift(free, live, v, inside, most, limit, state)
+            accepted[1] += w >= 0
+        else:
+            if inside:
+                w = _swap(free, live, v, most, limit, state)
+            else:
+                w = _swap_outline(free, live, v, most, limit, state)
+            accepted[2] += w >= 0
+        if w >= 0:
+            if live.site[v]:  # there was room for one more
+                q = n_movable[0]
+                n_movable[0] += 1
+            movable[q] = w
+    retake(live, len(free.ground.z))
+    return moves
+
+
+# ------------------------------------------------------------------------------- thinning: answers to `surface.moves`
+
+
+@answers(moves.total_cost, Freedom)
+@inner(inline=True)
+def _total_cost(free: Freedom, live: Live) -> float:
+    return live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
+
+
+@answers(moves.error_now, Freedom)
+@inner(inline=True)
+def _error_now(free: Freedom, live: Live) -> float:
+    return live.amount[COVERED_ERROR] + live.amount[BARE_ERROR]
+
+
+@answers(moves.ranked, Freedom)
+@inner(inline=True)
+def _ranked(free: Freedom, live: Live, change: float) -> tuple[float, float]:
+    return change, 0.0
+
+
+@answers(moves.n_triangles, Freedom)
+@inner(inline=True)
+def _n_triangles(free: Freedom, live: Live) -> int:
+    return live.tally[N_EMITTED]
+
+
+@answers(moves.is_site, Freedom)
+@inner(inline=True)
+def _is_site(free: Freedom, live: Live, v: int) -> bool:
+    return live.site[v] != 0 and live.used[v] > 0
+
+
+@answers(moves.effort, Freedom)
+@inner(inline=True)
+def _effort(free: Freedom, live: Live) -> int:
+    return free.fan.count[N_CAVITY]
+
+
+@answers(moves.try_exchange, Freedom)
+@inner
+def _try_exchange(free: Freedom, live: Live, v: int, w: int, limit: float) -> tuple[float, int]:
+    """Return the least change of cost by which site v collapses, and that of the number of triangles; ``w`` is -1.
+
+    ``free.onto`` notes the neighbour. No other triangle comes or goes than the two at the edge, or the one at an edge
+    of the outline.
+    """
+    fan = free.fan
+    best = np.inf
+    triangles = 0
+    if not take_star(live, fan, v):
+        return best, triangles
+    inside = is_covered(live, fan)
+    if not inside and not free.moves_outline:
+        return best, triangles
+    m = fan.count[N_RING]
+    for r in range(m):
+        if fan.ring[r] >= free.n_vertices or not _collapses(free, live, r, inside):
+            continue
+        if inside:
+            change = tried(free, live, fan, v, -1, min(limit, best))
+        elif at_least(free, live, fan, v, -1, min(limit, best)) < np.inf:
+            change = done_outside(free, live, fan, v, -1, min(limit, best))
+            if change < np.inf:
+                undone(free, live, fan)
+        else:
+            change = np.inf
+        if change < best:
+            best = change
+            free.onto[v] = fan.ring[r]
+            triangles = -2 if inside else -1
+    return best, triangles
+
+
+@inner
+def _collapses(free: Freedom, live: Live, r: int, inside: bool) -> bool:
+    """Whether the site whose star is the cavity can collapse onto vertex r of the ring."""
+    fan = free.fan
+    fill_from(fan, r)
+    if inside:
+        return has_shape(free, fan) and is_inside_all(free, fan)
+    if is_shown(free, live, fan) != -1:
+        return False
+    for k in range(fan.count[N_RING] - 2):
+        # each triangle that stays, with another corner, is what it was
+        if (live.kind[fan.cavity[side_of(fan, k)] >> 3] & EMITTED != 0) != (fan.shown[k] != 0):
+            return False
+    return True
+
+
+@answers(moves.exchange, Freedom)
+@inner
+def _exchange(free: Freedom, live: Live, v: int, w: int) -> bool:
+    """Let site v collapse onto ``free.onto[v]``; ``w`` is -1. Returns False, with nothing changed, where it cannot."""
+    fan = free.fan
+    if not take_star(live, fan, v):
+        return False
+    inside = is_covered(live, fan)
+    for r in range(fan.count[N_RING]):
+        if fan.ring[r] == free.onto[v]:
+            if not _collapses(free, live, r, inside):
+                return False
+            if inside:
+                tried(free, live, fan, v, -1, np.inf)
+                done(free, live, fan, v, -1)
+                return True
+            return done_outside(free, live, fan, v, -1, np.inf) < np.inf
+    return False
+
+
+@answers(moves.sites_around, Freedom)
+@inner
+def _sites_around(free: Freedom, live: Live, v: int, found: np.ndarray) -> int:
+    fan = free.fan
+    if not take_star(live, fan, v):
+        return 0
+    n = 0
+    for r in range(fan.count[N_RING]):
+        if fan.ring[r] < free.n_vertices:
+            found[n] = fan.ring[r]
+            n += 1
+    return n
+
+
+# ------------------------------------------------------------------------------------------------------------ in Python
+
+
+class FreeGround:
+    """What the free meshes of one surface have in common.
+
+    Parameters
+    ----------
+    model : OpenModel
+        The original mesh of N vertices.
+    rules : Rules
+        What counts; their measure is what is lowered.
+    ground : Ground
+        Of these.
+    pinned : (N,) bool array
+        Vertices that stay.
+    centroids : bool
+        Whether the centroids of the original faces are samples too: as many vertices more, each with the weight of its
+        face's corners and the share of its area.
+    """
+
+    def __init__(self, model: OpenModel, rules: Rules, ground: Ground, pinned: BoolArray, *, centroids: bool) -> None:
+        n = model.n_vertices
+        weights = np.ones(n) if model.weights is None else model.weights
+        if centroids:
+            ground, share = with_centroids(ground, model)
+            corners = model.faces[centroids_of(model)[3]]
+            weights = np.concatenate([weights, len(model.faces) * share * weights[corners].mean(axis=1)])
+        n_samples = len(ground.z)
+        low, high = -FAR, 1.0 + FAR
+        xy = np.vstack([ground.xy.reshape(-1, 2), [[high, high], [low, high], [low, low], [high, low]]])
+        points = np.zeros((n_samples + 4, 4))
+        points[:, :2] = xy
+        points[:n_samples, 2] = ground.z
+        points[:n_samples, 3] = weights
+        indptr, indices = model.neighbours
+        start = np.repeat(np.arange(n), np.diff(indptr))
+        on_border = np.zeros(n, np.bool_)
+        on_border[model.border] = True
+        both = on_border[start] & on_border[indices]
+        self.name = model.name
+        self.pinned = pinned
+        self._freedom = Freedom(
+            ground=ground._replace(
+                xy=xy.ravel(), exact_area=exact_ranges(xy)[0], weight=weights, weighed=True, by_peak=False
+            ),
+            points=points,
+            n_vertices=n,
+            border=np.flatnonzero(on_border),
+            indptr=indptr,
+            indices=indices,
+            border_indptr=np.concatenate([[0], np.cumsum(np.bincount(start[both], minlength=n))]).astype(indptr.dtype),
+            border_indices=indices[both],
+            moves_outline=rules.footprint == "model",
+            ratio=0.0,
+            height=LEAST_HEIGHT,
+            onto=np.empty(0, np.int32),
+            fan=make_fan(0),
+            other=make_fan(0),
+        )
+        self._rooms = Reserve(partial(_make_room, n, n_samples), n_samples < LARGE)
+
+    @contextmanager
+    def triangulation(self, kept: BoolArray, *, min_height: float = USUAL_RATIO) -> Iterator[FreeTriangulation]:
+        """Lend the mesh of a subset (N,), to be changed freely until the context ends; see `FreeTriangulation`."""
+        with self._rooms.one() as (live, fan, other, onto):
+            freedom = self._freedom._replace(ratio=float(min_height), onto=onto, fan=fan, other=other)
+            build(freedom.ground, live, np.flatnonzero(kept), self.name)
+            _open(freedom.ground, live, len(freedom.ground.z))
+            yield FreeTriangulation(freedom, live, self.pinned)
+
+
+def _make_room(n_vertices: int, n_samples: int) -> tuple[Live, Fan, Fan, IntArray]:
+    live = make_live(n_samples)
+    live.bare[:] = COVERED
+    return live, make_fan(n_samples), make_fan(n_samples), np.empty(n_vertices, np.int32)
+
+
+class FreeTriangulation:
+    """A free mesh that is changed by moves; `FreeGround.triangulation` lends one.
+
+    Attributes
+    ----------
+    freedom, books : records
+        What the compiled functions work on.
+    accepted : (3,) int array
+        How many flips, shifts and swaps were made.
+    """
+
+    def __init__(self, freedom: Freedom, books: Live, pinned: BoolArray) -> None:
+        self.freedom = freedom
+        self.books = books
+        n = freedom.n_vertices
+        rows = np.flatnonzero((books.site[:n] == 1) & (books.used[:n] > 0) & ~pinned)
+        self._movable = np.empty(n, np.int64)
+        self._movable[: len(rows)] = rows
+        self._n_movable = np.array([len(rows)])
+        self.accepted = np.zeros(3, np.int64)
+
+    @property
+    def faces(self) -> IntArray:
+        """The triangles (M, 3) as rows of the model's points, the least row first, sorted."""
+        end = int(self.books.tally[END])
+        records = self.books.mesh[:end].reshape(-1, RECORD)[:, :3].astype(np.int64)
+        return canonical_faces(records[(self.books.kind[: end // RECORD] & EMITTED) != 0])
+
+    @property
+    def triangles(self) -> int:
+        """The number of triangles."""
+        return int(self.books.tally[N_EMITTED])
+
+    @property
+    def cost(self) -> float:
+        """The sum of the costs of all samples, in the measure of the rules."""
+        return max(float(self.books.amount[[COVERED_ERROR, BARE_ERROR]].sum()), 0.0)
+
+    @property
+    def movable(self) -> int:
+        """The number of vertices that may move."""
+        return int(self._n_movable[0])
+
+    def anneal(
+        self,
+        moves: int,
+        state: np.ndarray,
+        *,
+        hot: float,
+        cold: float,
+        triangles: int,
+        shares: FreeShares = USUAL_SHARES,
+        stop: BoolArray | None = None,
+    ) -> int:
+        """Try so many moves, the temperature falling from ``hot`` to ``cold``; return how many were tried.
+
+        Parameters
+        ----------
+        moves : int
+            How many.
+        state : (1,) uint64 array
+            Of the random numbers, not 0; it goes on.
+        hot, cold : float
+            Temperatures, in the unit of the costs; 0 accepts improvements only.
+        triangles : int
+            The most triangles.
+        shares : FreeShares
+            How often each move is tried.
+        stop : (1,) bool array, optional
+            Ends it where another thread sets it.
+        """
+        return int(
+            anneal_freely(
+                self.freedom,
+                self.books,
+                self._movable,
+                self._n_movable,
+                moves,
+                hot,
+                cold,
+                triangles,
+                shares,
+                state,
+                np.zeros(1, np.bool_) if stop is None else stop,
+                self.accepted,
+            )
+        )
