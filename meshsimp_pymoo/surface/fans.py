@@ -43,7 +43,7 @@ from meshsimp_pymoo.surface.live import collect, enter_region, new_record
 # Vertices with more triangles around stay where they are; the most in searches are some 20.
 MOST_AROUND = 64
 
-# Entries of ``count``: triangles that go, vertices of the ring, the side of the ring that the fan's first triangle
+# Entries of ``number``: triangles that go, vertices of the ring, the side of the ring that the fan's first triangle
 # stands on, the fan's triangles, its apex, and the samples that were looked at.
 N_CAVITY, N_RING, FIRST, N_FAN, APEX, N_SAMPLES = range(6)
 
@@ -54,7 +54,7 @@ NOT = 1 << 30
 class Fan(NamedTuple):
     """One change: what goes and what comes. Sides of the ring are counted counter-clockwise."""
 
-    count: np.ndarray  # (6,) see the names above
+    number: np.ndarray  # (6,) see the names above
     cavity: np.ndarray  # (MOST_AROUND,) triangles that go
     ring: np.ndarray  # (MOST_AROUND,) where each side of the ring starts
     rim: np.ndarray  # (MOST_AROUND,) the halfedge beyond it
@@ -95,7 +95,7 @@ def make_fan(n_samples: int) -> Fan:
     """Return room for one change among so many samples."""
     most = MOST_AROUND
     return Fan(
-        count=np.zeros(6, np.int64),
+        number=np.zeros(6, np.int64),
         cavity=np.zeros(most, np.uint32),
         ring=np.zeros(most, np.uint32),
         rim=np.zeros(most, np.uint32),
@@ -136,8 +136,8 @@ def take_star(live: Live, fan: Fan, v: int) -> bool:
         t = np.int64(mesh[t + (k + 2) % 3 + 4]) & TRIANGLE
         if t == first:
             break
-    fan.count[N_CAVITY] = m
-    fan.count[N_RING] = m
+    fan.number[N_CAVITY] = m
+    fan.number[N_RING] = m
     return True
 
 
@@ -153,8 +153,8 @@ def take_pair(live: Live, fan: Fan, h: int) -> None:
         side = t + ((h & 3) + 2 - (j == 3)) % 3 if j == 0 or j == 3 else s + ((twin & 3) + j) % 3
         fan.ring[j] = mesh[side]
         fan.rim[j] = mesh[side + 4]
-    fan.count[N_CAVITY] = 2
-    fan.count[N_RING] = 4
+    fan.number[N_CAVITY] = 2
+    fan.number[N_RING] = 4
 
 
 @inner
@@ -165,38 +165,38 @@ def take_triangle(live: Live, fan: Fan, t: int) -> None:
     for j in range(3):
         fan.ring[j] = mesh[t + j]
         fan.rim[j] = mesh[t + j + 4]
-    fan.count[N_CAVITY] = 1
-    fan.count[N_RING] = 3
+    fan.number[N_CAVITY] = 1
+    fan.number[N_RING] = 3
 
 
 @inner
 def fill_around(fan: Fan, w: int) -> None:
     """Let vertex w, inside the ring, be the apex."""
-    fan.count[FIRST] = 0
-    fan.count[N_FAN] = fan.count[N_RING]
-    fan.count[APEX] = w
+    fan.number[FIRST] = 0
+    fan.number[N_FAN] = fan.number[N_RING]
+    fan.number[APEX] = w
 
 
 @inner
 def fill_from(fan: Fan, r: int) -> None:
     """Let vertex r of the ring be the apex."""
-    m = fan.count[N_RING]
-    fan.count[FIRST] = r + 1 if r + 1 < m else 0
-    fan.count[N_FAN] = m - 2
-    fan.count[APEX] = fan.ring[r]
+    m = fan.number[N_RING]
+    fan.number[FIRST] = r + 1 if r + 1 < m else 0
+    fan.number[N_FAN] = m - 2
+    fan.number[APEX] = fan.ring[r]
 
 
 @inner(inline=True)
 def side_of(fan: Fan, k: int) -> int:
     """Return the side of the ring on which triangle k of the fan stands."""
-    j = fan.count[FIRST] + k
-    return j if j < fan.count[N_RING] else j - fan.count[N_RING]
+    j = fan.number[FIRST] + k
+    return j if j < fan.number[N_RING] else j - fan.number[N_RING]
 
 
 @inner
 def is_covered(live: Live, fan: Fan) -> bool:
     """Whether all triangles that go are emitted."""
-    for q in range(fan.count[N_CAVITY]):
+    for q in range(fan.number[N_CAVITY]):
         if not live.kind[fan.cavity[q] >> 3] & EMITTED:
             return False
     return True
@@ -211,8 +211,8 @@ def has_shape(free: Freedom, fan: Fan) -> bool:
     points = free.points
     ray = fan.ray
     rise = fan.rise
-    apex = fan.count[APEX]
-    n = fan.count[N_FAN]
+    apex = fan.number[APEX]
+    n = fan.number[N_FAN]
     x0, y0, z0 = points[apex, 0], points[apex, 1], points[apex, 2]
     i = np.int64(fan.ring[side_of(fan, 0)])
     ux, uy, uz = points[i, 0] - x0, points[i, 1] - y0, points[i, 2] - z0
@@ -288,12 +288,12 @@ def tried(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -> 
     sample = fan.sample
     owner = fan.owner
     following = live.following
-    n = fan.count[N_FAN]
-    first = fan.count[FIRST]
-    m = fan.count[N_RING]
-    apex = fan.count[APEX]
+    n = fan.number[N_FAN]
+    first = fan.number[FIRST]
+    m = fan.number[N_RING]
+    apex = fan.number[APEX]
     x0, y0, z0 = points[apex, 0], points[apex, 1], points[apex, 2]
-    n_cavity = fan.count[N_CAVITY]
+    n_cavity = fan.number[N_CAVITY]
     before = 0.0
     for q in range(n_cavity):
         before += live.subtotal[fan.cavity[q] >> 3]
@@ -321,7 +321,7 @@ def tried(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -> 
             i = np.int64(following[i]) if q >= 0 else np.int64(-1)
         if whole > most:
             return np.inf
-    fan.count[N_SAMPLES] = n_samples
+    fan.number[N_SAMPLES] = n_samples
     return whole - before
 
 
@@ -331,9 +331,9 @@ def is_inside_all(free: Freedom, fan: Fan) -> bool:
     g = free.ground
     if g.side == 0:
         return True
-    for k in range(fan.count[N_FAN]):
+    for k in range(fan.number[N_FAN]):
         a, b = np.int64(fan.ring[side_of(fan, k)]), np.int64(fan.ring[side_of(fan, k + 1)])
-        if not is_inside(g, a, b, fan.count[APEX]):
+        if not is_inside(g, a, b, fan.number[APEX]):
             return False
     return True
 
@@ -343,8 +343,8 @@ def _write(live: Live, fan: Fan) -> None:
     """Write the records of the fan, and free those that are left or take new ones."""
     mesh = live.mesh
     record = fan.record
-    n = fan.count[N_FAN]
-    n_cavity = fan.count[N_CAVITY]
+    n = fan.number[N_FAN]
+    n_cavity = fan.number[N_CAVITY]
     for k in range(n):
         record[k] = fan.cavity[k] if k < n_cavity else new_record(live)
     for q in range(n, n_cavity):
@@ -358,13 +358,13 @@ def _write(live: Live, fan: Fan) -> None:
         mesh[t] = INFINITE
         mesh[t + 1] = INFINITE
         mesh[t + 2] = INFINITE
-    is_closed = n == fan.count[N_RING]
+    is_closed = n == fan.number[N_RING]
     for k in range(n):
         t = record[k]
         h = fan.rim[side_of(fan, k)]
         mesh[t] = fan.ring[side_of(fan, k)]
         mesh[t + 1] = fan.ring[side_of(fan, k + 1)]
-        mesh[t + 2] = fan.count[APEX]
+        mesh[t + 2] = fan.number[APEX]
         mesh[t + 4] = h
         mesh[h + 4] = t
         if k < n - 1 or is_closed:
@@ -375,7 +375,7 @@ def _write(live: Live, fan: Fan) -> None:
         # the sides of the ring at the apex
         for e in (1, 2):
             t = record[n - 1 if e == 1 else 0]
-            j = side_of(fan, n) if e == 1 else (fan.count[FIRST] + fan.count[N_RING] - 1) % fan.count[N_RING]
+            j = side_of(fan, n) if e == 1 else (fan.number[FIRST] + fan.number[N_RING] - 1) % fan.number[N_RING]
             h = fan.rim[j]
             mesh[t + e + 4] = h
             mesh[h + 4] = t + e
@@ -390,8 +390,8 @@ def done(free: Freedom, live: Live, fan: Fan, v: int, w: int) -> None:
     place = live.place
     head = live.head
     following = live.following
-    n = fan.count[N_FAN]
-    n_cavity = fan.count[N_CAVITY]
+    n = fan.number[N_FAN]
+    n_cavity = fan.number[N_CAVITY]
     at_outline = False
     for q in range(n_cavity):
         t = fan.cavity[q]
@@ -421,7 +421,7 @@ def done(free: Freedom, live: Live, fan: Fan, v: int, w: int) -> None:
             i = mesh[t + e]
             used[i] += 1
             place[i] = t
-    for q in range(fan.count[N_SAMPLES]):
+    for q in range(fan.number[N_SAMPLES]):
         i = fan.sample[q]
         t = fan.record[fan.owner[q]]
         place[i] = t
@@ -447,14 +447,14 @@ def is_shown(free: Freedom, live: Live, fan: Fan) -> int:
     """
     g = free.ground
     mesh = live.mesh
-    apex = fan.count[APEX]
+    apex = fan.number[APEX]
     more = 0
-    for q in range(fan.count[N_CAVITY]):
+    for q in range(fan.number[N_CAVITY]):
         t = fan.cavity[q]
         if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX:
             return NOT
         more -= (live.kind[t >> 3] & EMITTED) != 0
-    for k in range(fan.count[N_FAN]):
+    for k in range(fan.number[N_FAN]):
         a, b = np.int64(fan.ring[side_of(fan, k)]), np.int64(fan.ring[side_of(fan, k + 1)])
         if turn(g.xy, a, b, apex, g.exact_area) <= 0:
             return NOT
@@ -475,9 +475,9 @@ def at_least(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) 
     outline than to theirs may lower it more.
     """
     points = free.points
-    n = fan.count[N_FAN]
-    n_cavity = fan.count[N_CAVITY]
-    apex = fan.count[APEX]
+    n = fan.number[N_FAN]
+    n_cavity = fan.number[N_CAVITY]
+    apex = fan.number[APEX]
     mesh = live.mesh
     x0, y0, z0 = points[apex, 0], points[apex, 1], points[apex, 2]
     change = 0.0
@@ -524,7 +524,7 @@ def at_least(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) 
 
 @inner
 def _goes(fan: Fan, t: int) -> bool:
-    for q in range(fan.count[N_CAVITY]):
+    for q in range(fan.number[N_CAVITY]):
         if fan.cavity[q] == t:
             return True
     return False
@@ -550,14 +550,14 @@ def done_outside(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: flo
     """
     mesh = live.mesh
     kind = live.kind
-    n = fan.count[N_FAN]
-    n_cavity = fan.count[N_CAVITY]
+    n = fan.number[N_FAN]
+    n_cavity = fan.number[N_CAVITY]
     for q in range(n_cavity):
         t = fan.cavity[q]
         fan.was[q] = kind[t >> 3] & PLAIN
         for e in range(RECORD):
             fan.saved[q, e] = mesh[t + e]
-    for j in range(fan.count[N_RING]):
+    for j in range(fan.number[N_RING]):
         fan.inside[j] = mesh[fan.rim[j] + 4]
     amount = live.amount
     fan.sums[0] = amount[COVERED_ERROR]
@@ -587,8 +587,8 @@ def done_outside(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: flo
 def undone(free: Freedom, live: Live, fan: Fan) -> None:
     """Take back what `done_outside` did last with this fan; nothing else may have changed since."""
     mesh = live.mesh
-    n = fan.count[N_FAN]
-    n_cavity = fan.count[N_CAVITY]
+    n = fan.number[N_FAN]
+    n_cavity = fan.number[N_CAVITY]
     collect(live, fan.record, n)
     _exchange(live, fan.moved[1], fan.moved[0])
     for k in range(n - 1, n_cavity - 1, -1):
@@ -606,7 +606,7 @@ def undone(free: Freedom, live: Live, fan: Fan) -> None:
             mesh[t + e] = fan.saved[q, e]
         live.kind[t >> 3] = fan.was[q]
         live.region[q] = t
-    for j in range(fan.count[N_RING]):
+    for j in range(fan.number[N_RING]):
         mesh[fan.rim[j] + 4] = fan.inside[j]
     live.tally[N_REGION] = n_cavity
     enter_region(free.ground, live, False)

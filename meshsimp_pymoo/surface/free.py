@@ -354,8 +354,8 @@ def _wanted_in(free: Freedom, live: Live, t: int, state: np.ndarray) -> int:
 @inner
 def _meet(one: Fan, two: Fan) -> bool:
     """Whether two cavities share a triangle."""
-    for q in range(one.count[N_CAVITY]):
-        for p in range(two.count[N_CAVITY]):
+    for q in range(one.number[N_CAVITY]):
+        for p in range(two.number[N_CAVITY]):
             if one.cavity[q] == two.cavity[p]:
                 return True
     return False
@@ -384,7 +384,7 @@ def _swap(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.
         return w if _inside(free, live, other, -1, w, limit) < np.inf else -1
     if _meet(fan, other) or not has_shape(free, other):
         return -1
-    fill_from(fan, below(state, fan.count[N_RING]))
+    fill_from(fan, below(state, fan.number[N_RING]))
     if not has_shape(free, fan):
         return -1
     gain = tried(free, live, other, -1, w, np.inf)
@@ -439,7 +439,7 @@ def _swap_outline(free: Freedom, live: Live, v: int, most: int, limit: float, st
     u = fan.ring[r]
     gain = done_outside(free, live, other, -1, w, np.inf)
     if take_star(live, fan, v):
-        for q in range(fan.count[N_RING]):
+        for q in range(fan.number[N_RING]):
             if fan.ring[q] == u:
                 fill_from(fan, q)
                 if _outside(free, live, fan, v, -1, -more, most, limit - gain) < np.inf:
@@ -452,7 +452,7 @@ def _swap_outline(free: Freedom, live: Live, v: int, most: int, limit: float, st
 @inner
 def _along_outline(live: Live, fan: Fan, state: np.ndarray) -> int:
     """Draw a vertex of the ring of a site on the outline that follows it there; -1: the site is on none."""
-    m = fan.count[N_RING]
+    m = fan.number[N_RING]
     found = -1
     n = 0
     for r in range(m):
@@ -563,7 +563,7 @@ def _is_site(free: Freedom, live: Live, v: int) -> bool:
 @answers(moves.effort, Freedom)
 @inner(inline=True)
 def _effort(free: Freedom, live: Live) -> int:
-    return free.fan.count[N_CAVITY]
+    return free.fan.number[N_CAVITY]
 
 
 @answers(moves.try_exchange, Freedom)
@@ -582,7 +582,7 @@ def _try_exchange(free: Freedom, live: Live, v: int, w: int, limit: float) -> tu
     inside = is_covered(live, fan)
     if not inside and not free.moves_outline:
         return best, triangles
-    m = fan.count[N_RING]
+    m = fan.number[N_RING]
     for r in range(m):
         if fan.ring[r] >= free.n_vertices or not _collapses(free, live, r, inside):
             continue
@@ -610,7 +610,7 @@ def _collapses(free: Freedom, live: Live, r: int, inside: bool) -> bool:
         return has_shape(free, fan) and is_inside_all(free, fan)
     if is_shown(free, live, fan) != -1:
         return False
-    for k in range(fan.count[N_RING] - 2):
+    for k in range(fan.number[N_RING] - 2):
         # each triangle that stays, with another corner, is what it was
         if (live.kind[fan.cavity[side_of(fan, k)] >> 3] & EMITTED != 0) != (fan.shown[k] != 0):
             return False
@@ -625,7 +625,7 @@ def _exchange(free: Freedom, live: Live, v: int, w: int) -> bool:
     if not take_star(live, fan, v):
         return False
     inside = is_covered(live, fan)
-    for r in range(fan.count[N_RING]):
+    for r in range(fan.number[N_RING]):
         if fan.ring[r] == free.onto[v]:
             if not _collapses(free, live, r, inside):
                 return False
@@ -644,7 +644,7 @@ def _sites_around(free: Freedom, live: Live, v: int, found: np.ndarray) -> int:
     if not take_star(live, fan, v):
         return 0
     n = 0
-    for r in range(fan.count[N_RING]):
+    for r in range(fan.number[N_RING]):
         if fan.ring[r] < free.n_vertices:
             found[n] = fan.ring[r]
             n += 1
