@@ -58,14 +58,14 @@ from meshsimp_pymoo.files import (
     write_npz,
 )
 from meshsimp_pymoo.formats.material import is_put_beside
-from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import (
     Format,
+    Rounding,
     format_of_output,
     format_to_write,
     shared_frame,
     warn_of_left_behind,
-    warn_of_shift,
     write_mesh,
 )
 from meshsimp_pymoo.plane.faces import is_canonical
@@ -307,7 +307,7 @@ def write_front(
     with new_folder(folder, replace=overwrite) as partial:
         digits = max(3, len(str(len(order) - 1)))
         files: dict[int, tuple[str, list[str]]] = {}
-        single, pace = 0.0, SECONDS_A_CORNER
+        rounding, pace = Rounding(kind), SECONDS_A_CORNER
         if with_mesh:
             (partial / "meshes").mkdir()
             if refit is not None:
@@ -325,7 +325,7 @@ def write_front(
             assert faces is not None
             triangles = faces(int(row))
             arrays = mesh_arrays(model, triangles)
-            single = max(single, single_precision_shift(arrays[0], surface.view.scale))
+            rounding.add(OutMesh(*arrays, **look), surface.view.scale)
             if solution in with_mesh:
                 path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                 write_mesh(partial / path, *arrays, **look)
@@ -338,6 +338,7 @@ def write_front(
             better = None if refit is None else refit(int(row))
             if better is not None:
                 raised = (better.vertices, *arrays[1:])
+                rounding.add(OutMesh(*raised, **look), surface.view.scale)
                 fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                 if solution in with_mesh:
                     write_mesh(partial / fitted[1], *raised, **look)
@@ -351,7 +352,7 @@ def write_front(
             cells = {name: spelled_value(name, getattr(quality[row], name)) for name in MEASURES}
             cells |= {"solution": str(solution), "mesh": path, "free": str(int(own[row] is not None))}
             rows.append([cells[column] for column in FRONT_COLUMNS] + (fitted if refit is not None else []))
-        warn_of_shift(kind, model.name, surface.diagonal, single)
+        rounding.warn(model.name, surface.diagonal)
         if with_mesh or chosen is not None:
             warn_of_left_behind(kind, model.name, model.attributes)
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
@@ -512,14 +513,16 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     Warns
     -----
     ModelWarning
-        If single precision moves vertices by more than rounding, or the format does not hold all that is known of them.
+        If single precision moves vertices by more than rounding or turns triangles over, or the format does not hold
+        all that is known of the vertices.
     """
     kind, model = format_of_output(path), surface.model
     kind.check(model)
-    arrays = mesh_arrays(model, faces)
-    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0], surface.view.scale))
+    arrays, look, rounding = mesh_arrays(model, faces), _look(kind, surface), Rounding(kind)
+    rounding.add(OutMesh(*arrays, **look), surface.view.scale)
+    rounding.warn(model.name, surface.diagonal)
     warn_of_left_behind(kind, model.name, model.attributes)
-    write_mesh(path, *arrays, **_look(kind, surface))
+    write_mesh(path, *arrays, **look)
 
 
 def _look(kind: Format, surface: Surface) -> dict[str, Any]:
