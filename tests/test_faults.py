@@ -96,15 +96,15 @@ def one_line(capsys):
     return err
 
 
-def with_a_free_mesh(monkeypatch, number):
-    """Let NSGA-II have a free mesh beside a small solution of that generation, and keep it as long as it lives."""
+def with_free_meshes(monkeypatch, number):
+    """Let NSGA-II have free meshes beside some solutions of that generation, as long as these live."""
     set_optimum = NSGA2._set_optimum
 
     def and_free(self):
         set_optimum(self)
         if self.n_iter == number:
-            one = self.opt[int(np.argsort(self.opt.get("F")[:, 1])[1])]
-            one.set("free", freed(self.problem.surface, one.X))
+            for one in self.opt[np.argsort(self.opt.get("F")[:, 1])[1:6]]:
+                one.set("free", freed(self.problem.surface, one.X))
 
     monkeypatch.setattr(NSGA2, "_set_optimum", and_free)
 
@@ -258,12 +258,12 @@ def test_killed_between_moving_the_old_folder_away_and_the_new_one_in(tmp_path, 
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
-def test_a_free_mesh_found_before_a_kill_is_in_the_front_of_the_search_that_goes_on(tmp_path, monkeypatch):
-    with_a_free_mesh(monkeypatch, 18)
+def test_free_meshes_found_before_a_kill_are_in_the_front_of_the_search_that_goes_on(tmp_path, monkeypatch):
+    with_free_meshes(monkeypatch, 18)
     assert simplify(tmp_path / "undisturbed") == 0
     assert simplify(stopped(tmp_path / "out", monkeypatch, 19)) == 0
     assert reproducible(tmp_path / "out") == reproducible(tmp_path / "undisturbed")
-    assert read_front(tmp_path / "out").quality["free"].sum() == 1
+    assert read_front(tmp_path / "out").quality["free"].any()
 
 
 def test_a_folder_that_is_there_is_not_replaced_by_what_stands_aside(tmp_path):
