@@ -397,15 +397,26 @@ def _was_interrupted(problem: BaseException | None) -> bool:
     return problem is not None
 
 
-def write_npz(path: Path, **arrays: AnyArray) -> None:
-    """Write arrays as .npz without the time of writing, so that equal arrays give equal bytes."""
+def write_npz(path: Path, **arrays: AnyArray | Sequence[AnyArray]) -> None:
+    """Write arrays as .npz without the time of writing, so that equal arrays give equal bytes.
+
+    A sequence of arrays of one type is written as one, joined along the first axis, but is not joined in memory.
+    """
     with zipfile.ZipFile(path, "w") as file:
         for name, array in arrays.items():
-            content = io.BytesIO()
-            np.lib.format.write_array(content, np.ascontiguousarray(array), allow_pickle=False)
+            parts = [array] if isinstance(array, np.ndarray) else array
+            first = parts[0]
+            shape = (sum(map(len, parts)), *first.shape[1:])
+            header = io.BytesIO()
+            described = {"descr": np.lib.format.dtype_to_descr(first.dtype), "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(header, described)
             entry = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
             entry.compress_type = zipfile.ZIP_DEFLATED
-            file.writestr(entry, content.getvalue())
+            entry.file_size = len(header.getvalue()) + sum(part.nbytes for part in parts)  # beyond 2 GiB it is marked
+            with file.open(entry, "w") as member:
+                member.write(header.getvalue())
+                for part in parts:
+                    member.write(np.ascontiguousarray(part).data)
 
 
 def read_npz(stream: IO[bytes], name: str, *, wanted: Collection[str] | None = None) -> dict[str, AnyArray]:

@@ -52,10 +52,22 @@ from meshsimp_pymoo.storage import (
 )
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES, Measure, Quality, quality_of
+from meshsimp_pymoo.surface.measures import (
+    ERROR,
+    MAXIMUM,
+    MEASURES,
+    REGIONS,
+    SQUARES,
+    TRIANGLES,
+    UNCOVERED,
+    VERTICES,
+    Measure,
+    Quality,
+    quality_of,
+)
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Refitted, Simplified, Surface
+from meshsimp_pymoo.surface.surface import FreeMesh, Refitted, Simplified, Surface, free_faces
 from meshsimp_pymoo.surface.units import length_unit
 from meshsimp_pymoo.surface.weld import pieces
 
@@ -105,11 +117,16 @@ class FrontSolution(_Numbers):
         kept: BoolArray = self.front.kept[self.solution]
         return kept
 
+    @property
+    def free(self) -> bool:
+        """Whether its edges are chosen for the error, and not by the Delaunay rule."""
+        return self.front.faces[self.solution] is not None
+
     @cached_property
     def simplified(self) -> Simplified:
         """Triangles, deviation and cover of the original vertices, computed when first used."""
-        surface = self.front.surface
-        return surface.simplify(self.kept | surface.pinned)
+        surface, own = self.front.surface, self.front.faces[self.solution]
+        return surface.simplify(self.kept | surface.pinned) if own is None else surface.of_faces(own)
 
     @cached_property
     def refitted(self) -> Refitted:
@@ -118,8 +135,7 @@ class FrontSolution(_Numbers):
 
     def refit(self, *, until: float | None = None) -> Refitted:
         """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
-        surface = self.front.surface
-        return surface.refit(self.kept | surface.pinned, until=until)
+        return self.front.surface.refit(self.simplified, until=until)
 
     @property
     def points(self) -> FloatArray:
@@ -129,8 +145,8 @@ class FrontSolution(_Numbers):
     @cached_property
     def faces(self) -> IntArray:
         """The triangles (M, 3) as rows of the model's vertices."""
-        surface = self.front.surface
-        return surface.triangles(self.kept | surface.pinned)
+        surface, own = self.front.surface, self.front.faces[self.solution]
+        return surface.triangles(self.kept | surface.pinned) if own is None else own
 
     @property
     def attributes(self) -> dict[str, npt.NDArray[Any]]:
@@ -186,7 +202,8 @@ class FrontSolution(_Numbers):
     def __repr__(self) -> str:
         q = self.quality
         return (
-            f"<solution {self.solution} of {len(self.front)}: {q.triangles} triangles, error {q.error:.6g}, "
+            f"<solution {self.solution} of {len(self.front)}{', free' if self.free else ''}: "
+            f"{q.triangles} triangles, error {q.error:.6g}, "
             f"mean {q.mean_error:.4g}, max {q.max_error:.4g}>"
         )
 
@@ -217,15 +234,19 @@ for _name, _measure in MEASURES.items():
 class Front(Sequence[FrontSolution]):
     """The solutions of a search that no other solution beats, sorted by triangles.
 
-    Make one with :meth:`from_result`, :meth:`from_subsets` or :meth:`load`. It is a sequence: ``len(front)``,
-    ``front[3]``, ``front[-1]``, ``for solution in front``; a slice is a front too.
+    Make one with :meth:`from_result`, :meth:`from_population`, :meth:`from_subsets` or :meth:`load`. It is a sequence:
+    ``len(front)``, ``front[3]``, ``front[-1]``, ``for solution in front``; a slice is a front too.
 
     Parameters
     ----------
     quality : sequence of Quality, length S
         The numbers of each solution, sorted by triangles, then error.
     kept : (S, N) bool array, or Nested
-        The solutions in vector order; or by rows of the file, as tiles find them, and then made one at a time.
+        The solutions in vector order; or by rows of the file, as tiles find them, and then made one at a time. Of a
+        free mesh the vertices that its triangles use, and the pinned ones.
+    faces : sequence of (M, 3) int array or None, length S, optional
+        The triangles of each solution that is a free mesh, as rows of the model's vertices; None where it is the
+        Delaunay mesh of ``kept``, as all are by default.
     problem : MeshProblem, optional
         What they are solutions of; by default it is read again from what ``run`` says of it when it is needed.
     surface : Surface, optional
@@ -259,6 +280,7 @@ class Front(Sequence[FrontSolution]):
         quality: Sequence[Quality],
         kept: npt.ArrayLike | Nested,
         *,
+        faces: Sequence[npt.ArrayLike | None] = (),
         problem: MeshProblem | None = None,
         surface: Surface | None = None,
         run: Mapping[str, Any] | None = None,
@@ -279,6 +301,23 @@ class Front(Sequence[FrontSolution]):
         shape = (len(self._kept), 1) if isinstance(self._kept, Nested) else self._kept.shape
         if len(shape) != 2 or not shape[0] == len(self.quality) == len(self._meshes):
             raise ValueError(f"{len(self.quality)} solutions cannot have kept of the shape {shape}")
+        self.faces: tuple[IntArray | None, ...] = self._checked(faces)
+
+    def _checked(self, faces: Sequence[npt.ArrayLike | None]) -> tuple[IntArray | None, ...]:
+        """Return the triangles of free meshes in their one spelling, if they fit the numbers and ``kept``."""
+        found: list[IntArray | None] = [None] * len(self.quality)
+        if len(faces) not in (0, len(found)):
+            raise ValueError(f"{len(found)} solutions cannot have faces for {len(faces)}; give None for Delaunay ones")
+        for row, own in enumerate(faces):
+            if own is None:
+                continue
+            if isinstance(self._kept, Nested):
+                raise ValueError("solutions by rows of the file, as of tiles, are Delaunay meshes; give no faces")
+            try:
+                found[row] = free_faces(own, self._kept[row], self.quality[row])
+            except ValueError as problem:
+                raise ValueError(f"solution {row}: {problem}") from None
+        return tuple(found)
 
     # ---------------------------------------------------------------------------------------------- where it comes from
 
@@ -292,6 +331,8 @@ class Front(Sequence[FrontSolution]):
         wish: Mapping[str, float] | None = None,
     ) -> Front:
         """Evaluate chromosomes and keep those that no other one beats, each once, and that meet the constraints.
+
+        All meshes are Delaunay; :meth:`from_population` knows the free ones that a search made.
 
         Parameters
         ----------
@@ -310,17 +351,68 @@ class Front(Sequence[FrontSolution]):
         LookupError
             If none of them is a mesh that meets the constraints.
         """
-        rows = np.atleast_2d(np.asarray(kept))
+        return cls._of(problem, np.atleast_2d(np.asarray(kept)), [], ends=ends, wish=wish)
+
+    @classmethod
+    def from_population(
+        cls, problem: MeshProblem, population: Any, *, ends: bool = False, wish: Mapping[str, float] | None = None
+    ) -> Front:
+        """Take over a population: its chromosomes, as :meth:`from_subsets` does, and the free meshes beside them.
+
+        An individual can carry a free mesh, ``individual.get("free")``, a
+        :class:`~meshsimp_pymoo.surface.surface.FreeMesh`. It is taken where it is better than the mesh of the
+        individual's subset: its first objective is lower, with no more triangles. Then all meshes are compared, and
+        limits and constraints are those of what is taken.
+
+        Parameters
+        ----------
+        problem : MeshProblem
+            What its individuals are chromosomes of.
+        population : pymoo Population
+            Such as ``algorithm.opt``.
+        ends, wish
+            As in :meth:`from_subsets`.
+
+        Raises
+        ------
+        LookupError
+            If there is no mesh that meets the constraints.
+        """
+        rows, free = population.get("X", "free", to_numpy=False)
+        return cls._of(problem, np.array(rows), free, ends=ends, wish=wish)
+
+    @classmethod
+    def _of(
+        cls,
+        problem: MeshProblem,
+        rows: BoolArray,
+        free: Sequence[FreeMesh | None],
+        *,
+        ends: bool,
+        wish: Mapping[str, float] | None,
+    ) -> Front:
+        """Return the front of chromosomes (P, N) and of the free mesh beside each, if there is one."""
         known = [np.ones((1, problem.n_var), dtype=bool), problem.pinned[None]] if ends else []
         threads = getattr(problem.elementwise_runner, "n_threads", 1)
         table = np.vstack([problem.evaluate_subsets(some, n_threads=threads) for some in (rows, *known)])
+        quality = [problem.as_quality(row) for row in table]
+        n_subsets, measure = len(table), problem.objectives[0]
+        meshes = [
+            mesh
+            for mesh, own in zip(free, quality, strict=False)
+            if mesh is not None
+            and mesh.quality.triangles <= own.triangles
+            and getattr(mesh.quality, measure) < getattr(own, measure)
+        ]
+        quality += [mesh.quality for mesh in meshes]
+        table = np.vstack([table, *(_row_of(problem, mesh.quality) for mesh in meshes)])
         usable = np.flatnonzero([_is_feasible(problem, row) for row in table])
         if not len(usable):
             raise LookupError(
                 f"{problem.model.name}: none of {len(table)} subsets of its vertices is a mesh that meets the "
                 "constraints; search longer, or loosen max_triangles and max_objective"
             )
-        quality = [problem.as_quality(row) for row in table[usable]]
+        quality = [quality[row] for row in usable]
         others = beside(wish or {}, problem.objectives[0])
         if others and any(shortfall(asdict(q), wish or {}) == 0.0 for q in quality):
             holding = [k for k, q in enumerate(quality) if shortfall(asdict(q), others) == 0.0]
@@ -336,10 +428,12 @@ class Front(Sequence[FrontSolution]):
             if key in best:
                 first.setdefault(key, int(row))
         chosen = list(first.values())
+        subsets = [*rows, *(row for some in known for row in some), *(mesh.kept for mesh in meshes)]
         solutions = np.empty((len(chosen), problem.n_var), dtype=bool)
         for solution, row in zip(solutions, usable[chosen], strict=True):
-            np.logical_or(rows[row] if row < len(rows) else known[row - len(rows)][0], problem.pinned, out=solution)
-        return cls([quality[row] for row in chosen], solutions, problem=problem)
+            np.logical_or(subsets[row], problem.pinned, out=solution)
+        faces = [meshes[row - n_subsets].faces if row >= n_subsets else None for row in usable[chosen]]
+        return cls([quality[row] for row in chosen], solutions, faces=faces, problem=problem)
 
     @classmethod
     def from_result(cls, result: Any, *, ends: bool = True) -> Front:
@@ -348,7 +442,8 @@ class Front(Sequence[FrontSolution]):
         Parameters
         ----------
         result : pymoo Result, or anything with ``X`` and ``problem``
-            Of ``minimize(MeshProblem(...), ...)`` with any algorithm.
+            Of ``minimize(MeshProblem(...), ...)`` with any algorithm. Of a Result, whose ``opt`` is the population of
+            ``X``, free meshes are taken too, see :meth:`from_population`.
         ends : bool
             Add both ends of the front, which are known without a search: all vertices, and the pinned ones alone.
 
@@ -371,7 +466,11 @@ class Front(Sequence[FrontSolution]):
             )
         algorithm = getattr(result, "algorithm", None)
         wish = algorithm.limits if isinstance(algorithm, TargetedSearch) else None
-        front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends, wish=wish)
+        found = getattr(result, "opt", None)
+        if found is None:
+            front = cls.from_subsets(problem, np.atleast_2d(result.X), ends=ends, wish=wish)
+        else:
+            front = cls.from_population(problem, found, ends=ends, wish=wish)
         front.series |= starting_front(problem, algorithm)
         facts = {
             "algorithm": type(algorithm).__name__ if algorithm is not None else None,
@@ -408,7 +507,13 @@ class Front(Sequence[FrontSolution]):
         columns = [stored.quality[name].tolist() for name in MEASURES]
         quality = [quality_of(zip(MEASURES, row, strict=True)) for row in zip(*columns, strict=True)]
         front = cls(
-            quality, stored.kept, run=stored.run, folder=stored.folder, meshes=stored.meshes, series=stored.series
+            quality,
+            stored.kept,
+            faces=stored.faces,
+            run=stored.run,
+            folder=stored.folder,
+            meshes=stored.meshes,
+            series=stored.series,
         )
         if model is not None:
             front._surface = front._surface_of(model)
@@ -432,6 +537,7 @@ class Front(Sequence[FrontSolution]):
             return Front(
                 [self.quality[row] for row in rows],
                 self._kept.take(rows) if isinstance(self._kept, Nested) else self._kept[list(rows)],
+                faces=[self.faces[row] for row in rows],
                 problem=self._problem,
                 surface=self._surface,
                 run=self.run,
@@ -448,6 +554,11 @@ class Front(Sequence[FrontSolution]):
     def kept(self) -> BoolArray | Chromosomes:
         """The vertices that stay (S, N), in vector order; of a front made by tiles one row is made at a time."""
         return Chromosomes(self._kept, self.model) if isinstance(self._kept, Nested) else self._kept
+
+    @property
+    def n_free(self) -> int:
+        """How many of the solutions are free meshes."""
+        return sum(own is not None for own in self.faces)
 
     @property
     def objectives(self) -> tuple[str, ...]:
@@ -699,6 +810,7 @@ class Front(Sequence[FrontSolution]):
             self.quality,
             self._kept,
             faces=lambda solution: self[solution].faces,
+            free=self.faces,
             meshes=meshes,
             mesh_format=mesh_format.lower(),
             chosen=row,
@@ -784,12 +896,14 @@ class Front(Sequence[FrontSolution]):
         except ImportError:
             raise ImportError(f"to_frame() needs pandas: {way_to_install('pandas')}") from None
         frame = pandas.DataFrame([asdict(q) for q in self.quality])
+        frame["free"] = [int(own is not None) for own in self.faces]
         return frame.rename_axis(index="solution")
 
     def __repr__(self) -> str:
         few, many = self.quality[0], self.quality[-1]
+        free = f", {self.n_free} of {len(self)} free" if self.n_free else ""
         return (
-            f"<front of {self.name}: {len(self)} solutions, {few.triangles} to {many.triangles} triangles, "
+            f"<front of {self.name}: {len(self)} solutions{free}, {few.triangles} to {many.triangles} triangles, "
             f"error {few.error:.6g} to {many.error:.6g}>"
         )
 
@@ -991,6 +1105,18 @@ def simplify_to(
     budget = ("time", time) if time is not None else Moves(USUAL_BUDGET if moves is None else moves)
     result = minimize(problem, targeted(**limits), budget, seed=seed)  # type: ignore[arg-type]
     return Front.from_result(result).best(**limits)
+
+
+def _row_of(problem: MeshProblem, quality: Quality) -> FloatArray:
+    """Return the row of the table of :meth:`MeshProblem.evaluate_subsets` that says these numbers of a mesh.
+
+    The errors of regions are not known of it.
+    """
+    row = np.full(REGIONS + problem.regions, np.inf)
+    row[[ERROR, TRIANGLES, VERTICES]] = quality.error, quality.triangles, quality.vertices
+    row[[MAXIMUM, UNCOVERED]] = quality.max_error, quality.uncovered
+    row[SQUARES] = quality.rms_error**2 * problem.surface.total_weight
+    return row
 
 
 def _is_feasible(problem: MeshProblem, row: FloatArray) -> bool:

@@ -8,10 +8,12 @@
     OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
                        the columns REFIT_COLUMNS too
     OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
-    OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); of a nested front (one made by
-                       tiles) rows (V,), which the largest solution keeps, level (V,), at which each goes, slope (S,):
-                       solution s keeps the rows of higher level, unless moved_start (S + 1,) gives it a part of moved.
-                       No pickles
+    OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); faces (M, 3), the triangles of
+                       all free meshes, of which solution s has those from face_start[s] to face_start[s + 1],
+                       face_start (S + 1,); none: it is the Delaunay mesh of what it keeps. Of a nested front (one made
+                       by tiles) F and rows (V,), which the largest solution keeps, level (V,), at which each goes,
+                       slope (S,): solution s keeps the rows of higher level, unless moved_start (S + 1,) gives it a
+                       part of moved. No pickles
     OUT/run.json       the model with its hash, how it was read (options), what counted (rules), what was minimised
                        (objectives), how it was searched and written (settings, seed), package versions, the machine
                        (environment), when the search was begun, evaluations,
@@ -28,6 +30,7 @@ hidden folder beside OUT, flushed to the disk and then renamed, so that OUT is e
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 import os
 import platform
@@ -55,25 +58,27 @@ from meshsimp_pymoo.files import (
     write_npz,
 )
 from meshsimp_pymoo.formats.material import is_put_beside
-from meshsimp_pymoo.formats.source.precision import single_precision_shift
+from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import (
     Format,
+    Rounding,
     format_of_output,
     format_to_write,
     shared_frame,
     warn_of_left_behind,
-    warn_of_shift,
     write_mesh,
 )
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
+from meshsimp_pymoo.plane.faces import is_canonical
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives, quality_of
 from meshsimp_pymoo.surface.nested import Nested
-from meshsimp_pymoo.surface.surface import Refitted, Surface, mesh_arrays, require_rules
+from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, require_rules
 
-FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
+# ``free``: 1 where the edges of a mesh are chosen for the error, 0 where it is Delaunay.
+FRONT_COLUMNS = ("solution", *MEASURES, "mesh", "free")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
-INT_COLUMNS = ("solution", *COUNTED)
+INT_COLUMNS = ("solution", *COUNTED, "free")
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 # What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
 SECONDS_A_CORNER = 5e-7
@@ -114,6 +119,8 @@ class StoredFront:
         Path of each mesh with its best heights, relative to the folder; empty where there is none.
     series : dict of str to (n, 2) float array
         Other fronts to compare with: the error that was minimised [model units] and triangles, by name.
+    faces : tuple of (M, 3) int32 array or None
+        The triangles of each solution that is a free mesh, as rows of the model's vertices; None of the others.
     """
 
     folder: Path
@@ -125,6 +132,7 @@ class StoredFront:
     refitted_error: FloatArray | None = None
     refitted_meshes: tuple[str, ...] = ()
     series: dict[str, FloatArray] = field(default_factory=dict)
+    faces: tuple[IntArray | None, ...] = ()
 
     @property
     def F(self) -> FloatArray:
@@ -202,6 +210,7 @@ def write_front(
     kept: BoolArray | Nested,
     *,
     faces: Callable[[int], IntArray] | None = None,
+    free: Sequence[IntArray | None] = (),
     meshes: int | None = MESHES_BY_DEFAULT,
     mesh_format: str = "ply",
     chosen: int | None = None,
@@ -227,6 +236,9 @@ def write_front(
     faces : callable, optional
         Triangles (M, 3) of the solution in this row of ``kept``, as indices in vector order. Needed for
         meshes.
+    free : sequence of (M, 3) int32 array or None, length S, optional
+        The triangles of each solution that is a free mesh, in their one spelling (see
+        :func:`~meshsimp_pymoo.surface.surface.checked_faces`); None of the others, as it is of all by default.
     meshes : int or None
         The most meshes to write; a longer front writes an even selection, its ends included. None writes all,
         0 none.
@@ -283,6 +295,9 @@ def write_front(
     if not np.isfinite(F).all():
         raise ValueError(f"solution {int(np.argmin(np.isfinite(F).all(axis=1)))} has an error that is not finite")
     order = np.lexsort((F[:, 0], F[:, 1]))
+    own = tuple(free) or (None,) * len(order)
+    if len(own) != len(order):
+        raise ValueError(f"free has {len(own)} entries for {len(order)} solutions; give None for Delaunay meshes")
     with_mesh = set(even_selection(len(order), meshes))
     if (with_mesh or chosen is not None) and faces is None:
         raise ValueError("meshes are asked for but no faces are given; pass faces= or meshes=0")
@@ -292,7 +307,7 @@ def write_front(
     with new_folder(folder, replace=overwrite) as partial:
         digits = max(3, len(str(len(order) - 1)))
         files: dict[int, tuple[str, list[str]]] = {}
-        single, pace = 0.0, SECONDS_A_CORNER
+        rounding, pace = Rounding(kind), SECONDS_A_CORNER
         if with_mesh:
             (partial / "meshes").mkdir()
             if refit is not None:
@@ -310,7 +325,7 @@ def write_front(
             assert faces is not None
             triangles = faces(int(row))
             arrays = mesh_arrays(model, triangles)
-            single = max(single, single_precision_shift(arrays[0], surface.view.scale))
+            rounding.add(OutMesh(*arrays, **look), surface.view.scale)
             if solution in with_mesh:
                 path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
                 write_mesh(partial / path, *arrays, **look)
@@ -323,6 +338,7 @@ def write_front(
             better = None if refit is None else refit(int(row))
             if better is not None:
                 raised = (better.vertices, *arrays[1:])
+                rounding.add(OutMesh(*raised, **look), surface.view.scale)
                 fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                 if solution in with_mesh:
                     write_mesh(partial / fitted[1], *raised, **look)
@@ -333,19 +349,25 @@ def write_front(
         rows = []
         for solution, row in enumerate(order):
             path, fitted = files.get(solution, ("", ["", ""]))
-            numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
-            rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
-        warn_of_shift(kind, model.name, surface.diagonal, single)
+            cells = {name: spelled_value(name, getattr(quality[row], name)) for name in MEASURES}
+            cells |= {"solution": str(solution), "mesh": path, "free": str(int(own[row] is not None))}
+            rows.append([cells[column] for column in FRONT_COLUMNS] + (fitted if refit is not None else []))
+        rounding.warn(model.name, surface.diagonal)
         if with_mesh or chosen is not None:
             warn_of_left_behind(kind, model.name, model.attributes)
         write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         if isinstance(kept, Nested):
-            arrays_of = kept.take(order.tolist()).arrays()
+            arrays_of: dict[str, AnyArray | list[AnyArray]] = {**kept.take(order.tolist()).arrays()}
         else:
-            rows_of_file = np.asarray(model.source_index, np.int64)
-            arrays_of = {"kept": np.packbits(kept[order], axis=1), "source_index": rows_of_file}
+            parts = [np.empty((0, 3), np.int32) if own[row] is None else own[row] for row in order]
+            arrays_of = {
+                "kept": np.packbits(kept[order], axis=1),
+                "source_index": np.asarray(model.source_index, np.int64),
+                "faces": parts,
+                "face_start": np.cumsum([0, *map(len, parts)]),
+            }
         write_npz(partial / "front.npz", F=F[order], **arrays_of)
         shape = getattr(model, "shape", None)  # of a height grid
         record = dict(run or {}) | {
@@ -393,7 +415,7 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     quality, meshes, refitted_meshes = read_front_csv(folder / "front.csv")
     refitted_error = quality.pop("refitted_error", None)
     count = len(meshes)
-    F, kept, source_index = _read_npz(folder / "front.npz", count)
+    F, kept, source_index, parts = _read_npz(folder / "front.npz", count)
     if F.shape != (count, 2) or not (
         np.array_equal(F[:, 0], quality["error"]) and np.array_equal(F[:, 1], quality["triangles"])
     ):
@@ -405,9 +427,34 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
             f"{folder / 'front.npz'}: solution {too_few[0]} keeps {sizes[too_few[0]]} vertices, but "
             f"front.csv says its mesh has {quality['vertices'][too_few[0]]}"
         )
+    faces = tuple(_own_faces(folder / "front.npz", quality, kept, parts))
     run = read_record(folder / "run.json", count)
     series = _read_series(folder / "series.csv")
-    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series)
+    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series, faces)
+
+
+def _own_faces(
+    path: Path, quality: Mapping[str, AnyArray], kept: BoolArray | Nested, parts: Sequence[IntArray]
+) -> Iterator[IntArray | None]:
+    """Yield the triangles of free meshes, None of others, if they are what front.csv says and use what is kept."""
+    for solution, (is_free, faces) in enumerate(zip(quality["free"].tolist(), parts, strict=True)):
+        if is_free != (len(faces) > 0):
+            raise ResultError(
+                f"{path}: holds {len(faces)} faces of solution {solution}, whose free is {is_free} in front.csv; write "
+                "the front again"
+            )
+        if not is_free:
+            yield None
+            continue
+        assert not isinstance(kept, Nested)
+        numbers = quality_of((name, quality[name][solution]) for name in MEASURES)
+        try:
+            found = free_faces(faces, kept[solution], numbers)
+            if not is_canonical(faces):
+                raise ValueError("its faces are not sorted, the smallest row first")
+        except ValueError as problem:
+            raise ResultError(f"{path}: solution {solution}: {problem}; write the front again") from None
+        yield found
 
 
 def read_record(path: Path, count: int) -> dict[str, Any]:
@@ -466,14 +513,16 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     Warns
     -----
     ModelWarning
-        If single precision moves vertices by more than rounding, or the format does not hold all that is known of them.
+        If single precision moves vertices by more than rounding or turns triangles over, or the format does not hold
+        all that is known of the vertices.
     """
     kind, model = format_of_output(path), surface.model
     kind.check(model)
-    arrays = mesh_arrays(model, faces)
-    warn_of_shift(kind, model.name, surface.diagonal, single_precision_shift(arrays[0], surface.view.scale))
+    arrays, look, rounding = mesh_arrays(model, faces), _look(kind, surface), Rounding(kind)
+    rounding.add(OutMesh(*arrays, **look), surface.view.scale)
+    rounding.warn(model.name, surface.diagonal)
     warn_of_left_behind(kind, model.name, model.attributes)
-    write_mesh(path, *arrays, **_look(kind, surface))
+    write_mesh(path, *arrays, **look)
 
 
 def _look(kind: Format, surface: Surface) -> dict[str, Any]:
@@ -617,15 +666,19 @@ def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, 
     return columns, meshes, refitted
 
 
-def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, IntArray]:
-    """Return F, and the subsets of ``count`` solutions: as chromosomes with their rows in the file, or nested."""
+def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, IntArray, list[IntArray]]:
+    """Return F, the subsets of ``count`` solutions and the faces of each that is free.
+
+    The subsets are chromosomes with their rows in the file, or nested.
+    """
     try:
         with path.open("rb") as stream:
             arrays = read_npz(stream, path.name)
         F = _of_type(path, "F", arrays, "f", 2)
         if "level" in arrays:
-            return F, _nested(path, arrays, count), np.empty(0, np.int64)
+            return F, _nested(path, arrays, count), np.empty(0, np.int64), [np.empty((0, 3), np.int32)] * count
         packed, source_index = _of_type(path, "kept", arrays, "u", 2), _of_type(path, "source_index", arrays, "i", 1)
+        faces, start = _of_type(path, "faces", arrays, "i", 2), _of_type(path, "face_start", arrays, "i", 1)
     except KeyError as problem:
         raise ResultError(f"{path}: holds no array {problem}; the file is not ours") from None
     except (OSError, ModelError, MemoryError) as problem:
@@ -642,7 +695,16 @@ def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, I
     bits = np.unpackbits(packed, axis=1).astype(bool)
     if bits[:, n:].any():
         raise ResultError(f"{path}: kept has bits set beyond the {n} vertices of the model")
-    return F, bits[:, :n], source_index
+    if faces.dtype != np.int32 or faces.shape[1] != 3:
+        raise ResultError(
+            f"{path}: faces has the type {faces.dtype} and the shape {faces.shape} instead of int32, (M, 3)"
+        )
+    if len(start) != count + 1 or start[0] != 0 or start[-1] != len(faces) or (np.diff(start) < 0).any():
+        raise ResultError(
+            f"{path}: face_start does not cut its {len(faces)} faces into those of {count} solutions, one after the "
+            "other; write the front again"
+        )
+    return F, bits[:, :n], source_index, [faces[a:b] for a, b in itertools.pairwise(start)]
 
 
 def _nested(path: Path, arrays: Mapping[str, AnyArray], count: int) -> Nested:

@@ -16,12 +16,13 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import Source, open_model
+from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.storage import write_front
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.orient import FOLD_SHARE, SurfaceFacts, open_faces, surface_facts
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Simplified
+from meshsimp_pymoo.surface.surface import FreeMesh, Simplified, Surface
 
 
 def surface(model: Source | OpenModel, *, up: Any = "auto", **rules: Any) -> HeightSurface:
@@ -55,6 +56,27 @@ def subset(model: OpenModel, share: float, seed: int = 0) -> np.ndarray:
     kept = np.random.default_rng(seed).random(model.n_vertices) < share
     kept[model.corners] = True
     return kept
+
+
+def freed(surface: Surface, kept: np.ndarray, *, better: bool = True) -> FreeMesh:
+    """Return a free mesh: that of a subset, its edges flipped one after the other, where that lowers the error."""
+    mesh, xy = surface.simplify(kept | surface.pinned), surface.points[:, :2]
+    for a, b in edge_table(mesh.faces).ends.tolist():
+        both = np.flatnonzero(np.isin(mesh.faces, [a, b]).sum(axis=1) == 2)
+        if len(both) < 2:  # on the border
+            continue
+        c, d = (np.setdiff1d(mesh.faces[t], [a, b])[0] for t in both)
+        side = [np.linalg.det([xy[d] - xy[c], xy[x] - xy[c]]) for x in (a, b)]
+        if np.prod(side) >= -((1e-9 * surface.diagonal) ** 4):  # they have no convex outline
+            continue
+        faces = mesh.faces.copy()
+        faces[both] = [(c, d, x) if s > 0 else (d, c, x) for x, s in zip((a, b), side, strict=True)]
+        other = surface.of_faces(faces)
+        if not better or other.quality.error < mesh.quality.error:
+            mesh = other
+    used = surface.pinned.copy()
+    used[mesh.faces] = True
+    return FreeMesh(used, mesh.faces, mesh.quality)
 
 
 def random_solutions(model: OpenModel) -> tuple[np.ndarray, list[Simplified]]:

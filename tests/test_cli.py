@@ -19,8 +19,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+from samples import freed
 
 import meshsimp_pymoo
 from meshsimp_pymoo import Front, MeshProblem, memetic
@@ -32,6 +34,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import all_formats, write_mesh, written_formats
 from meshsimp_pymoo.front import FrontSolution
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
@@ -791,6 +794,57 @@ def test_pick_copies_what_is_stored_even_if_the_model_is_gone(tmp_path, roof_ply
     assert run("pick", tmp_path / "out", "--solution", stored, "-o", tmp_path / "a.obj") == 2
     assert re.search(r"out: its model cannot be read \(.*roof\.ply: no such file.*--model FILE", one_line(capsys))
     assert not (tmp_path / "a.obj").exists()
+
+
+def test_free_meshes_of_a_search_are_written_picked_scored_and_reported_by_their_own_faces(
+    tmp_path, capsys, monkeypatch
+):
+    """A search that has a free mesh beside its best compromise: from its front to every file."""
+    with monkeypatch.context() as patch:
+        set_optimum = NSGA2._set_optimum
+
+        def with_free_meshes(self):
+            set_optimum(self)
+            if self.n_iter == 3:
+                for one in self.opt[np.argsort(self.opt.get("F")[:, 1])[1:4]]:
+                    one.set("free", freed(self.problem.surface, one.X))
+
+        patch.setattr(NSGA2, "_set_optimum", with_free_meshes)
+        out, found = tmp_path / "out", ("--format", "obj", "--refit", "--meshes", "none")
+        assert run("simplify", "face:200", "-o", out, *found, "--triangles", 60, *QUICK) == 0
+    said = capsys.readouterr().out
+    front = Front.load(out)
+    free = [solution for solution in front if solution.free]
+    assert free
+    assert f"front: {len(front)} solutions, {len(free)} of them free, " in said
+    solution = free[-1]
+    own, compact = solution.faces, used_rows(solution.faces)[1].tolist()
+    assert own.tolist() != front.surface.triangles(solution.kept).tolist()
+    for suffix in ("ply", "stl", "obj", "off", "glb", "xml"):
+        path = tmp_path / f"free.{suffix}"
+        assert run("pick", out, "--solution", solution.solution, "-o", path) == 0
+        assert f"solution {solution.solution} of {out}, free: {solution.triangles} triangles" in capsys.readouterr().out
+        if suffix in ("ply", "obj", "off", "glb"):
+            assert trimesh.load(path, force="mesh", process=False).faces.tolist() == compact
+        elif suffix == "xml":
+            rows = re.findall(r"<F>(\d+) (\d+) (\d+)</F>", path.read_text())
+            assert (np.array(rows, int) - 1).tolist() == compact
+        else:
+            corners = trimesh.load(path, process=False).triangles
+            np.testing.assert_array_equal(corners, front.model.file_points[own].astype(np.float32))
+    assert run("pick", out, "--solution", solution.solution, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["free"] is True
+    assert run("score", "face:200", tmp_path / "free.ply", "--front", out, "--json") == 0
+    scored = json.loads(capsys.readouterr().out)
+    assert scored["error"] == pytest.approx(solution.error, rel=1e-9)
+    assert (scored["front"]["solution"], scored["front"]["error_ratio"]) == (solution.solution, pytest.approx(1))
+    chosen = front[front.run["chosen"]]
+    assert trimesh.load(out / "chosen.obj", process=False).faces.tolist() == used_rows(chosen.faces)[1].tolist()
+    pictures = {name: (out / name).read_bytes() for name in ("front.png", "report.html")}
+    for name in pictures:
+        (out / name).unlink()
+    assert run("report", out) == 0
+    assert {name: (out / name).read_bytes() for name in pictures} == pictures
 
 
 def test_pick_refuses_a_model_that_changed(tmp_path, roof_ply, capsys):

@@ -37,6 +37,7 @@ import numpy as np
 import pytest
 from counts import tried
 from pymoo.algorithms.moo.nsga2 import NSGA2
+from samples import freed
 
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli.terminal import answering, interrupted_code, interruptible, is_interrupted
@@ -93,6 +94,19 @@ def one_line(capsys):
     assert err.count("\n") == 1, err
     assert err.startswith("meshsimp: ")
     return err
+
+
+def with_free_meshes(monkeypatch, number):
+    """Let NSGA-II have free meshes beside some solutions of that generation, as long as these live."""
+    set_optimum = NSGA2._set_optimum
+
+    def and_free(self):
+        set_optimum(self)
+        if self.n_iter == number:
+            for one in self.opt[np.argsort(self.opt.get("F")[:, 1])[1:6]]:
+                one.set("free", freed(self.problem.surface, one.X))
+
+    monkeypatch.setattr(NSGA2, "_set_optimum", and_free)
 
 
 def at_generation(monkeypatch, number, act):
@@ -242,6 +256,14 @@ def test_killed_between_moving_the_old_folder_away_and_the_new_one_in(tmp_path, 
     assert simplify(out, *options) == 0
     assert reproducible(out) == whole
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+def test_free_meshes_found_before_a_kill_are_in_the_front_of_the_search_that_goes_on(tmp_path, monkeypatch):
+    with_free_meshes(monkeypatch, 18)
+    assert simplify(tmp_path / "undisturbed") == 0
+    assert simplify(stopped(tmp_path / "out", monkeypatch, 19)) == 0
+    assert reproducible(tmp_path / "out") == reproducible(tmp_path / "undisturbed")
+    assert read_front(tmp_path / "out").quality["free"].any()
 
 
 def test_a_folder_that_is_there_is_not_replaced_by_what_stands_aside(tmp_path):

@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import subprocess
 import sys
+import tracemalloc
 
+import numpy as np
 import pytest
 
 from meshsimp_pymoo import files
 from meshsimp_pymoo.errors import ResultError
-from meshsimp_pymoo.files import _turned, left_beside, locked, new_file, new_folder, partial_folder, put_back, put_text
+from meshsimp_pymoo.files import (
+    _turned,
+    left_beside,
+    locked,
+    new_file,
+    new_folder,
+    partial_folder,
+    put_back,
+    put_text,
+    read_npz,
+    write_npz,
+)
 
 
 def entries(folder):
@@ -309,3 +323,24 @@ def test_an_interruption_of_which_a_library_makes_an_error_stays_one(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         files.draw_into(tmp_path, {"front.png": draw})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_sequence_of_arrays_is_written_as_one_that_is_never_joined_in_memory(tmp_path):
+    rng = np.random.default_rng(1)
+    whole = rng.integers(0, 1000, (500_000, 3)).astype(np.int32)
+    cuts = [0, 0, 1, *range(25_000, 500_001, 25_000), 500_000]
+    parts = [whole[a:b] for a, b in itertools.pairwise(cuts)]
+    tracemalloc.start()
+    write_npz(tmp_path / "a.npz", joined=parts, beside=np.arange(3))
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < whole.nbytes / 4
+    write_npz(tmp_path / "b.npz", joined=parts, beside=np.arange(3))
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    with (tmp_path / "a.npz").open("rb") as stream:
+        found = read_npz(stream, "a.npz")
+    np.testing.assert_array_equal(found["joined"], whole)
+    assert (found["joined"].dtype, found["beside"].tolist()) == (np.int32, [0, 1, 2])
+    write_npz(tmp_path / "c.npz", none=[np.empty((0, 3), np.int32)] * 2)
+    with np.load(tmp_path / "c.npz") as arrays:
+        assert arrays["none"].shape == (0, 3)

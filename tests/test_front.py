@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import builtins
+import contextlib
+import copy
+import csv
 import dataclasses
 import inspect
 import itertools
@@ -12,6 +15,7 @@ import pydoc
 import re
 import shutil
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +24,7 @@ from matplotlib.figure import Figure
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
+from samples import freed
 
 from meshsimp_pymoo import (
     Front,
@@ -45,11 +50,13 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.table import write_mesh, written_suffixes
 from meshsimp_pymoo.front import starting_front
 from meshsimp_pymoo.indicators import hypervolume_ratio, knee
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
 from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
 from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.surface import FreeMesh
 
 
 @pytest.fixture(scope="module")
@@ -146,6 +153,164 @@ def test_other_objectives_make_another_front():
     assert front.F[:, 0].tolist() == [solution.max_error for solution in front]
     middle = front[len(front) // 2]
     assert front.best(triangles=middle.triangles) == middle
+
+
+# --------------------------------------------------------------------------------------------------------- free meshes
+
+
+@pytest.fixture(scope="module")
+def mixed(result):
+    """The result of a search with a free mesh beside every other solution, and the front of it."""
+    result = copy.copy(result)
+    result.opt = copy.deepcopy(result.opt)
+    for one in result.opt[::2]:
+        one.set("free", freed(result.problem.surface, one.X))
+    return result, Front.from_result(result)
+
+
+def test_a_free_mesh_is_taken_where_it_is_better_and_what_it_beats_goes(mixed, front):
+    result, found = mixed
+    np.testing.assert_array_equal(result.F, result.problem.evaluate(result.X))  # as it is without
+    assert 2 <= found.n_free < len(found)
+    free = {mesh.quality: mesh for mesh in result.opt.get("free") if mesh is not None}
+    delaunay = {row.tobytes() for row in front.kept}
+    for (e0, t0), (e1, t1) in itertools.pairwise(found.F):
+        assert t0 < t1
+        assert e0 > e1
+    for solution in found:
+        if solution.free:
+            mesh = free[solution.quality]
+            np.testing.assert_array_equal(solution.kept, mesh.kept)
+            np.testing.assert_array_equal(solution.faces, mesh.faces)
+        else:
+            assert solution.kept.tobytes() in delaunay
+    best = [(q.error, q.triangles) for q in [*free, *front.quality]]
+    for error, triangles in best:  # nothing is lost
+        assert ((found.F[:, 0] <= error) & (found.F[:, 1] <= triangles)).any()
+
+
+def test_a_free_mesh_that_is_no_better_than_its_subset_is_left(result):
+    problem, surface = result.problem, result.problem.surface
+    one = copy.deepcopy(result.opt[[len(result.opt) // 2]])
+    mesh, (own,) = freed(surface, one[0].X), Front.from_population(problem, one)
+    for free in (
+        FreeMesh(own.kept, own.faces, own.quality),  # the very same
+        dataclasses.replace(mesh, quality=dataclasses.replace(mesh.quality, triangles=own.triangles + 1)),
+        freed(surface, one[0].X, better=False),
+    ):
+        one[0].set("free", free)
+        assert Front.from_population(problem, one).faces == (None,)
+    one[0].set("free", mesh)
+    assert Front.from_population(problem, one).F.tolist() == [[mesh.quality.error, own.triangles]]
+    assert Front.from_subsets(problem, one.get("X")).quality == (own.quality,)  # Delaunay
+    one[0].set("free", None)
+    alone = SimpleNamespace(X=one[0].X, problem=problem)  # who has no more than that
+    assert Front.from_result(alone, ends=False).quality == (own.quality,)
+
+
+def test_limits_hold_for_the_numbers_of_the_free_mesh(result):
+    """A wish and a constraint that the Delaunay mesh misses and the free one meets, and the other way round."""
+    one = copy.deepcopy(result.opt[[len(result.opt) // 2]])
+    mesh = freed(result.problem.surface, one[0].X)
+    one[0].set("free", mesh)
+    (own,) = Front.from_subsets(result.problem, one.get("X"))
+    assert mesh.quality.error < own.error
+    between = (mesh.quality.error + own.error) / 2
+    bounded = MeshProblem("face:200", max_objective=between)
+    with pytest.raises(LookupError, match="meets the constraints"):
+        Front.from_subsets(bounded, one.get("X"))
+    assert Front.from_population(bounded, one).n_free == 1
+    high = dataclasses.replace(mesh, quality=dataclasses.replace(mesh.quality, max_error=2 * own.max_error))
+    one[0].set("free", high)
+    wish = {"triangles": own.triangles, "max_error": own.max_error}
+    assert [s.free for s in Front.from_population(result.problem, one)] == [True]
+    assert [s.free for s in Front.from_population(result.problem, one, wish=wish)] == [False]
+
+
+def test_a_free_solution_is_its_own_mesh_in_all_that_is_asked_of_it(mixed, tmp_path):
+    _, front = mixed
+    surface = front.surface
+    row = next(k for k in range(len(front)) if front[k].free)
+    solution, own = front[row], front.faces[row]
+    delaunay = surface.simplify(solution.kept)
+    assert own.tolist() != delaunay.faces.tolist()
+    assert solution.simplified.faces.tolist() == solution.faces.tolist() == own.tolist()
+    assert dataclasses.asdict(solution.simplified.quality) == pytest.approx(dataclasses.asdict(solution.quality))
+    refitted = solution.refitted
+    assert refitted.faces.tolist() == own.tolist()
+    assert refitted.error < refitted.before == pytest.approx(solution.error)
+    used, compact = used_rows(own)
+    for mesh in (solution.mesh, trimesh.load(solution.save(tmp_path / "a.ply"), process=False)):
+        assert mesh.faces.tolist() == compact.tolist()
+        np.testing.assert_array_equal(mesh.vertices, front.model.file_points[used])
+    assert len(solution.plot(Figure().subplots()).collections[0].get_paths()) == len(own)
+    again = surface.score(solution.mesh.vertices, solution.mesh.faces).quality
+    assert again.error == pytest.approx(solution.error, rel=1e-9)
+    assert repr(front).startswith(
+        f"<front of face:200: {len(front)} solutions, {front.n_free} of {len(front)} free, 2 "
+    )
+    assert repr(solution).startswith(f"<solution {row} of {len(front)}, free: {solution.triangles} triangles, ")
+    assert front.to_frame()["free"].tolist() == [int(s.free) for s in front]
+
+
+def test_slices_and_choices_keep_the_faces(mixed):
+    _, front = mixed
+    for part in (front[2:], front[::-2], front[1:4:2], pickle.loads(pickle.dumps(front))):
+        for solution in part:
+            whole = front.best(triangles=solution.triangles)
+            assert (solution.free, solution.quality) == (whole.free, whole.quality)
+            assert solution.faces.tolist() == whole.faces.tolist()
+    assert front.knee().faces.tolist() == front[knee(front.F)].faces.tolist()
+
+
+def test_a_free_mesh_goes_to_the_folder_and_back_to_the_same_bytes(mixed, tmp_path):
+    _, front = mixed
+    chosen = next(s for s in front if s.free)
+    stored = front.save(tmp_path / "out", chosen=chosen, refit=True, meshes=None, pictures=False)
+    again = Front.load(stored)
+    assert again.quality == front.quality
+    for one, other in zip(again, front, strict=True):
+        np.testing.assert_array_equal(one.kept, other.kept)
+        assert (one.free, one.faces.tolist()) == (other.free, other.faces.tolist())
+        assert (one.faces.dtype, one.free) == (np.int32, again.faces[one.solution] is not None)
+    with (stored / "front.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["free"]) for row in rows] == [int(s.free) for s in front]
+    assert list(rows[0])[: len(FRONT_COLUMNS)] == list(FRONT_COLUMNS)
+    for row, solution in zip(rows, front, strict=True):
+        for path, mesh in ((row["mesh"], solution.mesh), (row["refitted_mesh"], None)):
+            found = trimesh.load(stored / path, process=False)
+            assert found.faces.tolist() == used_rows(solution.faces)[1].tolist()
+            assert mesh is None or found.vertices.tolist() == mesh.vertices.tolist()
+        assert float(row["refitted_error"]) <= solution.error * (1 + 1e-12)
+    assert (stored / "chosen.ply").read_bytes() == (stored / rows[chosen.solution]["mesh"]).read_bytes()
+    assert (stored / "chosen_refitted.ply").is_file()
+    twice = again.save(tmp_path / "twice", chosen=chosen.solution, refit=True, meshes=None, pictures=False)
+    for path in sorted(path for path in stored.rglob("*") if path.is_file() and path.name != "run.json"):
+        assert (twice / path.relative_to(stored)).read_bytes() == path.read_bytes(), path
+    part = again[: chosen.solution + 1].save(tmp_path / "part", meshes=0, pictures=False)
+    assert Front.load(part)[chosen.solution].faces.tolist() == chosen.faces.tolist()
+
+
+def test_faces_that_do_not_fit_are_refused(mixed):
+    _, front = mixed
+    row = next(k for k in range(len(front)) if front[k].free)
+    one, faces = front[row : row + 1], front.faces[row]
+    outside = np.flatnonzero(~one.kept[0])[0]
+    for wrong, message in (
+        ([], None),
+        ([None], None),
+        ([faces, faces], "1 solutions cannot have faces for 2; give None"),
+        ([faces[:-1]], r"solution 0: its faces are \d+ triangles of \d+ vertices, and it is said to have"),
+        (
+            [np.where(faces == faces.max(), outside, faces)],
+            f"solution 0: its faces use vertex {outside}, which it does",
+        ),
+        ([faces + 200], "solution 0: faces index rows 2"),
+        ([faces.astype(float)], "solution 0: faces are float64"),
+    ):
+        with contextlib.nullcontext() if message is None else pytest.raises(ValueError, match=message):
+            Front(one.quality, one.kept, faces=wrong)
 
 
 # -------------------------------------------------------------------------------------------------------- as a sequence
@@ -479,7 +644,8 @@ def test_as_a_table_of_pandas(front):
     frame = front.to_frame()
     assert isinstance(frame, pandas.DataFrame)
     assert frame["error"].tolist() == front.F[:, 0].tolist()
-    assert tuple(frame.columns) == FRONT_COLUMNS[1:-1]
+    assert list(frame.columns) == [name for name in FRONT_COLUMNS if name not in ("solution", "mesh")]
+    assert frame["free"].tolist() == [0] * len(front)
     assert frame.index.name == "solution"
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from samples import random_solutions, write_solutions
+from samples import freed, random_solutions, write_solutions
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ResultError
@@ -26,6 +26,7 @@ from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.storage import FRONT_COLUMNS, claim_output, read_front, write_front
 from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
@@ -40,6 +41,17 @@ def solutions(model):
     return random_solutions(model)
 
 
+@pytest.fixture(scope="module")
+def freed_solutions(model, solutions):
+    """The same, with the free meshes of three of them: triangles or None."""
+    kept, simplified = (list(part) for part in solutions)
+    free = [None] * len(kept)
+    for row in (2, 5, 9):
+        mesh = freed(HeightSurface(model), kept[row])
+        kept[row], simplified[row], free[row] = mesh.kept, mesh, mesh.faces
+    return (np.array(kept), simplified), free
+
+
 def files(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(Path(folder).rglob("*")) if p.is_file()}
 
@@ -49,7 +61,7 @@ def test_a_front_reads_back_as_it_was_written(tmp_path, model, solutions):
     stored = read_front(write_solutions(tmp_path / "deep" / "out", model, solutions, chosen=4))
     order = np.lexsort(([s.quality.error for s in simplified], [s.quality.triangles for s in simplified]))
     assert np.array_equal(stored.kept, kept[order])
-    for column in FRONT_COLUMNS[1:-1]:
+    for column in MEASURES:
         expected = [getattr(simplified[row].quality, column) for row in order]
         assert stored.quality[column].tolist() == expected, column  # to the last bit
     assert np.array_equal(stored.F[:, 0], stored.quality["error"])
@@ -92,11 +104,12 @@ def test_meshes_stand_where_the_front_says_and_are_the_solutions(tmp_path, model
         assert len(np.unique(mesh.faces)) == len(mesh.vertices)
 
 
-def test_the_referee_agrees_with_the_written_front(tmp_path, model, solutions, oracle):
+def test_the_referee_agrees_with_the_written_front(tmp_path, model, freed_solutions, oracle):
     everything = np.ones(model.n_vertices, dtype=bool)
     assert HeightSurface(model).simplify(everything).quality.error < 1e-9
     write_mesh(tmp_path / "original.ply", model.file_points, model.faces)
-    folder = write_solutions(tmp_path / "out", model, solutions)
+    solutions, free = freed_solutions
+    folder = write_solutions(tmp_path / "out", model, solutions, free=free)
     command = [sys.executable, oracle, tmp_path / "original.ply", "--front", folder / "front.csv"]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
@@ -439,6 +452,105 @@ DAMAGE = {
 def test_a_damaged_result_is_noticed_and_named(tmp_path, model, solutions, damage):
     spoil, message = DAMAGE[damage]
     folder = write_solutions(tmp_path / "out", model, solutions, meshes=0)
+    spoil(folder)
+    with pytest.raises(ResultError, match=message) as caught:
+        read_front(folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_faces_of_free_meshes_are_read_back_where_they_belong(tmp_path, model, freed_solutions):
+    """By hand: the smallest solution has the range [0, 0), the next free one begins where the last ended."""
+    found, free = freed_solutions
+    one, two = (write_solutions(tmp_path / name, model, found, free=free) for name in "ab")
+    assert (one / "front.npz").read_bytes() == (two / "front.npz").read_bytes()
+    stored = read_front(one)
+    order = np.argsort([s.quality.triangles for s in found[1]], kind="stable")
+    for faces, row in zip(stored.faces, order, strict=True):
+        assert (faces is None) == (free[row] is None)
+        assert faces is None or faces.tolist() == free[row].tolist()
+    assert stored.quality["free"].tolist() == [int(free[row] is not None) for row in order]
+    with np.load(one / "front.npz") as arrays:
+        sizes = [0 if free[row] is None else len(free[row]) for row in order]
+        assert arrays["face_start"].tolist() == [sum(sizes[:k]) for k in range(13)]
+        assert arrays["faces"].tolist() == [
+            face for row in order if free[row] is not None for face in free[row].tolist()
+        ]
+        assert arrays["faces"].dtype == np.int32
+    none = read_front(write_solutions(tmp_path / "none", model, found))
+    assert none.faces == (None,) * 12
+    with pytest.raises(ValueError, match="free has 3 entries for 12 solutions"):
+        write_solutions(tmp_path / "wrong", model, found, free=free[:3])
+
+
+def free_rows(change):
+    """Change the faces of the first free mesh, (M, 3), in place."""
+
+    def spoil(folder):
+        with np.load(folder / "front.npz") as file:
+            arrays = dict(file)
+        start = arrays["face_start"]
+        change(arrays["faces"][: start[np.flatnonzero(np.diff(start))[0] + 1]])
+        np.savez(folder / "front.npz", **arrays)
+
+    return spoil
+
+
+def put(at, value):
+    def change(faces):
+        faces[at] = value(faces) if callable(value) else value
+
+    return free_rows(change)
+
+
+FREE_DAMAGE = {
+    "no faces": (
+        lambda f: np.savez(f / "front.npz", **{n: a for n, a in np.load(f / "front.npz").items() if n != "faces"}),
+        r"holds no array 'faces'",
+    ),
+    "other type": (spoil_npz(faces=lambda a: a.astype(np.int64)), r"faces has the type int64 and the shape \(\d+, 3\)"),
+    "no numbers": (spoil_npz(faces=lambda a: a.astype(float)), r"faces has the type float64 and 2 dimensions"),
+    "other shape": (
+        spoil_npz(faces=lambda a: a[:, :2]),
+        r"faces has the type int32 and the shape \(\d+, 2\) instead of",
+    ),
+    "a face less": (spoil_npz(faces=lambda a: a[:-1]), r"face_start does not cut its \d+ faces into those of 12"),
+    "a start less": (spoil_npz(face_start=lambda a: a[:-1]), r"face_start does not cut its"),
+    "starts out of order": (spoil_npz(face_start=lambda a: a[::-1].copy()), r"face_start does not cut its"),
+    "negative starts": (spoil_npz(face_start=lambda a: a - 1), r"face_start does not cut its"),
+    "later": (
+        spoil_npz(face_start=lambda a: np.r_[0 * a[:-1], a[-1]]),
+        r"holds 0 faces of solution \d+, whose free is 1 in front\.csv",
+    ),
+    "said to be free": (spoil_csv(2, "free", "1"), r"holds 0 faces of solution 0, whose free is 1"),
+    "more than free": (spoil_csv(2, "free", "2"), r"holds 0 faces of solution 0, whose free is 2"),
+    "free in words": (spoil_csv(2, "free", "yes"), r"front\.csv, line 2: free is 'yes'"),
+    "not said to be free": (
+        lambda f: [spoil_csv(line, "free", "0")(f) for line in range(2, 14)],
+        r"holds \d+ faces of solution \d+, whose free is 0",
+    ),
+    "beyond the model": (put((-1, 2), 200), r"solution \d+: faces index rows \d+ to 200 of 200 vertices"),
+    "negative": (put((0, 0), -1), r"solution \d+: faces index rows -1 to"),
+    "unsorted": (put(slice(None), lambda f: f[::-1].copy()), r"its faces are not sorted, the smallest row first"),
+    "turned": (put(slice(None), lambda f: np.roll(f, 1, axis=1)), r"its faces are not sorted"),
+    "a face twice": (put(1, lambda f: f[0].copy()), r"one triangle twice"),
+    "a corner twice": (put((0, 2), lambda f: f[0, 1]), r"a vertex twice in one triangle"),
+    "a vertex that is not kept": (
+        spoil_npz(kept=lambda k: np.roll(k, 1, axis=1)),
+        r"solution \d+: its faces use vertex \d+, which it does not keep",
+    ),
+    "of fewer vertices": (
+        lambda f: [spoil_csv(line, "vertices", "3")(f) for line in range(2, 14)],
+        r"solution \d+: its faces are \d+ triangles of \d+ vertices, and it is said to have \d+ of 3",
+    ),
+}
+
+
+@pytest.mark.parametrize("damage", FREE_DAMAGE)
+def test_damaged_faces_are_noticed_and_named(tmp_path, model, freed_solutions, damage):
+    spoil, message = FREE_DAMAGE[damage]
+    found, free = freed_solutions
+    folder = write_solutions(tmp_path / "out", model, found, free=free, meshes=0)
+    read_front(folder)
     spoil(folder)
     with pytest.raises(ResultError, match=message) as caught:
         read_front(folder)

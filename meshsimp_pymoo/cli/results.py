@@ -145,7 +145,12 @@ def _summary(front: Front, output: Output) -> dict[str, Any]:
         "most_accurate": asdict(front.quality[-1]),
         "chosen": None
         if chosen is None
-        else {"mesh": str(_chosen_path(output)), "solution": chosen, **asdict(front.quality[chosen])},
+        else {
+            "mesh": str(_chosen_path(output)),
+            "solution": chosen,
+            "free": front[chosen].free,
+            **asdict(front.quality[chosen]),
+        },
     } | {name: front.run[name] for name in SAID if name in front.run}
 
 
@@ -161,15 +166,17 @@ def _tell(front: Front, output: Output) -> None:
     if "evaluations" in run:
         moves = [f"{run['moves']:,} moves"] if "moves" in run else []
         effort = [f"{run['evaluations']:,} evaluations", *moves, *effort, f"seed {run['seed']}"]
+    free = f", {front.n_free} of them free" if front.n_free else ""
     tell(
-        f"front: {len(front)} solutions, {few.triangles:,} to {many.triangles:,} triangles, "
+        f"front: {len(front)} solutions{free}, {few.triangles:,} to {many.triangles:,} triangles, "
         f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} ({', '.join(effort)})"
     )
     if run.get("wish"):
         tell(f"searched: around {in_words(run['wish'])}; the rest of the front is what came along")
     if chosen is not None:
         path = _chosen_path(output)
-        tell(f"chosen: {path} (solution {chosen}): {described(front.quality[chosen], unit)}")
+        which = f"solution {chosen}{', free' * front[chosen].free}"
+        tell(f"chosen: {path} ({which}): {described(front.quality[chosen], unit)}")
     suffix = format_to_write(output.format).suffix
     written, refitted = (len(list(folder.glob(f"{place}/*{suffix}"))) for place in ("meshes", "refitted"))
     files = [there(folder, "front.csv", *PICTURES)]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pymoo.core.population import Population
 from pymoo.termination.max_eval import MaximumFunctionCallTermination
 from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.termination.max_time import TimeBasedTermination
@@ -254,15 +255,16 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
         interrupted, until = True, time.perf_counter() + WAIT_SECONDS
         if found is None and (starts := _begun(problem, algorithm)):
             say(f"the search had not begun yet; the front is of {' and '.join(map(str, starts))}, of its start")
-    X = np.asarray(found.get("X"), dtype=bool) if found is not None else _subsets_begun(problem, algorithm)
-    if X is None:
-        return None
+    if found is None:
+        X = _subsets_begun(problem, algorithm)
+        if X is None:
+            return None
+        found = Population.new(X=X)
     seconds = before + time.perf_counter() - start
     try:
         # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
-        front = Front.from_subsets(
-            problem, X, ends=True, wish=keeper.request.wish.limits if keeper.request.is_targeted else None
-        )
+        wish = keeper.request.wish.limits if keeper.request.is_targeted else None
+        front = Front.from_population(problem, found, ends=True, wish=wish)
     except LookupError:
         raise UsageError(
             f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "

@@ -178,6 +178,16 @@ def reservations(study: Study) -> list[str]:
     if len(study.versions) > 1:
         differing = sorted({k for v in study.versions for k in v if any(v.get(k) != o.get(k) for o in study.versions)})
         lines.append(f"the runs were made with different versions of {listed(differing)}")
+    free: dict[str, int] = {}
+    for run in study.all_runs:
+        if "free_F" in run.arrays:
+            method = run.record["algorithm"]
+            free[method] = free.get(method, 0) + len(run.arrays["free_F"])
+    if free:
+        lines.append(
+            f"{sum(free.values()):,} free meshes of {listed(free)} are stored beside the runs and not compared: all "
+            "numbers here are those of the Delaunay meshes of the same searches"
+        )
     return lines + _unlike(study)
 
 

@@ -68,6 +68,7 @@ from meshsimp_pymoo.comparison.trace import Trace
 from meshsimp_pymoo.errors import ResultError, ToolUnavailable
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import listed
+from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.budgets import Moves, moves_of
@@ -399,7 +400,8 @@ def perform(
                     "versions": package_versions(),
                     "environment": machine() | {"jobs": jobs},
                 }
-                yield k, _front_arrays(problem, algorithm.opt) | until_now.arrays, facts
+                arrays = _front_arrays(problem, algorithm.opt) | _free_arrays(problem, algorithm.opt)
+                yield k, arrays | until_now.arrays, facts
                 left.remove(k)
         if left and keeper is not None and keeper.due():
             try:
@@ -460,6 +462,25 @@ def _front_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[A
         best = {tuple(row) for row in non_dominated(F[rows[first]]).tolist()}
         rows = np.array([row for row in rows[first] if tuple(F[row].tolist()) in best])
     return {name: values[rows] for name, values in arrays.items()}
+
+
+def _free_arrays(problem: MeshProblem, optimum: Any) -> dict[str, npt.NDArray[Any]]:
+    """Return the free meshes of the front of a population; nothing where it has none."""
+    if optimum is None or not any(mesh is not None for mesh in optimum.get("free", to_numpy=False)):
+        return {}
+    try:
+        found = Front.from_population(problem, optimum)
+    except LookupError:  # nothing of it is feasible
+        return {}
+    faces, measure = [own for own in found.faces if own is not None], problem.objectives[0]
+    if not faces:
+        return {}
+    quality = [solution.quality for solution in found if solution.free]
+    return {
+        "free_F": np.array([[getattr(q, measure), q.triangles] for q in quality], dtype=np.float64),
+        "free_faces": np.concatenate(faces),
+        "free_face_start": np.cumsum([0, *map(len, faces)]),
+    }
 
 
 def _subset_arrays(problem: MeshProblem, kept: BoolArray) -> dict[str, npt.NDArray[Any]]:

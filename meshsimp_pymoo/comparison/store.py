@@ -75,7 +75,10 @@ class StoredRun:
         moments, the last of them its end: ``trace_generations`` (K,), ``trace_evaluations`` (K,), and the front at
         moment k, error as searched and triangles, sorted by triangles, as the rows ``trace_start[k]`` to
         ``trace_start[k + 1]`` of ``trace_F``; ``trace_start`` is (K + 1,). The record has the K
-        ``trace_seconds``, which are never the same twice. See the runner for what baselines have.
+        ``trace_seconds``, which are never the same twice. ``F`` and all that is compared is of the Delaunay meshes of
+        ``kept``. Where the search found free meshes that are better, those K of its front are there besides:
+        ``free_F`` (K, 2), and the triangles ``free_faces`` (M, 3), rows of the stored model, of which mesh k has those
+        from ``free_face_start[k]`` to ``free_face_start[k + 1]``. See the runner for what baselines have.
     """
 
     path: Path

@@ -348,20 +348,32 @@ def _axes(mesh: OutMesh) -> tuple[str, ...]:
     return UPRIGHT["-" * bool(up[k] < 0) + "xyz"[k]]
 
 
+def _origin(mesh: OutMesh) -> FloatArray:
+    """Return what the coordinates count from."""
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.precision import local_origin
+
+    return local_origin(np.asarray(mesh.vertices, dtype=np.float64)) if mesh.origin is None else mesh.origin
+
+
+def _single(mesh: OutMesh) -> FloatArray:
+    """Return the vertices from there, in metres."""
+    import numpy as np
+
+    return (np.asarray(mesh.vertices, dtype=np.float64) - _origin(mesh)) * _metres_per_unit(mesh.georeference)
+
+
 def _write(path: Path, mesh: OutMesh) -> None:
     """Write a GLB of one node with one mesh, whose coordinates are those from the origin."""
     import json
 
     import numpy as np
 
-    from meshsimp_pymoo.formats.source.precision import local_origin
-
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    origin = local_origin(vertices) if mesh.origin is None else mesh.origin
-    scale = _metres_per_unit(mesh.georeference)
+    origin, scale = _origin(mesh), _metres_per_unit(mesh.georeference)
     axes = _axes(mesh)
     turn = _turn(axes)
-    points = (((vertices - origin) * scale) @ turn.T).astype("<f4") + np.float32(0)  # no -0.0
+    points = (_single(mesh) @ turn.T).astype("<f4") + np.float32(0)  # no -0.0
     uv, material = mesh.uv, mesh.material if mesh.uv is None else mesh.material or Material()
     columns: list[tuple[str, AnyArray, dict[str, Any]]] = [
         (
@@ -448,7 +460,7 @@ register(
         "GLB",
         read=_read,
         write=_write,
-        single_precision=True,
+        single=_single,
         states_origin=True,
         keeps=("color", "uv"),
         refuse=_refuse,

@@ -13,6 +13,7 @@ from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
+    from meshsimp_pymoo.arrays import FloatArray
     from meshsimp_pymoo.formats.source import SourceMesh
 
 
@@ -55,4 +56,8 @@ def _write(path: Path, mesh: OutMesh) -> None:
     export(path, mesh)
 
 
-register(Format("stl", (".stl",), "STL", read=_read, write=_write, single_precision=True))
+def _single(mesh: OutMesh) -> FloatArray:
+    return mesh.vertices
+
+
+register(Format("stl", (".stl",), "STL", read=_read, write=_write, single=_single))

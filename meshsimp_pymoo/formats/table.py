@@ -109,8 +109,9 @@ class Format(NamedTuple):
         The extra of this package that brings the library it needs; empty: none.
     further : callable, optional
         Returns further suffixes, which are those of no other format: ones that a library knows, asked only if needed.
-    single_precision : bool
-        Whether it cannot hold double precision.
+    single : callable, optional
+        Of a format that cannot hold double precision: ``single(mesh)`` returns the coordinates (V, 3), along the axes
+        of the model's file, that are written in single precision.
     states_origin : bool
         Whether it says from which origin its coordinates count; then single precision loses nothing that matters.
     keeps : tuple of str, optional
@@ -132,7 +133,7 @@ class Format(NamedTuple):
     write: Callable[[Path, OutMesh], None] | None = None
     extra: str = ""
     further: Callable[[], Iterable[str]] | None = None
-    single_precision: bool = False
+    single: Callable[[OutMesh], FloatArray] | None = None
     states_origin: bool = False
     keeps: tuple[str, ...] | None = ()
     refuse: Callable[[Held], None] | None = None
@@ -143,6 +144,11 @@ class Format(NamedTuple):
     def suffix(self) -> str:
         """The suffix of the files that are written, with the dot."""
         return self.suffixes[0]
+
+    @property
+    def single_precision(self) -> bool:
+        """Whether it cannot hold double precision."""
+        return self.single is not None
 
     def check(self, model: Held) -> None:
         """Raise a ResultError if meshes of this model cannot be written in it."""
@@ -506,21 +512,53 @@ def shared_frame(
     return {"origin": origin, "georeference": georeference, "name": stem, "up": up, "material": material}
 
 
-def warn_of_shift(kind: Format, name: str, diagonal: float, shift: float) -> None:
-    """Warn if the format's single precision moves vertices by more than a person would see in the numbers."""
-    from meshsimp_pymoo.formats.source.precision import SINGLE_PRECISION_LOSS
+class Rounding:
+    """What a format's single precision does to meshes, to be said once.
 
-    if not kind.single_precision or kind.states_origin or shift <= SINGLE_PRECISION_LOSS * diagonal:
-        return
-    known = written_formats().values()
-    exact = listed(other.name for other in known if not other.single_precision)
-    stating = listed(other.name for other in known if other.states_origin)
-    warnings.warn(
-        f"{name}: {kind.name} holds single precision, which moves vertices by up to {shift:.3g} [model units]; {exact} "
-        f"keep them exactly, {stating} states a local origin",
-        ModelWarning,
-        stacklevel=3,
-    )
+    Parameters
+    ----------
+    kind : Format
+        The format.
+    """
+
+    def __init__(self, kind: Format) -> None:
+        self.kind = kind
+        self.shift = 0.0
+        self.turned = 0
+
+    def add(self, mesh: OutMesh, scale: FloatArray) -> None:
+        """Take note of a mesh that is written; ``scale`` (3,) is what units of its coordinates are [model units]."""
+        import numpy as np
+
+        from meshsimp_pymoo.formats.source.precision import single_precision_shift, turned_over
+
+        if self.kind.single is None:
+            return
+        if not self.kind.states_origin:
+            self.shift = max(self.shift, single_precision_shift(mesh.vertices, scale))
+        up = np.array([0.0, 0.0, 1.0]) if mesh.up is None else mesh.up
+        self.turned += turned_over(self.kind.single(mesh), mesh.faces, up)
+
+    def warn(self, name: str, diagonal: float) -> None:
+        """Warn if it moves vertices by more than a person would see in the numbers, or turns triangles over."""
+        from meshsimp_pymoo.formats.source.precision import SINGLE_PRECISION_LOSS
+
+        does = []
+        if self.shift > SINGLE_PRECISION_LOSS * diagonal:
+            does.append(f"moves vertices by up to {self.shift:.3g} [model units]")
+        if self.turned:
+            does.append(f"turns over or flattens {self.turned:,} triangle{'s' * (self.turned > 1)}")
+        if not does:
+            return
+        known = written_formats().values()
+        exact = listed(other.name for other in known if not other.single_precision)
+        stating = listed(other.name for other in known if other.states_origin)
+        warnings.warn(
+            f"{name}: {self.kind.name} holds single precision, which {listed(does)}; {exact} keep them exactly"
+            + ("" if self.kind.states_origin else f", {stating} states a local origin"),
+            ModelWarning,
+            stacklevel=3,
+        )
 
 
 def warn_of_left_behind(kind: Format, name: str, attributes: Iterable[str]) -> None:

@@ -24,6 +24,21 @@ def canonical_faces(faces: IntArray) -> IntArray:
     return turned[np.lexsort((turned[:, 2], turned[:, 1], turned[:, 0]))]
 
 
+def is_canonical(faces: IntArray) -> bool:
+    """Tell whether triangles (M, 3) are in their one spelling, none of them twice and none with a corner twice.
+
+    Examples
+    --------
+    >>> is_canonical(np.array([[0, 1, 2], [0, 3, 1]])), is_canonical(np.array([[0, 3, 1], [0, 1, 2]]))
+    (True, False)
+    """
+    a, b, c = faces.T
+    if not ((a < b) & (a < c) & (b != c)).all():
+        return False
+    first, second, third = (np.sign(np.diff(column.astype(np.int64))) for column in (a, b, c))
+    return bool((9 * first + 3 * second + third > 0).all())
+
+
 def used_rows(faces: IntArray) -> tuple[IntArray, IntArray]:
     """Return the vertices (V,) that triangles (M, 3) use, ascending, and the triangles as rows of these.
 

@@ -24,7 +24,7 @@ from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_
 from meshsimp_pymoo.report.figures import UNCOVERED, original_mesh
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
-from meshsimp_pymoo.storage import FRONT_COLUMNS, StoredFront
+from meshsimp_pymoo.storage import StoredFront
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.units import length_unit, reference_system
@@ -128,7 +128,7 @@ def simplification_page(
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
     held = _embedded(surface, kept, front, original, order, knee, limit)
     missing = sum(solution is None for solution in held.solutions)
-    columns: dict[str, list[Any]] = {name: front.quality[name].tolist() for name in FRONT_COLUMNS[:-1]}
+    columns: dict[str, list[Any]] = {name: values.tolist() for name, values in front.quality.items()}
     if front.refitted_error is not None:
         columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
@@ -255,7 +255,11 @@ def _checked(
     surface: Surface, kept: BoolArray | Chromosomes, front: StoredFront, row: int, measured: IntArray
 ) -> Simplified:
     """Return the mesh of a solution, its deviation at some vertices, if it has the numbers that are said of it."""
-    mesh = surface.simplify(kept[row] | surface.pinned, rows=measured)
+    own = front.faces[row]
+    if own is None:
+        mesh = surface.simplify(kept[row] | surface.pinned, rows=measured)
+    else:
+        mesh = surface.of_faces(own, rows=measured)
     triangles, error, found = front.quality["triangles"][row], front.quality["error"][row], mesh.quality
     if found.triangles != triangles or not np.isclose(found.error, error, rtol=1e-6, atol=1e-12 * surface.diagonal):
         raise ResultError(

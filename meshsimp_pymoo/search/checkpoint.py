@@ -424,13 +424,14 @@ class _Writer:
     def _columns(self) -> dict[str, Any]:
         """Return all individuals met, a column for each of their attributes."""
         people = list(self._individuals)
+        self._new = "an individual"  # all that it holds is made anew
         columns = {
-            name: self._column([vars(one).get(name) for one in people], [name in vars(one) for one in people])
+            name: self._column(name, [vars(one).get(name) for one in people], [name in vars(one) for one in people])
             for name in _keys([vars(one) for one in people])
             if name not in SAME_FOR_ALL
         }
         data = {
-            name: self._column([one.data.get(name) for one in people], [name in one.data for one in people])
+            name: self._column(name, [one.data.get(name) for one in people], [name in one.data for one in people])
             for name in _keys([one.data for one in people])
         }
         evaluated = [tuple(sorted(one.evaluated)) for one in people]
@@ -445,7 +446,7 @@ class _Writer:
             "evaluated": [which, [list(names) for names in kinds]],
         }
 
-    def _column(self, values: list[Any], there: list[bool]) -> list[Any]:
+    def _column(self, name: str, values: list[Any], there: list[bool]) -> list[Any]:
         mark = np.full(len(values), ABSENT, np.uint8)
         mark[there] = PRESENT
         mark[[value is None and is_there for value, is_there in zip(values, there, strict=True)]] = NOTHING
@@ -466,7 +467,7 @@ class _Writer:
             scalars = np.array(present)
             if scalars.dtype.type in kinds:
                 return ["rows", marks, self._array(scalars)]
-        return ["each", marks, [self.value(value, "individual") for value in present]]
+        return ["each", marks, [self.value(value, f"individuals.{name}[{k}]") for k, value in enumerate(present)]]
 
 
 def _keys(mappings: list[dict[str, Any]]) -> list[str]:
@@ -500,10 +501,12 @@ class _Reader:
         self.arrays = stored.arrays
         self._objects: dict[str, Any] = {}
         self._decoded: dict[str, npt.NDArray[Any]] = {}
-        self._individuals = self._people(stored.content["individuals"], n_var)
+        self._n_var = n_var
+        self._individuals = [Individual() for _ in range(stored.content["individuals"]["count"])]
 
     def restore(self, algorithm: Algorithm) -> None:
         self.value(self.stored.content["algorithm"], algorithm)
+        self._fill(self._individuals, self.stored.content["individuals"])  # they may hold what the algorithm holds
         if algorithm.start_time is not None:
             algorithm.start_time += time.time() - float(self.stored.content["clock"])
 
@@ -575,8 +578,7 @@ class _Reader:
             raise IndexError("no individual has a negative number")
         return self._individuals[k]
 
-    def _people(self, content: dict[str, Any], n_var: int) -> list[Individual]:
-        people = [Individual() for _ in range(content["count"])]
+    def _fill(self, people: list[Individual], content: dict[str, Any]) -> None:
         for name, code in content["columns"].items():
             for one, value in zip(people, self._column(code, len(people)), strict=True):
                 if value is not LACKING:
@@ -588,9 +590,8 @@ class _Reader:
         which, kinds = content["evaluated"]
         for one, k in zip(people, self.arrays[which], strict=True):
             one.evaluated = set(kinds[int(k)])
-            if one.X.shape != (n_var,):
-                raise ValueError(f"an individual has {one.X.shape} variables, the problem {n_var}")
-        return people
+            if one.X.shape != (self._n_var,):
+                raise ValueError(f"an individual has {one.X.shape} variables, the problem {self._n_var}")
 
     def _column(self, code: list[Any], count: int) -> list[Any]:
         """Return a value for each individual; LACKING where there is none."""

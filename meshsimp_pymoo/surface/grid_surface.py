@@ -153,6 +153,10 @@ class GridSurface:
         faces = canonical_faces(mesh.samples[mesh.faces])
         return Simplified(faces, as_quality(numbers, self.total_weight), deviation, np.ones(len(at), bool))
 
+    def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
+        """Refuse: free meshes are made and measured with a model in one piece."""
+        raise ModelError(f"{self.model.name}: meshes of tiles are Delaunay, not free; simplify it in one piece")
+
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh in the frame of the file by the same error, with the grid as a model in one piece."""
         model, row_of = self._whole
@@ -183,7 +187,7 @@ class GridSurface:
         model = build_model(source, up="z")
         return model, np.argsort(model.source_index)
 
-    def refit(self, kept: BoolArray, *, until: float | None = None) -> Refitted:
+    def refit(self, mesh: Simplified, *, until: float | None = None) -> Refitted:
         """Refuse: the heights of a mesh are fitted with a model in one piece."""
         raise ModelError(f"{self.model.name}: the heights of meshes of tiles are not fitted; simplify it in one piece")
 

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 
 from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.books import Live, make_live, with_peaks
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.free import FreeGround
@@ -24,7 +25,7 @@ from meshsimp_pymoo.surface.pins import pinned_vertices
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, require_rules
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, checked_faces, require_rules
 from meshsimp_pymoo.workers import Reserve
 
 # A kept vertex of weight 0 counts this share of the mean all the same, so that its refitted height has a value.
@@ -207,6 +208,32 @@ class HeightSurface:
         at = slice(None) if rows is None else rows
         return Simplified(faces, as_quality(numbers, self.total_weight), deviation[at], covered[at])
 
+    def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
+        """Measure a mesh of the model's own vertices with any edges: a free one.
+
+        The rule is that of :meth:`score`, whose numbers these are but for rounding; a vertex of the mesh that it covers
+        does not deviate at all.
+
+        Parameters
+        ----------
+        faces : (M, 3) int array
+            Triangles as rows of :attr:`points`; no two of them should overlap in the plane.
+        rows : (K,) int array, optional
+            The vertices whose deviation is wanted, ascending; by default all.
+
+        Raises
+        ------
+        ValueError
+            If these are no triangles of the model, or none has an area in the plane.
+        """
+        faces = checked_faces(faces, self.n_vertices)
+        deviation, covered = mesh_deviation(self._ground, self.points, faces)
+        used, _ = used_rows(faces)
+        deviation[used[covered[used]]] = 0.0
+        quality = mesh_quality(deviation, covered, faces, self.model.weights, self.total_weight)
+        at = slice(None) if rows is None else rows
+        return Simplified(faces, quality, deviation[at], covered[at])
+
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh by the same error: decimated, folded, with vertices of its own.
 
@@ -228,15 +255,14 @@ class HeightSurface:
         quality = mesh_quality(deviation, covered, np.asarray(faces), self.model.weights, self.total_weight)
         return Scored(quality, deviation, covered)
 
-    def refit(self, kept: BoolArray, *, tolerance: float = TOLERANCE, until: float | None = None) -> Refitted:
-        """Move the kept vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
+    def refit(self, mesh: Simplified, *, tolerance: float = TOLERANCE, until: float | None = None) -> Refitted:
+        """Move a mesh's vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
         if not tolerance > 0:
             raise ValueError(
                 f"tolerance={tolerance} is not positive; give a small share of the error such as {TOLERANCE}"
             )
-        model, mesh = self.model, self.simplify(kept)
-        rows, compact = np.unique(mesh.faces, return_inverse=True)
-        compact = compact.reshape(-1, 3)
+        model = self.model
+        rows, compact = used_rows(mesh.faces)
         before = mesh.quality.error
         own = model.file_points[rows]
         if before == 0.0:
@@ -283,7 +309,7 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
     What is minimised is the package's error itself: the sum of w_p d_p over all original vertices, the uncovered ones
     included (their distance in space to the nearest point of the outline depends on its height too), whatever other
     measure a search minimised. Pinned vertices stay in place but may change their height, too. The result is no subset
-    of the original vertices any more.
+    of the original vertices any more. ``surface.refit(mesh)`` does the same for any mesh of the surface, free ones too.
 
     Parameters
     ----------
@@ -317,4 +343,4 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
     3.0
     """
     require_rules(surface, "refit_heights")
-    return surface.refit(kept, tolerance=tolerance)
+    return surface.refit(surface.simplify(kept), tolerance=tolerance)

@@ -16,7 +16,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.formats.material import Material
-from meshsimp_pymoo.plane.faces import used_rows
+from meshsimp_pymoo.plane.faces import canonical_faces, is_canonical, used_rows
 from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -45,6 +45,28 @@ class Simplified:
     quality: Quality
     deviation: FloatArray
     covered: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMesh:
+    """A mesh of a surface's own vertices whose edges are chosen for the error, not by the surface's rule.
+
+    It is no function of a subset. A search keeps it beside the individual whose subset it began with, as
+    ``individual.get("free")``; the objectives of the individual stay those of its subset.
+
+    Attributes
+    ----------
+    kept : (N,) bool array
+        The vertices that its triangles use, and the pinned ones.
+    faces : (M, 3) int32 array
+        Triangles as rows of ``surface.points``, the smallest row first, sorted.
+    quality : Quality
+        Its numbers, as ``surface.of_faces`` measures them.
+    """
+
+    kept: BoolArray
+    faces: IntArray
+    quality: Quality
 
 
 @dataclass(frozen=True)
@@ -266,12 +288,19 @@ class Surface(Protocol):
         """
         ...
 
+    def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
+        """Measure a mesh of the surface's own vertices with any edges: triangles (M, 3) as rows of ``points``.
+
+        A ValueError if these are no triangles of the surface.
+        """
+        ...
+
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh in the frame of the model's file by the same error."""
         ...
 
-    def refit(self, kept: BoolArray, *, until: float | None = None) -> Refitted:
-        """Return the mesh of one subset with its vertices moved to where its error is least, or ended at ``until``."""
+    def refit(self, mesh: Simplified, *, until: float | None = None) -> Refitted:
+        """Return a mesh of the surface with its vertices moved to where its error is least, or ended at ``until``."""
         ...
 
     def ground(self) -> Any | None:
@@ -296,6 +325,50 @@ class Surface(Protocol):
         Of several kept vertices at one place, a fixed one is the site, else the first.
         """
         ...
+
+
+def checked_faces(faces: Any, n_vertices: int) -> IntArray:
+    """Return triangles (M, 3) of N vertices in their one spelling, int32.
+
+    Raises
+    ------
+    ValueError
+        If they are none: of another shape or type, out of range, with a corner twice, or one of them twice.
+    """
+    found = np.asarray(faces)
+    if found.ndim != 2 or found.shape[1] != 3 or not np.issubdtype(found.dtype, np.integer):
+        raise ValueError(
+            f"faces are {found.dtype} of shape {found.shape}; give whole numbers of shape (M, 3), rows of the vertices"
+        )
+    if len(found) == 0:
+        raise ValueError("a mesh without faces has no error; it needs at least one triangle")
+    if found.min() < 0 or found.max() >= n_vertices:
+        raise ValueError(f"faces index rows {found.min()} to {found.max()} of {n_vertices} vertices")
+    if not is_canonical(found):
+        found = canonical_faces(found)
+        if not is_canonical(found):
+            raise ValueError("faces name a vertex twice in one triangle, or one triangle twice")
+    return np.ascontiguousarray(found, np.int32)
+
+
+def free_faces(faces: Any, kept: BoolArray, quality: Quality) -> IntArray:
+    """Return the triangles (M, 3) of a free mesh as :func:`checked_faces` does, if they fit what is said of it.
+
+    Raises
+    ------
+    ValueError
+        If they are no triangles, not as many as the quality says, or use other vertices or another number of them.
+    """
+    found = checked_faces(faces, len(kept))
+    used, _ = used_rows(found)
+    if len(found) != quality.triangles or len(used) != quality.vertices:
+        raise ValueError(
+            f"its faces are {len(found)} triangles of {len(used)} vertices, and it is said to have "
+            f"{quality.triangles} of {quality.vertices}"
+        )
+    if not kept[used].all():
+        raise ValueError(f"its faces use vertex {used[~kept[used]][0]}, which it does not keep")
+    return found
 
 
 def mesh_arrays(model: Original, faces: IntArray) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:

@@ -23,12 +23,14 @@ from drawing import overlaps
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.population import Population
 from pymoo.optimize import minimize
+from samples import freed
 
 from meshsimp_pymoo.cli import main, terminal
 from meshsimp_pymoo.comparison import analysis, baselines, report, runner
 from meshsimp_pymoo.comparison.baselines import reductions
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.comparison.figures import meshes_figure
+from meshsimp_pymoo.comparison.findings_page import reservations
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
 from meshsimp_pymoo.comparison.report import write_report, write_tables
 from meshsimp_pymoo.comparison.runner import perform, plan, run_experiment
@@ -102,6 +104,46 @@ def record_of(out: Path, **wanted: object) -> Path:
         if all(record[key] == value for key, value in wanted.items()):
             return path
     raise AssertionError(f"no run with {wanted}")
+
+
+def test_free_meshes_are_stored_beside_what_is_compared_and_that_is_said(tmp_path, monkeypatch):
+    """F is what the problem says of X, with or without free meshes beside, and so is all that is made of it."""
+    config = tmp_path / "one.yaml"
+    config.write_text(
+        "problems: [{name: Face, model: 'face:90'}]\n"
+        "algorithms: [{name: N1, preset: nsga2_v1, parameters: {pop_size: 12}}]\n"
+        "seeds: [1, 2]\nbudgets: [{generations: 4}]\n",
+        encoding="utf-8",
+    )
+    run_experiment(config, tmp_path / "without")
+    set_optimum = NSGA2._set_optimum
+
+    def with_free_meshes(self):
+        set_optimum(self)
+        for one in self.opt[: len(self.opt) // 2] if self.n_iter == 4 else ():
+            one.set("free", freed(self.problem.surface, one.X))
+
+    monkeypatch.setattr(NSGA2, "_set_optimum", with_free_meshes)
+    run_experiment(config, tmp_path / "with")
+    studies = [Study(tmp_path / name) for name in ("without", "with")]
+    n_meshes = 0
+    for plain, run in zip(*(study.all_runs for study in studies), strict=True):
+        assert not [name for name in plain.arrays if name.startswith("free")]
+        for name, values in plain.arrays.items():
+            np.testing.assert_array_equal(run.arrays[name], values)
+        surface, F, start = (
+            studies[1].surface(studies[1].problems[0]),
+            run.arrays["free_F"],
+            run.arrays["free_face_start"],
+        )
+        assert len(F) == len(start) - 1 > 0
+        for (error, triangles), a, b in zip(F, start[:-1], start[1:], strict=True):
+            quality = surface.of_faces(run.arrays["free_faces"][a:b]).quality
+            assert (quality.error, quality.triangles) == (pytest.approx(error), triangles)
+            assert not ((run.arrays["F"][:, 1] <= triangles) & (run.arrays["F"][:, 0] <= error)).any()  # none beats it
+        n_meshes += len(F)
+    said = f"{n_meshes} free meshes of N1 are stored beside the runs and not compared: all numbers here are those of"
+    assert [any(said in line for line in reservations(study)) for study in studies] == [False, True]
 
 
 def test_every_run_is_stored_and_none_is_done_again(config, stored, monkeypatch):

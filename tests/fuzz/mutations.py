@@ -215,6 +215,7 @@ def good_front() -> tuple[tuple[str, bytes], ...]:
             [s.quality for s in found],
             kept,
             faces=lambda row: found[row].faces,
+            free=[None, found[1].faces, found[2].faces],
             series={"another": [[2.5, 2], [1.0, 7]]},
             run={"settings": {"up": "auto"}, "seed": 1},
         )

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import Visit, launched
+from samples import freed
 from scipy.spatial import Delaunay
 
 from meshsimp_pymoo import MeshProblem
@@ -618,6 +619,72 @@ def test_embedded_deviations_are_those_of_the_mesh_to_eight_bits(folder, front):
         assert (levels[~mesh.covered] == page_module.UNCOVERED_LEVEL).all()
         step = solution["largest"] / page_module.LEVELS
         np.testing.assert_allclose(found[mesh.covered], mesh.deviation[mesh.covered], atol=1.01 * step)
+
+
+@pytest.fixture(scope="module")
+def free_folder(front, tmp_path_factory):
+    """The same front with a free mesh in place of solution 3, and its page."""
+    mesh = freed(front.surface, front[3].kept)
+    parts = [front.quality, front.kept, [None] * len(front)]
+    quality, kept, faces = (list(part) for part in parts)
+    quality[3], kept[3], faces[3] = mesh.quality, mesh.kept, mesh.faces
+    own = Front(quality, kept, faces=faces, problem=front.problem)
+    return own.save(tmp_path_factory.mktemp("free") / "out", meshes=0, chosen=3)
+
+
+def faces_of(solution):
+    columns = unpacked(solution["faces"]).reshape(3, -1)
+    a = columns[0].cumsum()
+    return np.stack([a, a + columns[1], a + columns[2]], axis=1)
+
+
+def test_the_page_holds_a_free_mesh_by_its_own_faces_and_deviations(free_folder, front):
+    free, data = Front.load(free_folder)[3], data_of((free_folder / "report.html").read_text(encoding="utf-8"))
+    assert free.faces.tolist() != front[3].faces.tolist()
+    assert data["columns"]["free"] == [int(k == 3) for k in range(len(front))]
+    for row, solution in enumerate(Front.load(free_folder)):
+        assert faces_of(data["solutions"][row]).tolist() == solution.faces.tolist()  # all vertices are in the page
+    held, mesh = data["solutions"][3], free.simplified
+    found = held["largest"] * (unpacked(held["deviation"]).astype(float) / page_module.LEVELS) ** 2
+    np.testing.assert_allclose(found, mesh.deviation, atol=1.01 * held["largest"] / page_module.LEVELS)
+    assert held["largest"] == mesh.deviation.max() != front[3].simplified.deviation.max()
+
+
+def test_a_free_mesh_that_has_not_the_numbers_that_are_said_of_it_is_refused(free_folder, front):
+    stored = read_front(free_folder)
+    mesh = freed(front.surface, front[3].kept, better=False)
+    other = replace(stored, faces=(*stored.faces[:3], mesh.faces, *stored.faces[4:]))
+    with pytest.raises(
+        ResultError, match=r"solution 3 is said to have \d+ triangles .* the front is one of another model"
+    ):
+        simplification_page(other, front.surface, stored.kept, measure="error", folder=free_folder, knee=2)
+
+
+def test_a_free_mesh_is_shown_named_and_taken_home(browser, free_folder, front, tmp_path):
+    free = Front.load(free_folder)[3]
+    visit = Visit(browser, free_folder / "report.html", viewport={"width": 1280, "height": 1000})
+    try:
+        assert shown(visit.page) == 3
+        assert number(visit.page, "free") == 1
+        assert "chosen for the error" in visit.page.inner_text("#numbers")
+        assert visit.page.inner_text("#simplified-title").endswith(", free")
+        assert f"{free.triangles:,} triangles, free, mean" in visit.page.locator("#slider").get_attribute(
+            "aria-valuetext"
+        )
+        with visit.page.expect_download() as download:
+            visit.page.click("#downloads button[value=ply]")
+        download.value.save_as(tmp_path / "free.ply")
+        vertices, faces = parsed(tmp_path / "free.ply")
+        used = np.unique(free.faces)
+        assert vertices.tolist() == front.model.file_points[used].tolist()
+        assert sorted(used[faces].tolist()) == free.faces.tolist()
+        visit.page.locator("#slider").fill("4")
+        assert shown(visit.page) == 4
+        assert number(visit.page, "free") == 0
+        assert "by the Delaunay rule" in visit.page.inner_text("#numbers")
+        visit.check()
+    finally:
+        visit.close()
 
 
 def test_the_same_front_gives_the_same_bytes(folder, front):

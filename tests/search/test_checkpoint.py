@@ -20,6 +20,7 @@ from pymoo.algorithms.moo.nsga3 import HyperplaneNormalization
 from pymoo.core.individual import Individual
 from pymoo.core.population import Population
 from pymoo.util.archive import MultiObjectiveArchive
+from samples import freed
 
 from meshsimp_pymoo import MeshProblem, Moves, nsga2_v1, nsga3
 from meshsimp_pymoo.search import checkpoint as module
@@ -34,6 +35,7 @@ from meshsimp_pymoo.search.checkpoint import (
 from meshsimp_pymoo.search.operators import OAX
 from meshsimp_pymoo.search.operators.oax import first_objective
 from meshsimp_pymoo.search.presets import PRESETS
+from meshsimp_pymoo.surface.surface import FreeMesh
 
 WHAT = {"model": "roof"}
 ALGORITHMS = {name: preset.function for name, preset in PRESETS.items()} | {"nsga3": nsga3}
@@ -274,6 +276,7 @@ UNKNOWN = {
     "a new generator": lambda algorithm: setattr(algorithm, "extra", np.random.default_rng(1)),
     "a new part of a local class": lambda algorithm: setattr(algorithm, "extra", local_class()()),
     "an archive": lambda algorithm: setattr(algorithm, "archive", MultiObjectiveArchive()),
+    "a function in people": lambda algorithm: algorithm.pop[0].data.update(score=first_objective),
     "people in people": lambda algorithm: algorithm.pop[0].data.update(parent=Individual(X=np.ones(90, bool))),
 }
 
@@ -305,6 +308,54 @@ def test_parts_made_during_the_run_are_made_again_and_shared_generators_stay_sha
     assert second.survival.again is second.survival.norm
     assert second.survival.random_state is second.random_state
     assert state(second) == state(first)
+
+
+def test_free_meshes_of_individuals_come_back_and_shared_ones_stay_shared(problems, tmp_path):
+    problem = problems["usual"]
+    whole, first, second, third = (set_up("nsga2_v1", problem) for _ in range(4))
+    finish(whole)
+    keeper = Checkpoints(tmp_path / "c.npz", first, WHAT)
+    steps(first, 4)
+    meshes = [freed(problem.surface, one.X, better=False) for one in first.opt[:3]]
+    for one, mesh in zip(first.opt, [*meshes, meshes[0], None], strict=False):
+        one.set("free", mesh)
+    first.held = {"best": meshes[1]}  # what an algorithm holds beside
+    keeper.save()
+    restore(read_checkpoint(tmp_path / "c.npz"), second)
+    assert state(second) == state(first)
+    found = second.opt.get("free")
+    assert len({id(mesh) for mesh in found[:3]}) == 3
+    assert found[3] is found[0]
+    assert second.held["best"] is found[1]
+    assert all(one is None for one in found[4:])
+    for mesh, other in zip(meshes, found, strict=False):
+        assert type(other) is FreeMesh
+        np.testing.assert_array_equal(other.kept, mesh.kept)
+        np.testing.assert_array_equal(other.faces, mesh.faces)
+        assert (other.kept.dtype, other.faces.dtype, other.quality) == (bool, np.int32, mesh.quality)
+    restore(saved(second, tmp_path / "d.npz"), third)  # again and again
+    assert [mesh is None or mesh.quality for mesh in third.opt.get("free")] == [
+        mesh is None or mesh.quality for mesh in found
+    ]
+    finish(third)
+    assert state(third) == state(whole)  # they change nothing of the search itself
+
+
+def test_a_free_mesh_that_is_none_is_refused(problems, tmp_path):
+    first = set_up("nsga2_v1", problems["usual"])
+    first.next()
+    first.opt[0].set("free", freed(problems["usual"].surface, first.opt[0].X))
+    stored = saved(first, tmp_path / "c.npz")
+    for old, new in (
+        (f"{FreeMesh.__module__}.FreeMesh", "meshsimp_pymoo.nowhere.Other"),
+        (f"{FreeMesh.__module__}.FreeMesh", "subprocess.Popen"),
+        ('["bits"', '["no bits"'),
+    ):
+        text = json.dumps(stored.content)
+        assert old in text
+        changed = SimpleNamespace(path=stored.path, content=json.loads(text.replace(old, new)), arrays=stored.arrays)
+        with pytest.raises(CheckpointError, match="does not fit this search"):
+            restore(changed, set_up("nsga2_v1", problems["usual"]))
 
 
 def test_an_algorithm_in_the_middle_of_a_python_generator_is_refused(problems, tmp_path):

@@ -23,7 +23,7 @@ from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.measures import OBJECTIVES, REGIONS, as_quality
 from meshsimp_pymoo.surface.moves import answers
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View, checked_faces
 from meshsimp_pymoo.workers import thread_pool
 
 
@@ -166,10 +166,16 @@ class Circle:
         row = [d.sum(), len(faces), len(np.unique(faces)), (d * d).sum(), d.max(), (~covered).sum()]
         return Scored(as_quality(np.array(row, float), self.total_weight), d, covered)
 
-    def refit(self, kept: BoolArray, *, until: float | None = None) -> Refitted:
-        """Return the fan as it is: nothing moves here."""
-        mesh = self.simplify(kept)
-        rows = np.flatnonzero(kept)
+    def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
+        """Measure triangles of the points, of which a fan is only one way."""
+        faces = checked_faces(faces, self.n_vertices)
+        found = self.score(self.points, faces)
+        at = slice(None) if rows is None else rows
+        return Simplified(faces, found.quality, found.deviation[at], found.covered[at])
+
+    def refit(self, mesh: Simplified, *, until: float | None = None) -> Refitted:
+        """Return the mesh as it is: nothing moves here."""
+        rows = np.unique(mesh.faces)
         error = mesh.quality.error
         return Refitted(mesh.faces, rows, self.points[rows], error, error, 0.0)
 

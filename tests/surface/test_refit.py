@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import importlib.util
+import time
 
 import numpy as np
 import pytest
 import trimesh
-from samples import holey_grid, subset, surface
+from samples import freed, holey_grid, subset, surface
 from scipy import sparse
 from scipy.optimize import linprog
 
@@ -34,9 +35,9 @@ def model(request):
     return build_model(MODELS[request.param](), up="z")
 
 
-def by_linear_programme(model, kept, weights=None):
+def by_linear_programme(model, kept, weights=None, faces=None):
     """Least error over all heights, where every vertex is covered or costs nothing: min w.(u + v), A h - u + v = z."""
-    faces = surface(model, outside="ignore").simplify(kept).faces
+    faces = surface(model, outside="ignore").simplify(kept).faces if faces is None else faces
     rows, compact = np.unique(faces, return_inverse=True)
     ground = surface(model, outside="ignore").ground()
     samples = mesh_samples(ground, model.points[rows], compact.reshape(-1, 3))
@@ -67,6 +68,22 @@ def test_the_error_is_the_optimum_of_the_linear_programme(model, share):
     assert quick.error * (1 - TOLERANCE) <= quick.bound * (1 + 1e-9) <= least * (1 + 2e-9)
     fine = refit_heights(surface(model, outside="ignore"), kept, tolerance=1e-7)
     assert fine.error == pytest.approx(least, rel=1e-6)
+
+
+def test_the_heights_of_a_free_mesh_are_the_optimum_too_and_never_make_it_worse(model):
+    kept = subset(model, 0.2)
+    for outside in OUTSIDES:
+        own = surface(model, outside=outside)
+        free = freed(own, kept)
+        fine = own.refit(own.of_faces(free.faces), tolerance=1e-7)
+        assert fine.bound <= fine.error < fine.before == free.quality.error
+        np.testing.assert_array_equal(fine.faces, free.faces)
+        again = own.score(fine.vertices, np.searchsorted(fine.rows, fine.faces)).quality
+        assert again.error == pytest.approx(fine.error, rel=1e-9)
+        if outside == "ignore":
+            assert fine.error == pytest.approx(by_linear_programme(model, kept, faces=free.faces), rel=1e-6)
+        begun = own.refit(own.of_faces(free.faces), until=time.perf_counter())  # no time at all
+        assert begun.error <= free.quality.error
 
 
 def test_weights_count_in_the_optimum_too(model):

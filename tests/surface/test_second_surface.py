@@ -100,6 +100,9 @@ def test_its_numbers_are_those_of_the_definition_and_of_any_mesh(share):
     scored = surface.score(surface.model.file_points, mesh.faces).quality
     assert scored.error == pytest.approx(mesh.quality.error)
     assert (scored.triangles, scored.vertices) == (mesh.quality.triangles, mesh.quality.vertices)
+    assert surface.of_faces(mesh.faces).quality == scored
+    other = np.roll(np.flatnonzero(kept), 1)  # a fan from another point covers the same
+    assert surface.of_faces(fan(other)).quality.error == pytest.approx(mesh.quality.error)
 
 
 # ------------------------------------------------------------------------------------------------------- moves

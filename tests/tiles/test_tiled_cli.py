@@ -140,6 +140,8 @@ def test_a_tiled_front_is_scored_against_drawn_and_reported_as_any_other(out, pa
     assert knee.plot_error().collections
     with pytest.raises(ModelError, match="not fitted"):
         knee.refit()
+    with pytest.raises(ModelError, match=r"meshes of tiles are Delaunay, not free; simplify it in one piece"):
+        front.surface.of_faces(knee.faces)
     assert front.problem.evaluate(front.kept[3]).tolist() == [front[3].error, front[3].triangles]
 
 

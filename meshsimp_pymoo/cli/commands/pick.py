@@ -100,9 +100,10 @@ def _pick(
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
-        tell(json.dumps({"mesh": mesh, "solution": number, **asdict(solution.quality)}, indent=2))
+        said = {"mesh": mesh, "solution": number, "free": solution.free, **asdict(solution.quality)}
+        tell(json.dumps(said, indent=2))
     elif not quiet:
         which = f"solution {solution.solution}" if stored else "between two solutions"
-        tell(f"{which} of {folder}: {described(solution.quality, front.unit)}")
+        tell(f"{which} of {folder}{', free' * solution.free}: {described(solution.quality, front.unit)}")
         tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK

@@ -14,7 +14,7 @@ function spell(value) {
 }
 
 function describe(row) {
-  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles, mean error ${readable(columns.mean_error[row])}${data.unit}`;
+  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles${columns.free[row] ? ", free" : ""}, mean error ${readable(columns.mean_error[row])}${data.unit}`;
 }
 
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
@@ -75,7 +75,7 @@ async function pick(row) {
   part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
   const solution = data.solutions[row];
   part("simplified-title").textContent =
-    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}`;
+    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
   const [faces, levels] = solution ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation)]) : [null, null];
@@ -105,6 +105,7 @@ function numbers(row) {
     ...[...data.measures.filter(isSize), ...data.measures.filter((measure) => !isSize(measure))].map(
       ({ name, meaning }) => [name, columns[name][row], notes[name]?.(columns[name][row]) ?? meaning]),
     ...refitted(row),
+    ...(columns.free.some(Boolean) ? [["free", columns.free[row], `edges ${columns.free[row] ? "chosen for the error" : "by the Delaunay rule"}`]] : []),
     ["solution", columns.solution[row], data.meshes[row] ? `stored as ${data.meshes[row]}` : "not stored as a mesh"],
   ];
   const body = part("numbers");
