@@ -113,7 +113,7 @@ class FrontSolution(_Numbers):
 
     @cached_property
     def kept(self) -> BoolArray:
-        """The vertices that stay (N,), in vector order."""
+        """The vertices that stay (N,), in vector order; of a free mesh those of its triangles, and the pinned ones."""
         kept: BoolArray = self.front.kept[self.solution]
         return kept
 
@@ -314,7 +314,8 @@ class Front(Sequence[FrontSolution]):
             if isinstance(self._kept, Nested):
                 raise ValueError("solutions by rows of the file, as of tiles, are Delaunay meshes; give no faces")
             try:
-                found[row] = free_faces(own, self._kept[row], self.quality[row])
+                said = self.quality[row]
+                found[row] = free_faces(own, self._kept[row], triangles=said.triangles, vertices=said.vertices)
             except ValueError as problem:
                 raise ValueError(f"solution {row}: {problem}") from None
         return tuple(found)
@@ -379,6 +380,11 @@ class Front(Sequence[FrontSolution]):
             If there is no mesh that meets the constraints.
         """
         rows, free = population.get("X", "free", to_numpy=False)
+        for number, mesh in enumerate(free):
+            if not isinstance(mesh, FreeMesh | None):
+                raise TypeError(
+                    f"individual {number} has a {type(mesh).__name__} as free; set a FreeMesh(kept, faces, quality)"
+                )
         return cls._of(problem, np.array(rows), free, ends=ends, wish=wish)
 
     @classmethod

@@ -69,7 +69,7 @@ from meshsimp_pymoo.formats.table import (
     write_mesh,
 )
 from meshsimp_pymoo.plane.faces import is_canonical
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives, quality_of
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, require_rules
 
@@ -298,6 +298,8 @@ def write_front(
     own = tuple(free) or (None,) * len(order)
     if len(own) != len(order):
         raise ValueError(f"free has {len(own)} entries for {len(order)} solutions; give None for Delaunay meshes")
+    if isinstance(kept, Nested) and any(faces_of is not None for faces_of in own):
+        raise ValueError("solutions by rows of the file, as of tiles, are Delaunay meshes; give none that is free")
     with_mesh = set(even_selection(len(order), meshes))
     if (with_mesh or chosen is not None) and faces is None:
         raise ValueError("meshes are asked for but no faces are given; pass faces= or meshes=0")
@@ -447,9 +449,9 @@ def _own_faces(
             yield None
             continue
         assert not isinstance(kept, Nested)
-        numbers = quality_of((name, quality[name][solution]) for name in MEASURES)
+        said = {name: int(quality[name][solution]) for name in ("triangles", "vertices")}
         try:
-            found = free_faces(faces, kept[solution], numbers)
+            found = free_faces(faces, kept[solution], **said)
             if not is_canonical(faces):
                 raise ValueError("its faces are not sorted, the smallest row first")
         except ValueError as problem:

@@ -203,6 +203,9 @@ def test_a_free_mesh_that_is_no_better_than_its_subset_is_left(result):
     one[0].set("free", mesh)
     assert Front.from_population(problem, one).F.tolist() == [[mesh.quality.error, own.triangles]]
     assert Front.from_subsets(problem, one.get("X")).quality == (own.quality,)  # Delaunay
+    one[0].set("free", mesh.faces)
+    with pytest.raises(TypeError, match=r"individual 0 has a ndarray as free; set a FreeMesh\(kept, faces, quality\)"):
+        Front.from_population(problem, one)
     one[0].set("free", None)
     alone = SimpleNamespace(X=one[0].X, problem=problem)  # who has no more than that
     assert Front.from_result(alone, ends=False).quality == (own.quality,)

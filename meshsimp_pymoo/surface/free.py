@@ -14,7 +14,7 @@ outside it is not emitted and of any shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import NamedTuple
@@ -667,12 +667,23 @@ class FreeGround:
         Of these.
     pinned : (N,) bool array
         Vertices that stay.
+    sites : callable
+        Returns the rows of kept vertices (N,), one for each place: one of those that stay where there is one.
     centroids : bool
         Whether the centroids of the original faces are samples too: as many vertices more, each with the weight of its
         face's corners and the share of its area.
     """
 
-    def __init__(self, model: OpenModel, rules: Rules, ground: Ground, pinned: BoolArray, *, centroids: bool) -> None:
+    def __init__(
+        self,
+        model: OpenModel,
+        rules: Rules,
+        ground: Ground,
+        pinned: BoolArray,
+        sites: Callable[[BoolArray, BoolArray], IntArray],
+        *,
+        centroids: bool,
+    ) -> None:
         n = model.n_vertices
         weights = np.ones(n) if model.weights is None else model.weights
         if centroids:
@@ -693,6 +704,7 @@ class FreeGround:
         both = on_border[start] & on_border[indices]
         self.name = model.name
         self.pinned = pinned
+        self._sites = sites
         self._freedom = Freedom(
             ground=ground._replace(
                 xy=xy.ravel(), exact_area=exact_ranges(xy)[0], weight=weights, weighed=True, by_peak=False
@@ -718,7 +730,7 @@ class FreeGround:
         """Lend the mesh of a subset (N,), to be changed freely until the context ends; see `FreeTriangulation`."""
         with self._rooms.one() as (live, fan, other, onto):
             freedom = self._freedom._replace(ratio=float(min_height), onto=onto, fan=fan, other=other)
-            build(freedom.ground, live, np.flatnonzero(kept), self.name)
+            build(freedom.ground, live, self._sites(kept, self.pinned), self.name)
             _open(freedom.ground, live, len(freedom.ground.z))
             yield FreeTriangulation(freedom, live, self.pinned)
 

@@ -153,7 +153,9 @@ class HeightSurface:
     def free_ground(self, *, centroids: bool = True) -> FreeGround:
         """Return what the free meshes of this surface have in common; see :mod:`~meshsimp_pymoo.surface.free`."""
         if centroids not in self._free:
-            self._free[centroids] = FreeGround(self.model, self.rules, self._ground, self.pinned, centroids=centroids)
+            self._free[centroids] = FreeGround(
+                self.model, self.rules, self._ground, self.pinned, self.sites, centroids=centroids
+            )
         return self._free[centroids]
 
     @contextmanager

@@ -351,20 +351,20 @@ def checked_faces(faces: Any, n_vertices: int) -> IntArray:
     return np.ascontiguousarray(found, np.int32)
 
 
-def free_faces(faces: Any, kept: BoolArray, quality: Quality) -> IntArray:
+def free_faces(faces: Any, kept: BoolArray, *, triangles: int, vertices: int) -> IntArray:
     """Return the triangles (M, 3) of a free mesh as :func:`checked_faces` does, if they fit what is said of it.
 
     Raises
     ------
     ValueError
-        If they are no triangles, not as many as the quality says, or use other vertices or another number of them.
+        If they are no triangles, not so many, or use not so many vertices or other ones than are kept.
     """
     found = checked_faces(faces, len(kept))
     used, _ = used_rows(found)
-    if len(found) != quality.triangles or len(used) != quality.vertices:
+    if len(found) != triangles or len(used) != vertices:
         raise ValueError(
-            f"its faces are {len(found)} triangles of {len(used)} vertices, and it is said to have "
-            f"{quality.triangles} of {quality.vertices}"
+            f"its faces are {len(found)} triangles of {len(used)} vertices, and it is said to have {triangles} of "
+            f"{vertices}"
         )
     if not kept[used].all():
         raise ValueError(f"its faces use vertex {used[~kept[used]][0]}, which it does not keep")
