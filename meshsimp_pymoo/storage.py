@@ -29,6 +29,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 import os
 import platform
 import time
@@ -65,15 +66,17 @@ from meshsimp_pymoo.formats.table import (
     warn_of_shift,
     write_mesh,
 )
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.surface import Refitted, Surface, mesh_arrays, require_rules
 
-FRONT_COLUMNS = ("solution", *MEASURES, "mesh")
+# What only a mesh says is empty where nobody has measured it.
+FRONT_COLUMNS = ("solution", *(name for name in MEASURES if name not in OF_MESH), "mesh", *OF_MESH)
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", *COUNTED)
+MAY_BE_EMPTY = (*OF_MESH, "refitted_error")
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 # What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
 SECONDS_A_CORNER = 5e-7
@@ -333,8 +336,9 @@ def write_front(
         rows = []
         for solution, row in enumerate(order):
             path, fitted = files.get(solution, ("", ["", ""]))
-            numbers = [spelled_value(column, getattr(quality[row], column)) for column in FRONT_COLUMNS[1:-1]]
-            rows.append([str(solution), *numbers, path] + (fitted if refit is not None else []))
+            said = {"solution": str(solution), "mesh": path}
+            said |= {name: spelled_value(name, getattr(quality[row], name)) for name in MEASURES}
+            rows.append([said[column] for column in FRONT_COLUMNS] + (fitted if refit is not None else []))
         warn_of_shift(kind, model.name, surface.diagonal, single)
         if with_mesh or chosen is not None:
             warn_of_left_behind(kind, model.name, model.attributes)
@@ -534,8 +538,13 @@ def even_selection(count: int, most: int | None) -> list[int]:
 
 
 def spelled_value(column: str, value: float) -> str:
-    """Return a number as it stands in a front's CSV file: whole numbers bare, others so that they read back equal."""
-    return str(int(value)) if column in INT_COLUMNS else repr(float(value))
+    """Return a number as it stands in a front's CSV file: whole numbers bare, others so that they read back equal.
+
+    One that is not known, a NaN, is empty.
+    """
+    if column in INT_COLUMNS:
+        return str(int(value))
+    return "" if math.isnan(value) else repr(float(value))
 
 
 def _csv_rows(path: Path, *headers: tuple[str, ...]) -> tuple[tuple[str, ...], list[list[str]]]:
@@ -591,7 +600,7 @@ def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, 
         kind = int if column in INT_COLUMNS else float
         values = []
         for line, row in enumerate(rows[1:], start=2):
-            if column == "refitted_error" and not row[at]:
+            if not row[at] and column in MAY_BE_EMPTY:
                 values.append(float("nan"))
                 continue
             try:

@@ -8,17 +8,20 @@ if it shall be thinned and annealed too, answers to the questions of `surface.mo
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, spread
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.plane.faces import used_rows
-from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality
+from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_MESH, Quality
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.workers import on_threads
 
 # A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
 # metres.
@@ -296,6 +299,30 @@ class Surface(Protocol):
         Of several kept vertices at one place, a fixed one is the site, else the first.
         """
         ...
+
+
+def measured_meshes(
+    surface: Surface,
+    kept: BoolArray,
+    quality: Sequence[Quality],
+    *,
+    n_threads: int | None = None,
+    until: float | None = None,
+) -> list[Quality]:
+    """Return these qualities of subsets (S, N), as evaluation knows them, with what only their meshes say.
+
+    Ctrl-C is heard between two meshes. Those not begun by ``perf_counter() = until`` stay as they are; the others are
+    spread over all. A subset without a triangle is no mesh.
+    """
+    found = list(quality)
+
+    def measure(row: int) -> None:
+        if found[row].triangles and (until is None or time.perf_counter() < until):
+            whole = surface.simplify(kept[row]).quality
+            found[row] = replace(found[row], **{name: getattr(whole, name) for name in OF_MESH})
+
+    on_threads(measure, spread(len(found)), n_threads=n_threads)
+    return found
 
 
 def mesh_arrays(model: Original, faces: IntArray) -> tuple[FloatArray, IntArray, dict[str, AnyArray]]:
