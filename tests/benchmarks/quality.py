@@ -10,9 +10,9 @@ Tools that are not part of the package are compared where they are installed: ``
 * A tool that makes one mesh gets the parameter that gives its largest mesh of at most so many triangles (its smallest
   one, where all are larger); its error is compared with thinning's at the number of triangles it really has. Meshes
   that are too large are left out of the means.
-* Every mesh is scored by the package's own error: nearest point outside, footprint of the model. Beside the error at the
-  vertices stand the surface error, which is measured between them and set beside thinning's likewise, and the least
-  angles: of both it is seen who fits the vertices, and who pays with thin triangles.
+* Every mesh is scored by the package's own error: nearest point outside, footprint of the model. Beside the error at
+  the vertices stand the surface error, which is measured between them and set beside thinning's likewise, and the
+  least angles: they show who fits the vertices, and who pays with thin triangles.
 * ``--refit`` adds to each front the same meshes with their best heights.
 * The search gets its time for the whole front, thinning and all else included; only compilation is done before.
 
