@@ -67,7 +67,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import FreeMesh, Refitted, Simplified, Surface, free_faces
+from meshsimp_pymoo.surface.surface import FreeMesh, Refitted, Simplified, Surface, free_faces, measured_meshes
 from meshsimp_pymoo.surface.units import length_unit
 from meshsimp_pymoo.surface.weld import pieces
 
@@ -85,6 +85,8 @@ START = "adaptive thinning (start)"
 START_POINTS = 200
 # Between two solutions of a nested front the smallest within a limit is looked for to this share of its triangles.
 HALVED = 0.01
+# What the best solution can be asked for by.
+LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
 
 if TYPE_CHECKING:
@@ -330,10 +332,12 @@ class Front(Sequence[FrontSolution]):
         *,
         ends: bool = False,
         wish: Mapping[str, float] | None = None,
+        until: float | None = None,
     ) -> Front:
         """Evaluate chromosomes and keep those that no other one beats, each once, and that meet the constraints.
 
-        All meshes are Delaunay; :meth:`from_population` knows the free ones that a search made.
+        All meshes are Delaunay; :meth:`from_population` knows the free ones that a search made. Those of the front are
+        measured whole: between the vertices too, and their angles.
 
         Parameters
         ----------
@@ -346,17 +350,25 @@ class Front(Sequence[FrontSolution]):
         wish : mapping of str to float, optional
             Limits, by measure. Where any solution holds all of them, those are left out that miss one which is neither
             of the triangles nor of what is minimised: they would beat it.
+        until : float, optional
+            Meshes that are not begun by ``perf_counter() = until`` are not measured; the numbers are NaN.
 
         Raises
         ------
         LookupError
             If none of them is a mesh that meets the constraints.
         """
-        return cls._of(problem, np.atleast_2d(np.asarray(kept)), [], ends=ends, wish=wish)
+        return cls._of(problem, np.atleast_2d(np.asarray(kept)), [], ends=ends, wish=wish, until=until)
 
     @classmethod
     def from_population(
-        cls, problem: MeshProblem, population: Any, *, ends: bool = False, wish: Mapping[str, float] | None = None
+        cls,
+        problem: MeshProblem,
+        population: Any,
+        *,
+        ends: bool = False,
+        wish: Mapping[str, float] | None = None,
+        until: float | None = None,
     ) -> Front:
         """Take over a population: its chromosomes, as :meth:`from_subsets` does, and the free meshes beside them.
 
@@ -371,7 +383,7 @@ class Front(Sequence[FrontSolution]):
             What its individuals are chromosomes of.
         population : pymoo Population
             Such as ``algorithm.opt``.
-        ends, wish
+        ends, wish, until
             As in :meth:`from_subsets`.
 
         Raises
@@ -385,7 +397,7 @@ class Front(Sequence[FrontSolution]):
                 raise TypeError(
                     f"individual {number} has a {type(mesh).__name__} as free; set a FreeMesh(kept, faces, quality)"
                 )
-        return cls._of(problem, np.array(rows), free, ends=ends, wish=wish)
+        return cls._of(problem, np.array(rows), free, ends=ends, wish=wish, until=until)
 
     @classmethod
     def _of(
@@ -396,6 +408,7 @@ class Front(Sequence[FrontSolution]):
         *,
         ends: bool,
         wish: Mapping[str, float] | None,
+        until: float | None,
     ) -> Front:
         """Return the front of chromosomes (P, N) and of the free mesh beside each, if there is one."""
         known = [np.ones((1, problem.n_var), dtype=bool), problem.pinned[None]] if ends else []
@@ -439,7 +452,9 @@ class Front(Sequence[FrontSolution]):
         for solution, row in zip(solutions, usable[chosen], strict=True):
             np.logical_or(subsets[row], problem.pinned, out=solution)
         faces = [meshes[row - n_subsets].faces if row >= n_subsets else None for row in usable[chosen]]
-        return cls([quality[row] for row in chosen], solutions, faces=faces, problem=problem)
+        found = [quality[row] for row in chosen]
+        whole = measured_meshes(problem.surface, solutions, found, faces=faces, n_threads=threads, until=until)
+        return cls(whole, solutions, faces=faces, problem=problem)
 
     @classmethod
     def from_result(cls, result: Any, *, ends: bool = True) -> Front:
@@ -650,8 +665,8 @@ class Front(Sequence[FrontSolution]):
             If no limit is given, or it is none of these.
         """
         limits = {name: value for name, value in limit.items() if value is not None}
-        if unknown := [name for name in limits if name not in MEASURES]:
-            raise TypeError(f"best() knows no limit {unknown[0]!r}; it takes {', '.join(MEASURES)}")
+        if unknown := [name for name in limits if name not in LIMITS]:
+            raise TypeError(f"best() knows no limit {unknown[0]!r}; it takes {', '.join(LIMITS)}")
         if not limits:
             raise TypeError("best() takes limits, such as triangles=500 or max_error=0.1; none is given")
         require_numbers(limits)
@@ -690,7 +705,7 @@ class Front(Sequence[FrontSolution]):
     def _nearest(self, limits: Mapping[str, float]) -> FrontSolution:
         """Return the solution that comes nearest to limits: small enough if any is, then with the least errors."""
         errors = {name: most for name, most in limits.items() if name != "triangles"}
-        missed = [float(shortfall(asdict(q), errors)) for q in self.quality]
+        missed = np.nan_to_num([float(shortfall(asdict(q), errors)) for q in self.quality], nan=np.inf)
         too_large = [q.triangles > limits.get("triangles", np.inf) for q in self.quality]
         return self[min(range(len(self)), key=lambda k: (too_large[k], missed[k], k))]
 
@@ -698,10 +713,13 @@ class Front(Sequence[FrontSolution]):
         """Say how near the solutions come to limits that none of them meets."""
         if len(limits) == 1:
             ((name, most),) = limits.items()
-            label, least = MEASURES[name].label, min(getattr(q, name) for q in self.quality)
-            if MEASURES[name].unit:
-                return f"the least {label} of a solution of {self.name} is {least:.6g}, and {most:g} was asked for"
-            return f"no solution of {self.name} has at most {most:g} {label}; the least is {least}"
+            label, values = MEASURES[name].label, [getattr(q, name) for q in self.quality]
+            known = [value for value in values if not np.isnan(value)]
+            if not known:
+                return f"the {label} of the solutions of {self.name} was not measured; ask for something else"
+            if MEASURES[name].is_error:
+                return f"the least {label} of a solution of {self.name} is {min(known):.6g}, and {most:g} was asked for"
+            return f"no solution of {self.name} has at most {most:g} {label}; the least is {min(known)}"
         errors = {name: most for name, most in limits.items() if name != "triangles"}
         reached = " and ".join(f"{MEASURES[name].label} {getattr(near, name):.6g}" for name in errors)
         said = f"no solution of {self.name} holds all of what is asked for: {reached} at {near.triangles:,} triangles"
@@ -928,14 +946,17 @@ class Front(Sequence[FrontSolution]):
         at = knee(self.F)
         rows = sorted({*even_selection(len(self), SHOWN_ROWS), at})
         picture = base64.b64encode(self._repr_png_()).decode()
-        # what a mesh consists of, its error, and what it can be chosen by
-        shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name == "error"]
-        names = sorted(shown, key=lambda name: bool(MEASURES[name].unit))
+        # what a mesh consists of, its error at the vertices and between them, and what it can be chosen by
+        also = ("error", "surface_error")
+        shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name in also]
+        shown = [name for name in shown if not all(np.isnan(getattr(q, name)) for q in self.quality)]
+        names = sorted(shown, key=lambda name: MEASURES[name].is_error)
         header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]
-            cells += [f"{getattr(self.quality[row], name):.6g}" for name in names]
+            values = [getattr(self.quality[row], name) for name in names]
+            cells += ["" if np.isnan(value) else f"{value:.6g}" for value in values]
             body.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
         left_out = "" if len(rows) == len(self) else f"<p>{len(self) - len(rows)} more solutions are not listed.</p>"
         return (
@@ -998,9 +1019,9 @@ class Front(Sequence[FrontSolution]):
 def _say_limits() -> None:
     """Let the signature and the documentation of ``best`` name every measure."""
     own = inspect.signature(Front.best)
-    limits = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in MEASURES]
+    limits = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None) for name in LIMITS]
     Front.best.__signature__ = own.replace(parameters=[own.parameters["self"], *limits])  # type: ignore[attr-defined]
-    others = ", ".join(name for name in MEASURES if name != "triangles")
+    others = ", ".join(name for name in LIMITS if name != "triangles")
     Front.best.__doc__ = (Front.best.__doc__ or "").replace("LIMITS", others)
 
 

@@ -32,6 +32,7 @@ from __future__ import annotations
 import csv
 import itertools
 import json
+import math
 import os
 import platform
 import time
@@ -69,16 +70,18 @@ from meshsimp_pymoo.formats.table import (
     write_mesh,
 )
 from meshsimp_pymoo.plane.faces import is_canonical
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, checked_objectives
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, require_rules
 
-# ``free``: 1 where the edges of a mesh are chosen for the error, 0 where it is Delaunay.
-FRONT_COLUMNS = ("solution", *MEASURES, "mesh", "free")
+# What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
+# error, 0 where it is Delaunay.
+FRONT_COLUMNS = ("solution", *(name for name in MEASURES if name not in OF_MESH), "mesh", *OF_MESH, "free")
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", *COUNTED, "free")
+MAY_BE_EMPTY = (*OF_MESH, "refitted_error")
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 # What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
 SECONDS_A_CORNER = 5e-7
@@ -585,8 +588,13 @@ def even_selection(count: int, most: int | None) -> list[int]:
 
 
 def spelled_value(column: str, value: float) -> str:
-    """Return a number as it stands in a front's CSV file: whole numbers bare, others so that they read back equal."""
-    return str(int(value)) if column in INT_COLUMNS else repr(float(value))
+    """Return a number as it stands in a front's CSV file: whole numbers bare, others so that they read back equal.
+
+    One that is not known, a NaN, is empty.
+    """
+    if column in INT_COLUMNS:
+        return str(int(value))
+    return "" if math.isnan(value) else repr(float(value))
 
 
 def _csv_rows(path: Path, *headers: tuple[str, ...]) -> tuple[tuple[str, ...], list[list[str]]]:
@@ -642,7 +650,7 @@ def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, 
         kind = int if column in INT_COLUMNS else float
         values = []
         for line, row in enumerate(rows[1:], start=2):
-            if column == "refitted_error" and not row[at]:
+            if not row[at] and column in MAY_BE_EMPTY:
                 values.append(float("nan"))
                 continue
             try:

@@ -65,6 +65,7 @@ def _square() -> Any:
 def _evaluation() -> None:
     surface = _square()
     surface.evaluate(surface.pinned[None])
+    surface.simplify(surface.pinned)
 
 
 def _compile_for(function: Any, *arguments: Any) -> None:
@@ -180,7 +181,9 @@ PARTS = (
         ),
         _reading, 2.0, False,
     ),
-    Part("evaluation", ("surface.evaluate:_evaluate",), _evaluation, 5.2, False),
+    Part(
+        "evaluation", ("surface.evaluate:_evaluate", "surface.evaluate:measure_between"), _evaluation, 6.2, False
+    ),
     Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 6.6, False),
     Part("thinning", ("search.greedy:thin",), _thinning, 16.6, True),
     Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True),
@@ -190,7 +193,7 @@ PARTS = (
         "tiles",
         (
             "plane.triangulation:triangulate_once", "tiles.thin:_hull_levels", "tiles.thin:_fix_foreign",
-            "surface.weld:_measure_rows",
+            "surface.weld:_measure_rows", "surface.weld:_measure_cells",
         ),
         _tiles, 2.5, False,
     ),

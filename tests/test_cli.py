@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from importlib import metadata
 from itertools import cycle
 from pathlib import Path
@@ -38,7 +39,7 @@ from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
-from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES, Measure, Quality
+from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES, OF_MESH, Measure, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
 PAPERS = ("--algorithm", "nsga2_v1")
@@ -548,6 +549,28 @@ def test_an_interrupted_run_writes_the_front_so_far(tmp_path, monkeypatch, capsy
     assert "interrupted after 2 generations" in capsys.readouterr().err
     assert (tmp_path / "out" / "front.csv").read_bytes() == (tmp_path / "whole" / "front.csv").read_bytes()
     assert read_front(tmp_path / "out").run["interrupted"] is True
+
+
+def test_who_interrupts_does_not_wait_for_what_only_meshes_say(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "out"
+    monkeypatch.setattr("meshsimp_pymoo.cli.searching.WHOLE_SHARE", -1e9)
+    interrupt_after(monkeypatch, 2)
+    assert run("simplify", "roof:9", "-o", out, "--generations", 50, "--population", 12, *PAPERS, "--json") == 130
+    said = capsys.readouterr()
+    front = Front.load(out)
+    assert f"surface error and angles of {len(front)} of {len(front)} solutions are left out" in said.err
+    assert json.loads(said.out)["smallest"]["surface_error"] is None
+    with (out / "front.csv").open(newline="") as file:
+        assert all(row[name] == "" for row in csv.DictReader(file) for name in OF_MESH)
+    assert (out / "report.html").is_file()
+    assert run("pick", out, "--knee", "--json", "-o", tmp_path / "knee.ply") == 0
+    picked = json.loads(capsys.readouterr().out)
+    assert [picked[name] for name in OF_MESH] == [None] * 3
+    assert run("pick", out, "--knee") == 0
+    assert "surface" not in capsys.readouterr().out
+    assert run("score", "roof:9", tmp_path / "knee.ply", "--json") == 0
+    scored = json.loads(capsys.readouterr().out)
+    assert scored["surface_error"] == pytest.approx(front.knee().simplified.quality.surface_error, rel=1e-9)
 
 
 def test_a_run_interrupted_before_its_first_generation_writes_nothing(tmp_path, monkeypatch, capsys):
@@ -1079,8 +1102,13 @@ def test_a_mesh_is_described_by_every_measure_that_means_something(monkeypatch):
     said = "12,345 triangles, error 1234.57, mean 0.1235, RMS 0.2346, max 3.457, uncovered 1500"
     assert described(quality) == said
     new = Measure(lambda table, weight: 0.0, label="median error", meaning="half deviate by less", unit="model units")
-    monkeypatch.setitem(MEASURES, "median_error", new)
-    assert described(SimpleNamespace(**vars(quality), median_error=0.5)) == f"{said}, median 0.5"
+    with monkeypatch.context() as patch:
+        patch.setitem(MEASURES, "median_error", new)
+        assert described(SimpleNamespace(**vars(quality), median_error=0.5)) == f"{said}, median 0.5"
+    whole = replace(quality, surface_error=0.123456, min_angle_median=31.4159, below_5_degrees=0.0123456)
+    said = said.replace("1234.57", "1234.57 m").replace("0.1235", "0.1235 m").replace("0.2346", "0.2346 m")
+    said = said.replace("3.457", "3.457 m")
+    assert described(whole, "m") == f"{said}, surface 0.1235 m, least angle 31.42 degrees, thin triangles 0.01235"
 
 
 def test_info_without_a_model_lists_the_built_in_ones(capsys):

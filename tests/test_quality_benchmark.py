@@ -29,21 +29,30 @@ def quality():
 
 def test_it_scores_every_method_at_the_sizes_of_thinning(quality, tmp_path, capsys):
     rows_file, tables = tmp_path / "quality.csv", tmp_path / "quality.md"
-    options = ["--models", "peaks:9", "--shares", "20", "50", "--budgets", "0.2", "0.4"]
+    options = ["--models", "peaks:9", "--shares", "20", "50", "--budgets", "0.2", "0.4", "--refit"]
     assert quality.main([*options, "-o", str(rows_file), "-o", str(tables)]) == 0
     with rows_file.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    front = thinning(MeshProblem("peaks:9").surface)
+    problem = MeshProblem("peaks:9")
+    front = thinning(problem.surface)
     for row in rows:
         wanted = front.triangles[round(float(row["share"]) / 100 * 81) - len(front.base)]
         assert int(row["wanted"]) == wanted
         size = wanted if row["is_front"] == "True" else int(row["triangles"])
         least = front.error[front.triangles <= size].min()
         assert float(row["ratio"]) == pytest.approx(float(row["error"]) / least)
+        fitting = np.flatnonzero(front.triangles <= size)
+        best = problem.quality(front.kept(fitting[np.lexsort((front.triangles[fitting], front.error[fitting]))[0]]))
+        assert float(row["surface_ratio"]) == pytest.approx(float(row["surface_error"]) / best.surface_error)
+        if row["method"] == "thinning":
+            angles = (float(row["min_angle_median"]), float(row["below_5_degrees"]))
+            assert angles == (best.min_angle_median, best.below_5_degrees)
         if row["method"] in ("thinning", "memetic 0.2 s", "memetic 0.4 s", "worst point", "NSGA-II v1"):
             assert int(row["triangles"]) <= wanted
     ratios = {(row["method"], row["share"]): float(row["ratio"]) for row in rows}
     assert ratios["thinning", "20.0"] == pytest.approx(1.0)
+    for share in ("20.0", "50.0"):
+        assert ratios["memetic 0.4 s, refitted", share] <= ratios["memetic 0.4 s", share]
     assert ratios["worst point", "20.0"] >= ratios["memetic 0.4 s", "20.0"]
     printed = capsys.readouterr().out
     named = {row["method"] for row in rows}
@@ -51,6 +60,8 @@ def test_it_scores_every_method_at_the_sizes_of_thinning(quality, tmp_path, caps
         assert method in named or f"no {method}: " in printed
     text = tables.read_text()
     assert "| thinning, its error |" in text
+    assert "| thinning, its surface error |" in text
+    assert "Geometric means of surface error / thinning's" in text
     assert "Search / rival" in text
 
 
@@ -90,7 +101,7 @@ def test_the_enumerated_models_are_reported(quality, capsys):
 
 
 def test_a_front_gives_the_least_error_among_meshes_that_are_small_enough(quality):
-    curve = quality.Curve(np.array([5.0, 1.0, 3.0, 3.0]), np.array([2, 9, 6, 4]), lambda k: k, 0.0)
+    curve = quality.Curve(None, np.array([5.0, 1.0, 3.0, 3.0]), np.array([2, 9, 6, 4]), lambda k: k, 0.0)
     assert [curve.best(size) for size in (1, 2, 5, 8, 9)] == [None, 0, 3, 3, 1]
     assert curve.value(1) == np.inf
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from meshsimp_pymoo.cli.terminal import (
     Stages,
     answering,
     described,
+    in_numbers,
     in_unit,
     is_interrupted,
     place_for_matplotlib,
@@ -96,6 +97,12 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
             f"{left_out} of {len(asked)} meshes are left out, so that you need not wait; make one by meshsimp pick "
             f"{as_argument(folder)} --triangles N -o FILE, with a number of front.csv"
         )
+    unmeasured = sum(math.isnan(quality.surface_error) for quality in front.quality)
+    if unmeasured:
+        say(
+            f"surface error and angles of {unmeasured} of {len(front)} solutions are left out, so that you need not "
+            "wait; meshsimp score says those of a mesh"
+        )
     if undrawn:
         say(f"interrupted while it was drawn; {folder} holds the results: meshsimp report {as_argument(folder)}")
     elif slow:
@@ -141,15 +148,15 @@ def _summary(front: Front, output: Output) -> dict[str, Any]:
         },
         "front": str(output.folder / "front.csv"),
         "solutions": len(front),
-        "smallest": asdict(front.quality[0]),
-        "most_accurate": asdict(front.quality[-1]),
+        "smallest": in_numbers(front.quality[0]),
+        "most_accurate": in_numbers(front.quality[-1]),
         "chosen": None
         if chosen is None
         else {
             "mesh": str(_chosen_path(output)),
             "solution": chosen,
             "free": front[chosen].free,
-            **asdict(front.quality[chosen]),
+            **in_numbers(front.quality[chosen]),
         },
     } | {name: front.run[name] for name in SAID if name in front.run}
 

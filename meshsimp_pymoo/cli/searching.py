@@ -70,6 +70,8 @@ from meshsimp_pymoo.warming import SEARCH, WISH
 REFIT_SHARE = 0.3
 # Of that time, the share for measuring what a search was to start from.
 MEASURED_SHARE = 0.4
+# Of that time, the share for measuring the meshes of the front whole, which evaluation has not.
+WHOLE_SHARE = 0.3
 # What measuring takes for each triangle of a mesh, beside what it takes for each vertex of the model [s].
 SECONDS_A_TRIANGLE = 5e-7
 # What writing takes about: for any model, and times the root of its vertices [s].
@@ -263,8 +265,13 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
     seconds = before + time.perf_counter() - start
     try:
         # Both ends of what is possible are known without a search: all vertices, and the pinned ones alone.
-        wish = keeper.request.wish.limits if keeper.request.is_targeted else None
-        front = Front.from_population(problem, found, ends=True, wish=wish)
+        front = Front.from_population(
+            problem,
+            found,
+            ends=True,
+            wish=keeper.request.wish.limits if keeper.request.is_targeted else None,
+            until=None if until is None else until - (1.0 - WHOLE_SHARE) * WAIT_SECONDS,
+        )
     except LookupError:
         raise UsageError(
             f"{problem.model.name}: none of {algorithm.evaluator.n_eval} subsets of its vertices spans a triangle "

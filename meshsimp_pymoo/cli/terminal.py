@@ -16,7 +16,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ResultError, printable, reason_of
@@ -431,11 +431,17 @@ def described(quality: Quality, unit: str = LENGTH) -> str:
     """Return the size of a mesh, and each of its numbers that has a meaning of its own, in words."""
     said = [f"{quality.triangles:,} triangles"]
     for name, measure in MEASURES.items():
-        if measure.meaning:
-            value = getattr(quality, name)
-            number = f"{value:.{6 if name == 'error' else 4}g}{in_unit(unit)}" if measure.unit else f"{value}"
-            said.append(f"{measure.label.removesuffix(' error')} {number}")
+        value = getattr(quality, name)
+        if measure.meaning and not math.isnan(value):
+            number = f"{value:.{6 if name == 'error' else 4}g}" if isinstance(value, float) else f"{value}"
+            behind = in_unit(unit) if measure.is_error else f" {measure.unit}" * bool(measure.unit)
+            said.append(f"{measure.label.removesuffix(' error')} {number}{behind}")
     return ", ".join(said)
+
+
+def in_numbers(quality: Quality) -> dict[str, float | None]:
+    """Return the numbers of a mesh by name, as JSON holds them: what is not known is null."""
+    return {name: None if math.isnan(value) else value for name, value in asdict(quality).items()}
 
 
 def in_unit(unit: str) -> str:

@@ -87,6 +87,7 @@ from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import machine, now, package_versions
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured
+from meshsimp_pymoo.surface.surface import measured_meshes
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
 
 __all__ = ["Done", "Task", "perform", "plan", "run_experiment"]
@@ -489,7 +490,7 @@ def _subset_arrays(problem: MeshProblem, kept: BoolArray) -> dict[str, npt.NDArr
     measure, total = surface.rules.measure, surface.total_weight
     table = problem.evaluate_subsets(kept) if len(kept) else np.zeros((0, 6))
     F = np.column_stack([measured(table, measure, total), table[:, TRIANGLES]])
-    quality = [problem.as_quality(row) for row in table]
+    quality = measured_meshes(surface, kept, [problem.as_quality(row) for row in table], n_threads=1)
     nearest = F[:, 0]
     if surface.rules.outside != "nearest" and len(kept):
         charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))

@@ -41,7 +41,7 @@ Arrays = Mapping[str, npt.NDArray[Any]]
 
 EXPERIMENT_FILE = "experiment.json"
 # Of the records; another number wherever what they hold is spelled otherwise. 4: how each run converged.
-FORMAT = 4
+FORMAT = 5
 WAY_OUT = "mend that, and the same command does what is missing"
 
 # Hexadecimal digits of a key: 64 bits, where a study has some thousand runs.

@@ -42,7 +42,7 @@ from meshsimp_pymoo.comparison.study import (
     on_all_models,
     ranked,
 )
-from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.measures import MEASURES, OF_MESH
 
 __all__ = [
     "COMPARISONS",
@@ -62,11 +62,11 @@ __all__ = [
 Cell = str | int | float | None
 
 DIGITS = 4
-# The columns of measures of the error beside the one that was minimised, by their heading.
+# The columns of what is measured of a mesh beside the error that was minimised, by their heading.
 AS_SEARCHED = {
-    f"{name.removesuffix('_error')}_as_searched": name
+    f"{name.removesuffix('_error')}_as_searched" if measure.of else name: name
     for name, measure in MEASURES.items()
-    if measure.unit and name != "error"
+    if name in OF_MESH or (measure.is_error and name != "error")
 }
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_array
 
-from meshsimp_pymoo.arrays import Csr, IntArray
+from meshsimp_pymoo.arrays import Csr, FloatArray, IntArray
 
 
 def canonical_faces(faces: IntArray) -> IntArray:
@@ -57,6 +57,23 @@ def used_rows(faces: IntArray) -> tuple[IntArray, IntArray]:
     is_used = np.zeros(most + 1, np.bool_)
     is_used[faces] = True
     return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[faces]
+
+
+def least_angles(xy: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the least angle of each triangle (M, 3) of vertices (V, 2) in the plane; 0 where it has no area [degrees].
+
+    Examples
+    --------
+    >>> least_angles(np.array([[0.0, 0], [1, 0], [0, 1], [-1, 0]]), np.array([[0, 1, 2], [0, 1, 3]])).tolist()
+    [45.0, 0.0]
+    """
+    x, y = (np.ascontiguousarray(xy[:, k])[faces.T] for k in (0, 1))
+    dx, dy = x - x[[1, 2, 0]], y - y[[1, 2, 0]]
+    squares = dx * dx + dy * dy
+    # The least one lies opposite the shortest side, between the two others: their cross and scalar product, doubled.
+    cross = 2.0 * np.abs(dx[0] * dy[1] - dy[0] * dx[1])
+    angles: FloatArray = np.degrees(np.arctan2(cross, squares.sum(axis=0) - 2.0 * squares.min(axis=0)))
+    return angles
 
 
 class EdgeTable(NamedTuple):

@@ -88,6 +88,24 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
         t = mesh[h + 4] & TRIANGLE
 
 
+@inner(inline=True)
+def height_on(xy: np.ndarray, z: np.ndarray, mesh: np.ndarray, t: int, x: float, y: float) -> float:
+    """Return the height of triangle t at (x, y), of vertices at heights z."""
+    a = mesh[t]
+    b = mesh[t + 1]
+    c = mesh[t + 2]
+    ax = xy[2 * a] - x
+    ay = xy[2 * a + 1] - y
+    bx = xy[2 * b] - x
+    by = xy[2 * b + 1] - y
+    cx = xy[2 * c] - x
+    cy = xy[2 * c + 1] - y
+    wa = bx * cy - by * cx
+    wb = cx * ay - cy * ax
+    wc = ax * by - ay * bx
+    return (wa * z[a] + wb * z[b] + wc * z[c]) / (wa + wb + wc)
+
+
 @inner
 def _ghost_in_conflict(xy: np.ndarray, u: int, v: int, d: int, x: float, y: float, exact_area: float) -> bool:
     if d > LAST_INDEX:

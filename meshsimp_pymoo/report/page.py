@@ -128,9 +128,11 @@ def simplification_page(
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
     held = _embedded(surface, kept, front, original, order, knee, limit)
     missing = sum(solution is None for solution in held.solutions)
-    columns: dict[str, list[Any]] = {name: values.tolist() for name, values in front.quality.items()}
+    numbers = dict(front.quality)
     if front.refitted_error is not None:
-        columns["refitted_error"] = [None if np.isnan(error) else error for error in front.refitted_error.tolist()]
+        numbers["refitted_error"] = front.refitted_error
+    # what is not known is null
+    columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
     exaggeration = float(f"{view.exaggeration:.2g}")
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
@@ -182,7 +184,7 @@ def simplification_page(
         },
         painted=paint is not None,
         further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
-        errors={name: MEASURES[name].label for name in _errors()},
+        errors={name: MEASURES[name].label for name in _errors() if any(one is not None for one in columns[name])},
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
@@ -190,13 +192,13 @@ def simplification_page(
 
 def _errors() -> list[str]:
     """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
-    errors = [name for name, measure in MEASURES.items() if measure.unit]
+    errors = [name for name, measure in MEASURES.items() if measure.is_error]
     return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
 
 
 def spoken(measure: Measure, unit: str = LENGTH) -> dict[str, str]:
     """Return what the page says of a measure, where lengths have this unit."""
-    return {"label": measure.label, "meaning": measure.meaning, "unit": unit if measure.unit else ""}
+    return {"label": measure.label, "meaning": measure.meaning, "unit": unit if measure.is_error else measure.unit}
 
 
 def _embedded(

@@ -6,6 +6,8 @@ are no candidates for a mesh, and no search of subsets lowers the error there by
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
@@ -43,6 +45,22 @@ def centroids_of(model: OpenModel) -> tuple[FloatArray, FloatArray, FloatArray, 
     order = np.argsort(hilbert_keys(place), kind="stable")
     solid = solid[order]
     return place[order], model.points[faces[solid], 2].mean(axis=1), area[solid] / area[solid].sum(), solid
+
+
+class Between(NamedTuple):
+    """The centroids as compiled functions want them; K samples."""
+
+    xy: np.ndarray  # (2 K,) coordinates in the unit square
+    z: np.ndarray  # (K,) heights of the original surface [model units]
+    share: np.ndarray  # (K,) of each face in the area of all, in the plane
+    exact_area: float  # up to where double precision is exact on these and the vertices, see plane.predicates
+
+
+def between_vertices(model: OpenModel) -> Between:
+    """Return where a mesh is measured between the vertices of a model."""
+    place, z, area, _ = centroids_of(model)
+    exact_area = min(exact_ranges(place)[0], exact_ranges(model.xy)[0])
+    return Between(np.ascontiguousarray(place).ravel(), z, area, exact_area)
 
 
 def with_centroids(ground: Ground, model: OpenModel) -> tuple[Ground, FloatArray]:

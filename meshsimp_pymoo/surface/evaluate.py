@@ -25,7 +25,8 @@ from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.emission import emit, outline
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
-from meshsimp_pymoo.plane.triangulation import RECORD, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import RECORD, height_on, locate, triangulate
+from meshsimp_pymoo.surface.centroids import Between
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, REGIONS, SQUARES, TRIANGLES, UNCOVERED, VERTICES
 from meshsimp_pymoo.workers import Reserve, on_threads
@@ -247,19 +248,7 @@ def _evaluate_one(
             dropped[n_bare] = i
             n_bare += 1
             continue
-        a = mesh[t]
-        b = mesh[t + 1]
-        c = mesh[t + 2]
-        ax = site_xy[2 * a] - x
-        ay = site_xy[2 * a + 1] - y
-        bx = site_xy[2 * b] - x
-        by = site_xy[2 * b + 1] - y
-        cx = site_xy[2 * c] - x
-        cy = site_xy[2 * c + 1] - y
-        wa = bx * cy - by * cx
-        wb = cx * ay - cy * ax
-        wc = ax * by - ay * bx
-        d = abs((wa * site_z[a] + wb * site_z[b] + wc * site_z[c]) / (wa + wb + wc) - z[i])
+        d = abs(height_on(site_xy, site_z, mesh, t, x, y) - z[i])
         if weighted:
             w = weight[i]
             total += w * d
@@ -329,6 +318,43 @@ def _evaluate(
     return end
 
 
+@entry
+def measure_between(
+    between: Between,
+    site_xy: np.ndarray,
+    site_z: np.ndarray,
+    mesh: np.ndarray,
+    end: int,
+    emitted: np.ndarray,
+    unit: float,
+    nearest: bool,
+) -> float:
+    """Return the mean deviation of a mesh at samples between the vertices, weighted by their shares."""
+    xy = between.xy
+    z = between.z
+    share = between.share
+    bare = np.empty(len(z), np.int32)
+    n_bare = 0
+    total = 0.0
+    t = 0
+    for i in range(len(z)):
+        x = xy[2 * i]
+        y = xy[2 * i + 1]
+        t = locate(site_xy, mesh, t, x, y, between.exact_area)
+        if emitted[t // RECORD] == 0:
+            bare[n_bare] = i
+            n_bare += 1
+        else:
+            total += share[i] * abs(height_on(site_xy, site_z, mesh, t, x, y) - z[i])
+    row = np.zeros(REGIONS)
+    if n_bare > 0:
+        nothing, nowhere = np.empty(0), np.empty(0, np.bool_)
+        _measure_bare(
+            xy, z, bare, n_bare, site_xy, site_z, unit, mesh, end, emitted, nearest, share, row, nothing, nowhere
+        )
+    return total + row[ERROR]
+
+
 def evaluate_subsets(
     ground: Ground, workspaces: Reserve[Workspace], kept: BoolArray, *, n_threads: int = 1, regions: int = 0
 ) -> FloatArray:
@@ -378,8 +404,8 @@ def evaluate_subsets(
 
 
 def triangulate_subset(
-    ground: Ground, workspaces: Reserve[Workspace], kept: BoolArray
-) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
+    ground: Ground, workspaces: Reserve[Workspace], kept: BoolArray, between: Between | None = None
+) -> tuple[IntArray, FloatArray, FloatArray, BoolArray, float]:
     """Triangulate one subset (N,) and measure it everywhere.
 
     Parameters
@@ -388,6 +414,8 @@ def triangulate_subset(
         As in :func:`evaluate_subsets`.
     kept : (N,) bool array
         The subset, contiguous and writeable.
+    between : Between, optional
+        Where the mesh is measured too.
 
     Returns
     -------
@@ -397,12 +425,18 @@ def triangulate_subset(
         The subset's row of the table of :func:`evaluate_subsets`.
     deviation, covered : (N,) arrays
         d_p at every vertex [model units], and whether a triangle covers it.
+    surface_error : float
+        Mean of the deviations at ``between``; NaN where it is not asked for, or there is no triangle.
     """
     n = len(ground.z)
     row, deviation, covered = np.empty(REGIONS), np.zeros(n), np.zeros(n, np.bool_)
     with workspaces.one() as workspace:
         end = _evaluate(ground, workspace, kept[None], row[None], deviation, covered)
-        sites, mesh, emitted = workspace[0], workspace[5], workspace[6]
+        sites, site_xy, site_z, mesh, emitted = (workspace[k] for k in (0, 2, 3, 5, 6))
         records = mesh[:end].reshape(-1, RECORD)[emitted[: end // RECORD] == 1, :3].astype(np.int64)
         faces = canonical_faces(records) if row[TRIANGLES] else records[:0]
-        return sites[faces], row, deviation, covered
+        surface_error = np.nan
+        if between is not None and row[TRIANGLES]:
+            rules = ground.unit, ground.nearest
+            surface_error = measure_between(between, site_xy, site_z, mesh, end, emitted, *rules)
+        return sites[faces], row, deviation, covered, surface_error

@@ -16,10 +16,36 @@ from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.source.heights import Heights
 from meshsimp_pymoo.formats.source.missing import is_nodata
 from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.surface.centroids import QUANTUM, Between, between_vertices
 from meshsimp_pymoo.surface.model import OpenModel
 
 # Samples that are looked at together where all are: some tens of megabytes.
 BAND_SAMPLES = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Where the centroids of a grid's triangles are, two a cell, south-west and north-east of its diagonal.
+
+    Attributes
+    ----------
+    x : (2, C - 1) float array
+        Of the lower and the upper triangle of the cells of each column, in the unit square.
+    y : (R - 1, 2) float array
+        The same for each row.
+    width : (C - 1,) float array
+        Of the columns, as a share of all.
+    height : (R - 1,) float array
+        Of the rows.
+    exact_area : float
+        Up to where double precision is exact on these and the samples.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    width: FloatArray
+    height: FloatArray
+    exact_area: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +155,18 @@ class HeightGrid:
             return np.column_stack([nw, np.where(second, se, sw), np.where(second, nw + 1, se)])
 
         return Rows(cut, 2 * (self.shape[0] - 1) * (self.shape[1] - 1))
+
+    @cached_property
+    def between(self) -> Between | Cells:
+        """The centroids of :attr:`faces`: of a model all of them, else where they are by row and column."""
+        if self.model is not None:
+            return between_vertices(self.model)
+        west, east, north, south = self.x[:-1], self.x[1:], self.y[:-1], self.y[1:]
+        x = _thirds(np.stack([west + west + east, west + east + east]))
+        y = _thirds(np.column_stack([north + south + south, north + south + north]))
+        exact_area = min(self.exact_ranges[0], exact_ranges(np.concatenate([x.ravel(), y.ravel()])[:, None])[0])
+        width, height = east - west, north - south
+        return Cells(x, y, width / width.sum(), height / height.sum(), exact_area)
 
     @cached_property
     def exact_ranges(self) -> tuple[float, float]:
@@ -279,3 +317,9 @@ class HeightGrid:
                 "grid without gaps can be cut into tiles: fill them, take a part without (--window), or leave the "
                 "tiles out (--tile none)"
             )
+
+
+def _thirds(sums: FloatArray) -> FloatArray:
+    """Return a third of sums of coordinates, rounded as those are."""
+    thirds: FloatArray = np.rint(sums / (3.0 * QUANTUM)) * QUANTUM
+    return thirds

@@ -21,11 +21,11 @@ from meshsimp_pymoo.memory import check_free
 from meshsimp_pymoo.plane.faces import canonical_faces, one_rings
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import REGIONS, as_quality
+from meshsimp_pymoo.surface.measures import REGIONS
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
-from meshsimp_pymoo.surface.weld import measured, weld
+from meshsimp_pymoo.surface.weld import measured, tabulated, weld
 
 #: Rules that may be anything: a grid without gaps fills its hull. The others are as they are where nothing is said.
 FREE_RULES = ("footprint", "outside")
@@ -140,7 +140,13 @@ class GridSurface:
             raise ValueError(f"{self.model.name}: a grid read by windows has no errors of regions; leave regions out")
         none = np.empty(0, np.int64)
         found = [
-            measured(self.model, weld(self.model, np.flatnonzero(self._checked(row))), none, n_threads=threads)[0]
+            tabulated(
+                self.model,
+                weld(self.model, np.flatnonzero(self._checked(row))),
+                none,
+                between=False,
+                n_threads=threads,
+            )[0]
             for row in np.atleast_2d(kept)
         ]
         return np.array(found).reshape(-1, REGIONS)
@@ -149,9 +155,9 @@ class GridSurface:
         """Return the mesh of one subset (N,), and its deviation at all samples or at those of ``rows``, ascending."""
         mesh = weld(self.model, np.flatnonzero(self._checked(kept)))
         at = np.arange(self.n_vertices) if rows is None else rows
-        numbers, deviation = measured(self.model, mesh, at, n_threads=os.cpu_count() or 1)
+        quality, deviation = measured(self.model, mesh, at, n_threads=os.cpu_count() or 1)
         faces = canonical_faces(mesh.samples[mesh.faces])
-        return Simplified(faces, as_quality(numbers, self.total_weight), deviation, np.ones(len(at), bool))
+        return Simplified(faces, quality, deviation, np.ones(len(at), bool))
 
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Refuse: free meshes are made and measured with a model in one piece."""

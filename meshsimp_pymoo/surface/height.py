@@ -15,6 +15,7 @@ from scipy import sparse
 from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.books import Live, make_live, with_peaks
+from meshsimp_pymoo.surface.centroids import Between, between_vertices
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.free import FreeGround
 from meshsimp_pymoo.surface.ground import Ground, make_ground
@@ -24,7 +25,7 @@ from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.pins import pinned_vertices
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
-from meshsimp_pymoo.surface.score import mesh_deviation, mesh_quality, mesh_samples
+from meshsimp_pymoo.surface.score import measured_angles, mesh_deviation, mesh_quality, mesh_samples
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, checked_faces, require_rules
 from meshsimp_pymoo.workers import Reserve
 
@@ -120,6 +121,10 @@ class HeightSurface:
         """Return the model's arrays and the rules for compiled functions."""
         return self._ground
 
+    @cached_property
+    def _between(self) -> Between:
+        return between_vertices(self.model)
+
     def bounded(self, most: float, *, own: float = 0.0) -> HeightSurface:
         """Return this surface with another cost of moves: what exceeds ``most``, and ``own`` times its own.
 
@@ -186,7 +191,7 @@ class HeightSurface:
 
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""
-        return self.simplify(kept).faces
+        return self._triangulated(kept)[0]
 
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table (P, 6 + regions) of numbers of subsets (P, N); see :func:`evaluate_subsets`."""
@@ -200,15 +205,22 @@ class HeightSurface:
         ValueError
             If no triangle is emitted: fewer than 3 vertices, all on one line, or all triangles outside the footprint.
         """
+        faces, numbers, deviation, covered, between = self._triangulated(kept, self._between)
+        angles = measured_angles(self.points[:, :2], faces)
+        quality = as_quality(numbers, self.total_weight, surface_error=between, **angles)
+        at = slice(None) if rows is None else rows
+        return Simplified(faces, quality, deviation[at], covered[at])
+
+    def _triangulated(self, kept: BoolArray, between: Between | None = None) -> Any:
+        """Return what :func:`triangulate_subset` does of a subset that spans a triangle."""
         row = self._checked(kept)
-        faces, numbers, deviation, covered = triangulate_subset(self._ground, self._workspaces, row)
-        if numbers[TRIANGLES] == 0:
+        found = triangulate_subset(self._ground, self._workspaces, row, between)
+        if found[1][TRIANGLES] == 0:
             raise ValueError(
                 f"{int(row.sum())} kept vertices of {self.model.name} span no triangle of the mesh; "
                 "keep more of them, the corners first"
             )
-        at = slice(None) if rows is None else rows
-        return Simplified(faces, as_quality(numbers, self.total_weight), deviation[at], covered[at])
+        return found
 
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Measure a mesh of the model's own vertices with any edges: a free one.
@@ -229,12 +241,9 @@ class HeightSurface:
             If these are no triangles of the model, or none has an area in the plane.
         """
         faces = checked_faces(faces, self.n_vertices)
-        deviation, covered = mesh_deviation(self._ground, self.points, faces)
-        used, _ = used_rows(faces)
-        deviation[used[covered[used]]] = 0.0
-        quality = mesh_quality(deviation, covered, faces, self.model.weights, self.total_weight)
+        found = self._scored(self.points, faces, own=used_rows(faces)[0])
         at = slice(None) if rows is None else rows
-        return Simplified(faces, quality, deviation[at], covered[at])
+        return Simplified(faces, found.quality, found.deviation[at], found.covered[at])
 
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh by the same error: decimated, folded, with vertices of its own.
@@ -253,9 +262,25 @@ class HeightSurface:
         """
         points = np.asarray(points, float)
         local = self.model.to_local(points) if points.ndim == 2 and points.shape[1:] == (3,) else points
-        deviation, covered = mesh_deviation(self._ground, local, faces)
-        quality = mesh_quality(deviation, covered, np.asarray(faces), self.model.weights, self.total_weight)
-        return Scored(quality, deviation, covered)
+        return self._scored(local, faces)
+
+    def _scored(self, vertices: FloatArray, faces: IntArray, own: IntArray | None = None) -> Scored:
+        """Measure a mesh whose vertices (V, 3) are in the frame of the model's points.
+
+        Those of the model's that are ``own`` vertices of the mesh do not deviate where it covers them.
+        """
+        ground, between, n = self._ground, self._between, self.n_vertices
+        both = ground._replace(xy=np.r_[ground.xy, between.xy], z=np.r_[ground.z, between.z])
+        deviation, covered = mesh_deviation(both, vertices, faces)
+        of_mesh = {"surface_error": float((between.share * deviation[n:]).sum())}
+        of_mesh |= measured_angles(np.asarray(vertices, float)[:, :2], np.asarray(faces))
+        deviation, covered = deviation[:n], covered[:n]
+        if own is not None:
+            deviation[own[covered[own]]] = 0.0
+        weights, total = self.model.weights, self.total_weight
+        return Scored(
+            mesh_quality(deviation, covered, np.asarray(faces), weights, total, **of_mesh), deviation, covered
+        )
 
     def refit(self, mesh: Simplified, *, tolerance: float = TOLERANCE, until: float | None = None) -> Refitted:
         """Move a mesh's vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
@@ -302,7 +327,8 @@ class HeightSurface:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in self.__dict__.items() if name not in ("_ground", "view")} | {"_free": {}}
+        unstored = ("_ground", "_between", "view")
+        return {name: value for name, value in self.__dict__.items() if name not in unstored} | {"_free": {}}
 
 
 def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float = TOLERANCE) -> Refitted:

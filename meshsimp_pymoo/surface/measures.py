@@ -6,11 +6,15 @@ wishes of the shell command, the objectives of a problem and the rows of the pag
 is a new field here and, if it needs a number that the columns below do not hold, a new one of these, which all
 who make such rows fill (``CONTRIBUTING.md`` lists them).
 
+Some measures are of the mesh, not of a row: searches, which only ask for rows, do not know them and need not pay for
+them; who makes a mesh measures them too. Where nobody has, they are NaN.
+
 Nothing heavy is imported here: the shell command's ``--help`` is made of the table.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
@@ -26,8 +30,9 @@ class Measure(NamedTuple):
 
     Attributes
     ----------
-    of : callable
-        Its value for rows (..., 6) of the table that evaluation fills and the total weight of the vertices.
+    of : callable, optional
+        Its value for rows (..., 6) of the table that evaluation fills and the total weight of the vertices; None: it is
+        one of the mesh.
     label : str
         What people call it.
     meaning : str
@@ -45,9 +50,11 @@ class Measure(NamedTuple):
         What ``--NAME`` asks for, if a mesh can be chosen by it.
     searched : str
         Of a wish for an error: the objective of the same order, which is lowered for it.
+    more_is_better : bool
+        Whether nobody wants at most so much of it.
     """
 
-    of: Callable[[Any, float], Any]
+    of: Callable[[Any, float], Any] | None
     label: str
     meaning: str
     unit: str = ""
@@ -56,10 +63,20 @@ class Measure(NamedTuple):
     is_sum: bool = False
     wish: str = ""
     searched: str = ""
+    more_is_better: bool = False
+
+    @property
+    def is_error(self) -> bool:
+        """Whether it is a deviation, a length."""
+        return self.unit == LENGTH
 
 
 def _measure(of: Callable[[Any, float], Any], **facts: Any) -> Any:
     return field(metadata={"measure": Measure(of, **facts)})
+
+
+def _measure_of_mesh(**facts: Any) -> Any:
+    return field(default=math.nan, metadata={"measure": Measure(None, **facts)})
 
 
 def _root(values: Any) -> Any:
@@ -89,6 +106,14 @@ class Quality:
         Maximum of d_p over the original vertices whose weight is not 0 [model units].
     uncovered : int
         Number of original vertices that no triangle covers.
+    surface_error : float
+        Mean of the deviation from the original surface between its vertices: at the centroids of the original faces,
+        weighted by their area in the plane. Faces without one are left out; uncovered centroids cost what uncovered
+        vertices do. Weights of vertices change nothing [model units].
+    min_angle_median : float
+        Median over the triangles of the least angle of each, in the plane [degrees].
+    below_5_degrees : float
+        Share of the triangles whose least angle in the plane is below 5 degrees.
     """
 
     error: float = _measure(
@@ -140,23 +165,47 @@ class Quality:
         label="uncovered",
         meaning="original vertices that no triangle covers",
     )
+    surface_error: float = _measure_of_mesh(
+        label="surface error",
+        meaning="mean between the original vertices",
+        unit=LENGTH,
+    )
+    min_angle_median: float = _measure_of_mesh(
+        label="least angle",
+        meaning="median over the triangles, in the plane",
+        unit="degrees",
+        more_is_better=True,
+    )
+    below_5_degrees: float = _measure_of_mesh(
+        label="thin triangles",
+        meaning="share whose least angle is below 5 degrees",
+    )
 
 
 MEASURES: dict[str, Measure] = {item.name: item.metadata["measure"] for item in fields(Quality)}
 # Those that can be minimised beside the triangles.
 OBJECTIVES: dict[str, Measure] = {name: measure for name, measure in MEASURES.items() if measure.minimised}
 COUNTED = tuple(item.name for item in fields(Quality) if item.type == "int")
+# Those that rows do not say.
+OF_MESH = tuple(name for name, measure in MEASURES.items() if measure.of is None)
 
 
 def quality_of(values: Iterable[tuple[str, Any]]) -> Quality:
     """Return the quality with these (name, value) pairs, whole numbers as such."""
-    numbers: dict[str, Any] = {name: int(value) if name in COUNTED else float(value) for name, value in values}
+    numbers: dict[str, Any] = {}
+    for name, value in values:
+        # one and the same NaN, so that qualities without a number are equal
+        numbers[name] = int(value) if name in COUNTED else math.nan if math.isnan(value) else float(value)
     return Quality(**numbers)
 
 
-def as_quality(row: Any, total_weight: float) -> Quality:
-    """Name the columns of one row (6,) that evaluation filled; ``total_weight`` is that of the model, N without any."""
-    return quality_of((name, measure.of(row, total_weight)) for name, measure in MEASURES.items())
+def as_quality(row: Any, total_weight: float, **of_mesh: float) -> Quality:
+    """Name the columns of one row (6,) that evaluation filled, and what is known of its mesh beside.
+
+    ``total_weight`` is that of the model, N without any.
+    """
+    named = ((name, measure.of(row, total_weight)) for name, measure in MEASURES.items() if measure.of is not None)
+    return quality_of([*named, *of_mesh.items()])
 
 
 def measured(table: Any, measure: str, total_weight: float) -> Any:
@@ -169,7 +218,8 @@ def measured(table: Any, measure: str, total_weight: float) -> Any:
     array([2.])
     """
     require_measure(measure)
-    return MEASURES[measure].of(table, total_weight)
+    of: Any = MEASURES[measure].of
+    return of(table, total_weight)
 
 
 def checked_objectives(objectives: Sequence[str]) -> tuple[str, ...]:

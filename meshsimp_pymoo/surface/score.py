@@ -8,6 +8,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.plane.faces import least_angles
 from meshsimp_pymoo.plane.hilbert import hilbert_keys
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
@@ -24,16 +25,30 @@ from meshsimp_pymoo.surface.measures import (
     as_quality,
 )
 
+# A least angle below this is thin: the measure ``below_5_degrees``.
+THIN_DEGREES = 5.0
+
 
 def mesh_quality(
-    deviation: FloatArray, covered: BoolArray, faces: IntArray, weights: FloatArray | None, total_weight: float
+    deviation: FloatArray,
+    covered: BoolArray,
+    faces: IntArray,
+    weights: FloatArray | None,
+    total_weight: float,
+    **of_mesh: float,
 ) -> Quality:
     """Return what is said of a mesh with these deviations (N,), cover (N,) and triangles (M, 3)."""
     w = np.ones(len(deviation)) if weights is None else weights
     row = np.full(REGIONS, np.nan)
     row[ERROR], row[SQUARES], row[MAXIMUM] = (w * deviation).sum(), (w * deviation**2).sum(), deviation[w > 0].max()
     row[TRIANGLES], row[VERTICES], row[UNCOVERED] = len(faces), len(np.unique(faces)), len(covered) - covered.sum()
-    return as_quality(row, total_weight)
+    return as_quality(row, total_weight, **of_mesh)
+
+
+def measured_angles(xy: FloatArray, faces: IntArray) -> dict[str, float]:
+    """Return what is said of the least angles of triangles (M, 3) of vertices (V, 2) in the plane."""
+    angles = least_angles(xy, faces)
+    return {"min_angle_median": float(np.median(angles)), "below_5_degrees": float((angles < THIN_DEGREES).mean())}
 
 
 def mesh_deviation(ground: Ground, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, BoolArray]:

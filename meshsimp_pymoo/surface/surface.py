@@ -8,17 +8,21 @@ if it shall be thinned and annealed too, answers to the questions of `surface.mo
 
 from __future__ import annotations
 
+import math
+import time
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, spread
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.plane.faces import canonical_faces, is_canonical, used_rows
-from meshsimp_pymoo.surface.measures import OBJECTIVES, Quality
+from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_MESH, Quality
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.workers import on_threads
 
 # A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
 # metres.
@@ -368,6 +372,35 @@ def free_faces(faces: Any, kept: BoolArray, *, triangles: int, vertices: int) ->
         )
     if not kept[used].all():
         raise ValueError(f"its faces use vertex {used[~kept[used]][0]}, which it does not keep")
+    return found
+
+
+def measured_meshes(
+    surface: Surface,
+    kept: BoolArray,
+    quality: Sequence[Quality],
+    *,
+    faces: Sequence[IntArray | None] = (),
+    n_threads: int | None = None,
+    until: float | None = None,
+) -> list[Quality]:
+    """Return these qualities of subsets (S, N), as evaluation knows them, with what only their meshes say.
+
+    ``faces`` are the triangles of those that are free meshes, None of others. Ctrl-C is heard between two meshes. Those
+    not begun by ``perf_counter() = until`` stay as they are; the others are spread over all. What is known is not
+    measured again. A subset without a triangle is no mesh.
+    """
+    found = list(quality)
+    own = tuple(faces) or (None,) * len(found)
+
+    def measure(row: int) -> None:
+        is_known = not any(math.isnan(getattr(found[row], name)) for name in OF_MESH)
+        if found[row].triangles and not is_known and (until is None or time.perf_counter() < until):
+            triangles = own[row]
+            whole = (surface.simplify(kept[row]) if triangles is None else surface.of_faces(triangles)).quality
+            found[row] = replace(found[row], **{name: getattr(whole, name) for name in OF_MESH})
+
+    on_threads(measure, spread(len(found)), n_threads=n_threads)
     return found
 
 

@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.order import vector_order
-from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, locate, triangulate_once
-from meshsimp_pymoo.surface.grid import HeightGrid
+from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, height_on, locate, triangulate_once
+from meshsimp_pymoo.surface.centroids import Between
+from meshsimp_pymoo.surface.evaluate import measure_between
+from meshsimp_pymoo.surface.grid import Cells, HeightGrid
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -30,6 +32,7 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     as_quality,
 )
+from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.workers import on_threads
 
 
@@ -55,15 +58,22 @@ class WeldedMesh:
     @property
     def faces(self) -> IntArray:
         """The triangles (M, 3) as rows of ``samples``, counter-clockwise from above, the least row first, sorted."""
-        corners = self.records.reshape(-1, RECORD)[:, :3]
-        faces = corners[corners.max(axis=1) <= LAST_INDEX].astype(np.int64)
-        return canonical_faces(faces)
+        return canonical_faces(self.unsorted_faces)
+
+    @property
+    def unsorted_faces(self) -> IntArray:
+        """The triangles (M, 3) in no order."""
+        return self.records.reshape(-1, RECORD)[self.emitted, :3].astype(np.int64)
+
+    @property
+    def emitted(self) -> BoolArray:
+        """Which of the records are triangles: not the ghosts beyond the hull."""
+        return self.records.reshape(-1, RECORD)[:, :3].max(axis=1) <= LAST_INDEX
 
     @property
     def n_triangles(self) -> int:
         """Number of triangles."""
-        corners = self.records.reshape(-1, RECORD)[:, :3]
-        return int((corners.max(axis=1) <= LAST_INDEX).sum())
+        return int(self.emitted.sum())
 
 
 def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
@@ -98,24 +108,45 @@ def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
 
 def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Quality:
     """Measure a mesh over all samples of the grid."""
-    row, _ = measured(grid, mesh, np.empty(0, np.int64), n_threads=n_threads)
-    return as_quality(row, grid.n_vertices)
+    return measured(grid, mesh, np.empty(0, np.int64), n_threads=n_threads)[0]
 
 
-def measured(grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int = 1) -> tuple[FloatArray, FloatArray]:
-    """Return the numbers (6,) of a mesh over all samples of the grid, and its deviation at some, numbered ascending.
+def measured(grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int = 1) -> tuple[Quality, FloatArray]:
+    """Measure a mesh over all samples of the grid and return its deviation at some too, numbered ascending."""
+    row, deviation, between = tabulated(grid, mesh, at, between=True, n_threads=n_threads)
+    angles = measured_angles(mesh.xy, mesh.unsorted_faces)
+    return as_quality(row, grid.n_vertices, surface_error=between, **angles), deviation
+
+
+def tabulated(
+    grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, between: bool, n_threads: int = 1
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return the numbers (6,) of a mesh over all samples, its deviation at some, and its mean between them, if wanted.
 
     The sums are taken row by row and then over the rows, so they do not depend on the number of threads.
     """
     n_rows, n_columns = grid.shape
-    table = np.zeros((n_rows, 3))
+    table = np.zeros((n_rows, 4))
+    centroids = grid.between if between else None
+    cells = centroids if isinstance(centroids, Cells) else None
     deviation = np.empty(len(at))
     flat = np.ascontiguousarray(mesh.xy).ravel()
     bounds = np.linspace(0, n_rows, n_threads + 1).astype(int)
 
     def do(part: int) -> None:
-        t = 0
-        for row, band in grid.bands(first=bounds[part], end=bounds[part + 1]):
+        t = t_between = 0
+        above = np.empty((0, n_columns))
+        # the cells north of its rows belong to a part
+        for row, band in grid.bands(first=max(bounds[part] - 1, 0), end=bounds[part + 1]):
+            if cells is not None:
+                north = row - len(above)
+                t_between = _measure_cells(
+                    cells.x, cells.y[north:], cells.width, np.concatenate([above, band]), flat, mesh.z, mesh.records,
+                    t_between, cells.exact_area, table[north:, 3],
+                )  # fmt: skip
+                above = band[-1:]
+            if row < bounds[part]:
+                row, band = row + 1, band[1:]
             rows = slice(row, row + len(band))
             low, high = np.searchsorted(at, [row * n_columns, (row + len(band)) * n_columns])
             sizes = np.empty(band.shape if high > low else (0, 0))
@@ -128,7 +159,15 @@ def measured(grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int
     row = np.full(REGIONS, np.nan)
     row[ERROR], row[SQUARES], row[MAXIMUM] = table[:, 0].sum(), table[:, 1].sum(), table[:, 2].max()
     row[TRIANGLES], row[VERTICES], row[UNCOVERED] = mesh.n_triangles, len(mesh.samples), 0
-    return row, deviation
+    surface_error = np.nan
+    if cells is not None:
+        surface_error = float((cells.height * table[:-1, 3]).sum())
+    elif isinstance(centroids, Between):
+        emitted = mesh.emitted.astype(np.uint8)
+        surface_error = measure_between(
+            centroids, flat, mesh.z, mesh.records, len(mesh.records), emitted, grid.unit, True
+        )
+    return row, deviation, surface_error
 
 
 def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, IntArray]]:
@@ -194,19 +233,7 @@ def _measure_rows(
             t = locate(xy, mesh, t, px, py, exact_area)
             if c == 0:
                 begin = t
-            i = mesh[t]
-            j = mesh[t + 1]
-            k = mesh[t + 2]
-            ax = xy[2 * i] - px
-            ay = xy[2 * i + 1] - py
-            bx = xy[2 * j] - px
-            by = xy[2 * j + 1] - py
-            cx = xy[2 * k] - px
-            cy = xy[2 * k + 1] - py
-            wa = bx * cy - by * cx
-            wb = cx * ay - cy * ax
-            wc = ax * by - ay * bx
-            d = abs((wa * z[i] + wb * z[j] + wc * z[k]) / (wa + wb + wc) - heights[r, c])
+            d = abs(height_on(xy, z, mesh, t, px, py) - heights[r, c])
             if wanted:
                 sizes[r, c] = d
             total += d
@@ -215,4 +242,39 @@ def _measure_rows(
         table[r, 0] = total
         table[r, 1] = squares
         table[r, 2] = maximum
+    return begin
+
+
+@entry
+def _measure_cells(
+    x: np.ndarray,
+    y: np.ndarray,
+    width: np.ndarray,
+    heights: np.ndarray,
+    xy: np.ndarray,
+    z: np.ndarray,
+    mesh: np.ndarray,
+    start: int,
+    exact_area: float,
+    table: np.ndarray,
+) -> int:
+    """Fill the mean deviation at the centroids between each row and the next; return a triangle near the last's begin.
+
+    The original surface between four samples is two triangles, which meet on the line from north-west to south-east.
+    """
+    begin = start
+    for r in range(len(heights) - 1):
+        t = begin
+        total = 0.0
+        for c in range(len(width)):
+            ends = heights[r, c] + heights[r + 1, c + 1]
+            for k in range(2):
+                px = x[k, c]
+                py = y[r, k]
+                t = locate(xy, mesh, t, px, py, exact_area)
+                if c == 0:
+                    begin = t
+                middle = (ends + (heights[r + 1, c] if k == 0 else heights[r, c + 1])) / 3.0
+                total += width[c] * abs(height_on(xy, z, mesh, t, px, py) - middle)
+        table[r] = total / 2.0
     return begin

@@ -177,7 +177,7 @@ def identity(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> 
         "slope_step": SLOPE_STEP,
         "enough_samples": ENOUGH_SAMPLES,
         "searched": [SEARCHED, SAMPLES, MOVES],
-        "format": 2,
+        "format": 3,
     }
 
 

@@ -10,7 +10,10 @@ Tools that are not part of the package are compared where they are installed: ``
 * A tool that makes one mesh gets the parameter that gives its largest mesh of at most so many triangles (its smallest
   one, where all are larger); its error is compared with thinning's at the number of triangles it really has. Meshes
   that are too large are left out of the means.
-* Every mesh is scored by the package's own error: nearest point outside, footprint of the model.
+* Every mesh is scored by the package's own error: nearest point outside, footprint of the model. Beside the error at
+  the vertices stand the surface error, which is measured between them and set beside thinning's likewise, and the
+  least angles: they show who fits the vertices, and who pays with thin triangles.
+* ``--refit`` adds to each front the same meshes with their best heights.
 * The search gets its time for the whole front, thinning and all else included; only compilation is done before.
 
 ``--ablation`` compares variants of the memetic search instead, at equal time, and ``--enumerable`` looks for the true
@@ -43,6 +46,7 @@ from rich.console import Console
 from rich.table import Table
 
 from meshsimp_pymoo import (
+    Front,
     HalfPlaneCrossover,
     MeshProblem,
     NeighbourShift,
@@ -55,6 +59,7 @@ from meshsimp_pymoo import (
     memetic,
     moead,
     nsga2_v1,
+    nsga2_v2,
     thinning,
 )
 from meshsimp_pymoo.comparison.baselines import BASELINES, largest_at_most
@@ -174,6 +179,11 @@ class Score:
     thinning: float  # its error at `wanted` triangles
     thinning_at_count: float  # its error at `triangles`
     is_front: bool
+    surface_error: float
+    surface_thinning: float  # thinning's, likewise
+    surface_thinning_at_count: float
+    min_angle_median: float  # degrees
+    below_5_degrees: float  # share of the triangles
 
     @property
     def fits(self) -> bool:
@@ -190,6 +200,11 @@ class Score:
         """Error relative to thinning's at the number of triangles the mesh really has."""
         return _ratio(self.error, self.thinning_at_count)
 
+    @property
+    def surface_ratio(self) -> float:
+        """Surface error relative to thinning's, at the same size as the error."""
+        return _ratio(self.surface_error, self.surface_thinning if self.is_front else self.surface_thinning_at_count)
+
 
 def _ratio(error, reference):
     if reference > 0:
@@ -199,11 +214,12 @@ def _ratio(error, reference):
 
 @dataclass
 class Curve:
-    """A front: errors and triangles of many meshes, the quality of each on demand, and the seconds it took."""
+    """A front: errors and triangles of many meshes, which vertices each keeps, and the seconds it took."""
 
+    problem: MeshProblem
     error: np.ndarray
     triangles: np.ndarray
-    quality: Callable[[int], Quality]
+    kept: Callable[[int], np.ndarray]
     seconds: float
     note: str = ""
 
@@ -219,12 +235,26 @@ class Curve:
 
     def scored(self, row: int) -> Quality:
         """Return the quality of one mesh, computed anew; it must be what the front says."""
-        quality = self.quality(row)
+        quality = self.problem.quality(self.kept(row))
         if quality.triangles != self.triangles[row] or not np.isclose(quality.error, self.error[row], rtol=1e-6):
             raise RuntimeError(
                 f"a front says {self.error[row]} at {self.triangles[row]} triangles, but its mesh has {quality}"
             )
         return quality
+
+    def surface_value(self, size: int) -> float:
+        """Return the surface error of the mesh of least error."""
+        row = self.best(size)
+        return np.inf if row is None else self.scored(row).surface_error
+
+    def refitted(self, row: int) -> tuple[Quality, float]:
+        """Return the quality of one mesh with its best heights, and the seconds these took."""
+        (solution,) = Front.from_subsets(self.problem, self.kept(row)[None])
+        start = time.perf_counter()
+        found = solution.refit()
+        seconds = time.perf_counter() - start
+        faces = np.searchsorted(found.rows, found.faces)
+        return self.problem.surface.score(found.vertices, faces).quality, seconds
 
 
 @dataclass
@@ -259,6 +289,11 @@ class Comparison:
                 self.reference.value(wanted),
                 self.reference.value(quality.triangles),
                 is_front,
+                quality.surface_error,
+                self.reference.surface_value(wanted),
+                self.reference.surface_value(quality.triangles),
+                quality.min_angle_median,
+                quality.below_5_degrees,
             )
         )
 
@@ -268,8 +303,7 @@ def nested_curve(model, build):
     start = time.perf_counter()
     nested = build(HeightSurface(model))
     seconds = time.perf_counter() - start
-    problem = MeshProblem(model, memo=0)
-    return Curve(nested.error, nested.triangles, lambda k: problem.quality(nested.kept(k)), seconds)
+    return Curve(MeshProblem(model, memo=0), nested.error, nested.triangles, nested.kept, seconds)
 
 
 def search_curve(model, algorithm, termination, seed, regions=0):
@@ -279,7 +313,7 @@ def search_curve(model, algorithm, termination, seed, regions=0):
     result = minimize(problem, algorithm, termination, seed=seed)
     seconds = time.perf_counter() - start
     generations = f"{result.algorithm.n_iter - 1} generations"
-    return Curve(result.F[:, 0], result.F[:, 1], lambda k: problem.quality(result.X[k]), seconds, generations)
+    return Curve(problem, result.F[:, 0], result.F[:, 1], lambda k: result.X[k], seconds, generations)
 
 
 # ------------------------------------------------------------------------------------------------------ the methods
@@ -293,7 +327,10 @@ TOOLS = {
     "meshoptimizer": ("meshoptimizer_border", "meshoptimizer_free"),
     "MeshLab, border kept": ("quadric_collapse_boundary",),
 }
-SEARCHES = ("NSGA-II v1", "memetic")
+# The founding paper's, each with its 50 generations; what it compares of them with, only where it is asked for.
+PAPERS = {"NSGA-II v1": nsga2_v1, "NSGA-II v2": nsga2_v2, "MOEA/D": moead}
+SEARCHES = (*PAPERS, "memetic")
+USUAL_METHODS = (*TOOLS, *PASSES, "NSGA-II v1", "memetic")
 METHODS = (*TOOLS, *PASSES, *SEARCHES)
 
 
@@ -312,8 +349,7 @@ def reference_of(model, shares):
     start = time.perf_counter()
     nested = thinning(HeightSurface(model))
     seconds = time.perf_counter() - start
-    problem = MeshProblem(model, memo=0)
-    curve = Curve(nested.error, nested.triangles, lambda k: problem.quality(nested.kept(k)), seconds)
+    curve = Curve(MeshProblem(model, memo=0), nested.error, nested.triangles, nested.kept, seconds)
     sizes = {}
     for share in shares:
         k = round(share / 100 * model.n_vertices) - len(nested.base)
@@ -337,38 +373,43 @@ def add_tool(comparison, method):
         comparison.add(method, None, seconds, share, quality, False)
 
 
-def add_curve(comparison, method, seed, curve):
-    """Score a front at every size."""
+def add_curve(comparison, method, seed, curve, refit=False):
+    """Score a front at every size, with its best heights too where these are wanted."""
     comparison.curves[method, seed] = curve
     for share, size in comparison.sizes.items():
         row = curve.best(size)
         if row is not None:
             comparison.add(method, seed, curve.seconds, share, curve.scored(row), True)
+            if refit:
+                quality, seconds = curve.refitted(row)
+                comparison.add(f"{method}, refitted", seed, curve.seconds + seconds, share, quality, True)
 
 
-def compare(model, methods, shares, budgets, seeds, say):
+def compare(model, methods, shares, budgets, seeds, say, refit=False):
     """Run every method on one model."""
     name, usual = size_class(model.n_vertices)
     budgets = tuple(budgets or usual)
     say(f"{model.name}: thinning")
     comparison = Comparison(model, name, budgets, *reference_of(model, shares))
-    add_curve(comparison, "thinning", None, comparison.reference)
+    add_curve(comparison, "thinning", None, comparison.reference, refit)
     for method in methods:
         say(f"{model.name}: {method}")
         try:
             if method in TOOLS:
                 add_tool(comparison, method)
             elif method in PASSES:
-                add_curve(comparison, method, None, nested_curve(model, BASELINES[PASSES[method]].front))
-            elif method == "NSGA-II v1":
+                add_curve(comparison, method, None, nested_curve(model, BASELINES[PASSES[method]].front), refit)
+            elif method in PAPERS:
                 for seed in seeds:
-                    add_curve(comparison, method, seed, search_curve(model, nsga2_v1(), ("n_gen", 50), seed))
+                    add_curve(
+                        comparison, method, seed, search_curve(model, PAPERS[method](), ("n_gen", 50), seed), refit
+                    )
             else:
                 for seconds in budgets:
                     for seed in seeds:
                         say(f"{model.name}: {memetic_name(seconds)}, seed {seed}")
                         curve = search_curve(model, memetic(), ("time", seconds), seed)
-                        add_curve(comparison, memetic_name(seconds), seed, curve)
+                        add_curve(comparison, memetic_name(seconds), seed, curve, refit)
         except (ToolUnavailable, ValueError) as reason:  # the latter where a tool leaves no triangle
             comparison.absent[method] = str(reason)
     return comparison
@@ -428,34 +469,55 @@ class Sheet:
         return "\n".join(lines) + "\n"
 
 
-def model_sheet(comparison):
-    """Return the table of one model."""
+def model_sheets(comparison):
+    """Return the tables of one model: error, surface error, angles."""
     model = comparison.model
-    sheet = Sheet(
-        f"{model.name}: N = {model.n_vertices}, error relative to thinning's",
-        ["method", "seconds", *(f"{share:g} %: {size} triangles" for share, size in comparison.sizes.items())],
+    sizes = [f"{share:g} %: {size} triangles" for share, size in comparison.sizes.items()]
+    sheet = Sheet(f"{model.name}: N = {model.n_vertices}, error relative to thinning's", ["method", "seconds", *sizes])
+    surface = Sheet(f"{model.name}: surface error relative to thinning's", ["method", *sizes])
+    angles = Sheet(
+        f"{model.name}: median of the least angles in degrees, and the share of triangles below 5 degrees",
+        ["method", *sizes],
     )
     by_method = defaultdict(list)
     for score in comparison.scores:
         by_method[score.method].append(score)
+    angles.rows.append(["thinning", *_cells(by_method["thinning"], comparison.sizes, _angles)])
     at = {score.share: score for score in by_method.pop("thinning")}
     errors = [f"{at[share].error:.6g}{_bare(at[share].uncovered)}" for share in comparison.sizes]
     sheet.rows.append(["thinning, its error", f"{comparison.reference.seconds:.2f}", *errors])
+    surface.rows.append(["thinning, its surface error", *(f"{at[s].surface_error:.6g}" for s in comparison.sizes)])
     for method, scores in by_method.items():
-        sheet.rows.append([method, figure(np.mean([s.seconds for s in scores]), 2)])
-        for share in comparison.sizes:
-            sheet.rows[-1].append(_cell([s for s in scores if s.share == share]))
+        seconds = figure(np.mean([s.seconds for s in scores]), 2)
+        sheet.rows.append([method, seconds, *_cells(scores, comparison.sizes, _cell)])
+        surface.rows.append([method, *_cells(scores, comparison.sizes, _surface)])
+        angles.rows.append([method, *_cells(scores, comparison.sizes, _angles)])
     sheet.notes += [f"no {method}: {reason}" for method, reason in comparison.absent.items()]
     searched = [f"{method}: {curve.note}" for (method, _), curve in comparison.curves.items() if curve.note]
     if searched:
         sheet.notes.append("; ".join(searched))
-    return sheet
+    return [sheet, surface, angles]
+
+
+def _cells(scores, sizes, cell):
+    """Return a method's cells at all sizes."""
+    found = [[score for score in scores if score.share == share] for share in sizes]
+    return [cell(some) if some else "too large" for some in found]
+
+
+def _surface(scores):
+    """Return the ratio between the vertices."""
+    return figure(geometric_mean(s.surface_ratio for s in scores))
+
+
+def _angles(scores):
+    """Return the least angles: the median, and how many are small."""
+    degrees, share = (np.mean([getattr(s, name) for s in scores]) for name in ("min_angle_median", "below_5_degrees"))
+    return f"{degrees:.1f}, {100 * share:.1f} %"
 
 
 def _cell(scores):
     """Return the ratio, the triangles where they are not those of the heading, and the uncovered vertices."""
-    if not scores:
-        return "too large"
     text = figure(geometric_mean(s.ratio for s in scores))
     if not scores[0].is_front and scores[0].triangles != scores[0].wanted:
         text += f" {'at' if scores[0].fits else 'only at'} {scores[0].triangles}"
@@ -479,33 +541,42 @@ def summaries(comparisons):
     for name, _, _ in CLASSES:
         group = [c for c in comparisons if c.size_class == name]
         if group:
-            sheets += [means_sheet(name, group)]
+            sheets += [means_sheet(name, group, what, of) for what, of in MEANS.items()]
             if any(budgeted(c) for c in group):
                 sheets += [duels_sheet(name, group)]
     return sheets
 
 
-def means_sheet(name, group):
+# What means are taken of.
+MEANS = {"error": "ratio", "surface error": "surface_ratio"}
+
+
+def means_sheet(name, group, what, of):
     """Return the geometric means of a class."""
     shares = list(group[0].sizes)
     names = ", ".join(c.model.name for c in group)
     sheet = Sheet(
-        f"Geometric means of error / thinning's: {name} models ({names})",
-        ["method", "meshes", *(f"{share:g} %" for share in shares), "all", "worst", "worst at own count"],
+        f"Geometric means of {what} / thinning's: {name} models ({names})",
+        ["method", "meshes", *(f"{share:g} %" for share in shares), "all", "worst"],
     )
+    with_count = of == "ratio"
+    sheet.columns += ["worst at own count"] * with_count
     by_method = defaultdict(list)
     for comparison in group:
         for score in comparison.scores:
             if score.method != "thinning" and score.fits:
                 by_method[score.method].append(score)
     for method, scores in by_method.items():
-        by_share = [figure(geometric_mean(s.ratio for s in scores if s.share == share)) for share in shares]
-        total = [geometric_mean(s.ratio for s in scores), max(s.ratio for s in scores)]
-        total += [max(s.ratio_at_count for s in scores)]
+        ratios = [(s.share, getattr(s, of)) for s in scores]
+        by_share = [figure(geometric_mean(ratio for at, ratio in ratios if at == share)) for share in shares]
+        total = [geometric_mean(ratio for _, ratio in ratios), max(ratio for _, ratio in ratios)]
+        total += [max(s.ratio_at_count for s in scores)] * with_count
         sheet.rows.append([method, f"{len(scores)}", *by_share, *map(figure, total)])
-    sheet.notes.append(
-        "'worst at own count': beside thinning at the triangles that the mesh has, fewer where a front has a gap there"
-    )
+    if with_count:
+        sheet.notes.append(
+            "'worst at own count': beside thinning at the triangles that the mesh has, fewer where a front has a gap "
+            "there"
+        )
     return sheet
 
 
@@ -552,10 +623,11 @@ def write_csv(path, scores):
     names = [f.name for f in dataclasses.fields(Score)]
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow([*names, "ratio", "ratio_at_count"])
+        ratios = ("ratio", "ratio_at_count", "surface_ratio")
+        writer.writerow([*names, *ratios])
         for score in scores:
-            row = [getattr(score, name) for name in names]
-            writer.writerow(["" if cell is None else cell for cell in [*row, score.ratio, score.ratio_at_count]])
+            row = [getattr(score, name) for name in (*names, *ratios)]
+            writer.writerow(["" if cell is None else cell for cell in row])
 
 
 def write_markdown(path, sheets, skipped):
@@ -624,10 +696,13 @@ def benchmark(options):
     warm_up(options.methods)
     comparisons, sheets = [], []
     for model in opened(names, options.classes, skipped):
-        comparison = compare(model, options.methods, options.shares, options.budgets, options.seeds or (1,), say)
+        seeds, how = options.seeds or (1,), {"refit": options.refit}
+        comparison = compare(model, options.methods, options.shares, options.budgets, seeds, say, **how)
         comparisons.append(comparison)
-        sheets.append(model_sheet(comparison))
-        sheets[-1].show()
+        of_model = model_sheets(comparison)
+        sheets += of_model
+        for sheet in of_model:
+            sheet.show()
         write(options.output, comparisons, sheets, skipped)
     for sheet in summaries(comparisons):
         sheet.show()
@@ -739,8 +814,10 @@ def main(argv=None) -> int:
     usual = "; ".join(f"{name} models {' '.join(f'{b:g}' for b in budgets)}" for name, _, budgets in CLASSES)
     text = f"seconds of the search; default: {usual}"
     parser.add_argument("--budgets", nargs="+", type=float, metavar="S", help=text)
-    text = f"methods beside thinning; default: all: {'; '.join(METHODS)}"
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, metavar="METHOD", help=text)
+    others = "; ".join(method for method in METHODS if method not in USUAL_METHODS)
+    text = f"methods beside thinning; default: {'; '.join(USUAL_METHODS)}; there are also {others}"
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=USUAL_METHODS, metavar="METHOD", help=text)
+    parser.add_argument("--refit", action="store_true", help="each front's meshes with their best heights, too")
     text = "seeds of the searches; default: 1, of an ablation 1 2 3"
     parser.add_argument("--seeds", "--seed", nargs="+", type=int, metavar="K", help=text)
     text = "write all results (.csv) or the tables (.md) too; may be given twice"

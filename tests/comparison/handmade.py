@@ -118,5 +118,6 @@ def arrays(F: np.ndarray, nearest: float) -> dict[str, np.ndarray]:
     return {
         "F": F.reshape(n, 2), "kept": np.zeros((n, 2), np.uint8), "error_nearest": F.reshape(n, 2)[:, 0] * nearest,
         "vertices": np.full(n, 5), "uncovered": np.full(n, 3), "mean_error": np.full(n, 0.5),
-        "rms_error": np.full(n, 0.6), "max_error": np.full(n, 0.7),
+        "rms_error": np.full(n, 0.6), "max_error": np.full(n, 0.7), "surface_error": np.full(n, 0.4),
+        "min_angle_median": np.full(n, 30.0), "below_5_degrees": np.full(n, 0.25),
     }  # fmt: skip

@@ -33,6 +33,7 @@ from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
 from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.measures import OF_MESH
 from meshsimp_pymoo.surface.model import build_model
 
 TOOLS = [name for name, known in BASELINES.items() if known.tool]
@@ -195,6 +196,7 @@ def test_what_a_tool_raises_is_a_mesh_that_is_missing(monkeypatch):
     for mesh in (flat, none):
         assert (mesh.triangles, mesh.quality.triangles, mesh.quality.uncovered) == (0, 0, 225)
         assert mesh.quality.error == np.inf
+        assert np.isnan(mesh.quality.surface_error)
 
 
 class TestReductions:
@@ -324,6 +326,8 @@ def test_stored_scores_are_those_of_the_stored_meshes(everything):
                 assert getattr(quality, measure) == pytest.approx(errors[row], rel=1e-12)
                 assert quality.triangles == arrays["F"][row, 1]
                 assert quality.uncovered == arrays["uncovered"][row]
+                if scoring == "searched":
+                    assert [getattr(quality, name) for name in OF_MESH] == [arrays[name][row] for name in OF_MESH]
 
 
 def test_a_whole_front_is_what_its_pass_gives_under_the_problems_rules(everything):

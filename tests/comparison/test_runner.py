@@ -175,6 +175,7 @@ def test_a_stored_run_is_what_pymoo_finds_in_one_go(reference, config):
         assert (q.error, q.triangles) == tuple(run.arrays["F"][row])
         assert q.max_error == run.arrays["max_error"][row]
         assert q.uncovered == run.arrays["uncovered"][row]
+        assert q.surface_error == run.arrays["surface_error"][row] > 0
     charged = MeshProblem(problem.model, footprint="hull", outside="nearest")
     np.testing.assert_array_equal(run.arrays["error_nearest"], [charged.quality(row).error for row in kept])
 
@@ -920,7 +921,7 @@ def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp
 def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one_line(stored, capsys):
     record = stored / "experiment.json"
     content = json.loads(record.read_text(encoding="utf-8"))
-    assert content["format"] == FORMAT == 4
+    assert content["format"] == FORMAT == 5
 
     def told(**changed):
         record.write_text(json.dumps(content | changed), encoding="utf-8")
@@ -929,7 +930,7 @@ def test_an_experiment_of_an_earlier_version_or_a_damaged_one_is_answered_in_one
         return line
 
     without_rules = [{key: item[key] for key in item if key != "rules"} for item in content["problems"]]
-    assert "experiment.json: is not of the format 4 that this version reads; run it again" in told(
+    assert "experiment.json: is not of the format 5 that this version reads; run it again" in told(
         format=1, problems=without_rules
     )
     assert "experiment.json: is damaged ('rules' is missing); `meshsimp run` writes it anew" in told(

@@ -32,7 +32,7 @@ from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
-ERRORS = ["mean_error", "rms_error", "max_error", "error"]
+ERRORS = ["mean_error", "rms_error", "max_error", "surface_error", "error"]
 SIDE = 24  # samples along a side of the model
 
 
@@ -206,14 +206,15 @@ def test_a_search_by_triangles_finds_the_most_accurate(visit, front):
 def test_every_error_can_be_searched_for_those_that_meshes_are_chosen_by_first(visit):
     options = visit.page.locator("#measure option")
     assert [option.get_attribute("value") for option in options.all()] == ERRORS
-    assert options.all_inner_texts() == ["mean error", "RMS error", "max error", "error (sum)"]
+    assert options.all_inner_texts() == ["mean error", "RMS error", "max error", "surface error", "error (sum)"]
     assert visit.page.locator("#measure").input_value() == "mean_error"
 
 
 def test_the_numbers_begin_with_the_sizes(visit):
     names = visit.page.locator("#numbers th").all_inner_texts()
     assert names == [
-        "triangles", "vertices", "error", "mean error", "RMS error", "max error", "uncovered", "solution"
+        "triangles", "vertices", "error", "mean error", "RMS error", "max error", "uncovered",
+        "surface error", "least angle", "thin triangles", "solution",
     ]  # fmt: skip
 
 

@@ -1,16 +1,21 @@
 """The surface of a grid read by windows is the height surface of the same grid, and its arrays are made by number."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.opening import open_grid, open_model
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.weld import measure, weld
 
 
 @pytest.fixture(scope="module", params=["windows", "model"])
@@ -51,6 +56,7 @@ def test_a_subset_has_the_mesh_and_the_error_of_the_whole_model(pair, seed, shar
     there[row_of] = kept
     mine, known = surface.simplify(kept), whole.simplify(there)
     assert mine.deviation == pytest.approx(known.deviation[row_of], abs=1e-12)
+    assert dataclasses.astuple(mine.quality) == pytest.approx(dataclasses.astuple(known.quality), rel=1e-9, abs=1e-12)
     assert {frozenset(row_of[face].tolist()) for face in mine.faces} == {frozenset(f) for f in known.faces.tolist()}
     np.testing.assert_array_equal(surface.triangles(kept), mine.faces)
     table = surface.evaluate(kept[None])
@@ -58,6 +64,37 @@ def test_a_subset_has_the_mesh_and_the_error_of_the_whole_model(pair, seed, shar
     vertices = np.asarray(surface.model.file_points)
     scored = surface.score(vertices, mine.faces)
     assert scored.deviation == pytest.approx(mine.deviation, abs=1e-12)
+    assert scored.quality.surface_error == pytest.approx(mine.quality.surface_error, rel=1e-9, abs=1e-12)
+
+
+def test_between_the_samples_of_a_model_its_own_faces_count_however_they_are_cut():
+    z = np.random.default_rng(3).normal(size=(6, 8))
+    source = grid_source(z, 2.0, 3.0)
+    faces = []
+    for k, nw in enumerate(8 * row + column for row in range(5) for column in range(7)):
+        sw, se, ne = nw + 8, nw + 9, nw + 1
+        faces += [[nw, sw, ne], [sw, se, ne]] if k % 3 else [[nw, sw, se], [nw, se, ne]]
+    model = build_model(dataclasses.replace(source, faces=np.array(faces), name="cut"), up="z")
+    surface, whole, row_of = GridSurface(open_grid(model)), HeightSurface(model), np.argsort(model.source_index)
+    usual = GridSurface(open_grid(z, spacing=(2.0, 3.0)))
+    for share in (0.0, 0.3):
+        kept = (np.random.default_rng(5).random(surface.n_vertices) < share) | surface.pinned
+        there = np.zeros_like(kept)
+        there[row_of] = kept
+        mine, known = surface.simplify(kept).quality, whole.simplify(there).quality
+        assert mine.surface_error == pytest.approx(known.surface_error, rel=1e-9)
+        assert mine.error == pytest.approx(usual.simplify(kept).quality.error, rel=1e-9)
+        assert mine.surface_error != pytest.approx(usual.simplify(kept).quality.surface_error, rel=1e-3)
+
+
+def test_the_numbers_of_a_grid_s_mesh_do_not_depend_on_the_threads_nor_on_the_bands(pair, monkeypatch):
+    surface, _, _ = pair
+    kept = (np.random.default_rng(2).random(surface.n_vertices) < 0.2) | surface.pinned
+    mesh = weld(surface.model, np.flatnonzero(kept))
+    found = [measure(surface.model, mesh, n_threads=n) for n in (1, 2, 5, 30)]
+    monkeypatch.setattr("meshsimp_pymoo.surface.grid.BAND_SAMPLES", 40)
+    found += [measure(surface.model, mesh, n_threads=n) for n in (1, 2, 5)]
+    assert found == found[:1] * 7
 
 
 def test_what_a_grid_read_by_windows_does_not_know_is_refused(pair):

@@ -10,6 +10,7 @@ from samples import SMALL, freed, subset, surface
 
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.surface.measures import OF_MESH
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import OUTSIDES
 from meshsimp_pymoo.surface.score import mesh_deviation, mesh_samples
@@ -28,6 +29,8 @@ def test_the_error_of_a_written_mesh_is_that_of_its_subset(model, outside):
         assert other.error == pytest.approx(result.quality.error, rel=1e-9)
         assert (other.triangles, other.vertices) == (result.quality.triangles, result.quality.vertices)
         assert other.uncovered == result.quality.uncovered
+        for name in OF_MESH:
+            assert getattr(other, name) == pytest.approx(getattr(result.quality, name), rel=1e-9)
 
 
 @pytest.mark.parametrize("outside", OUTSIDES)

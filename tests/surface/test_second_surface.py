@@ -45,7 +45,7 @@ from meshsimp_pymoo.search.greedy import thin
 from meshsimp_pymoo.search.local_search import relocate, relocate_all
 from meshsimp_pymoo.search.operators import OPERATORS
 from meshsimp_pymoo.surface.ground import Ground
-from meshsimp_pymoo.surface.measures import ERROR, MEASURES, TRIANGLES
+from meshsimp_pymoo.surface.measures import ERROR, MEASURES, OF_MESH, TRIANGLES
 from meshsimp_pymoo.surface.moves import exchange, snapshot, total_cost, try_exchange
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Surface
@@ -293,6 +293,8 @@ def test_a_solution_is_picked_and_is_a_mesh_of_the_file(front, problem, tmp_path
     assert best.error == min(q.error for q in front.quality if q.triangles <= 10)
     assert front.best(max_error=0.05).triangles == min(q.triangles for q in front.quality if q.max_error <= 0.05)
     assert front.knee() in list(front)
+    with pytest.raises(LookupError, match="the surface error of the solutions of a circle was not measured"):
+        front.best(surface_error=0.05)
     assert best.mesh.faces.tolist() == fan(np.arange(12)).tolist()
     np.testing.assert_array_equal(best.mesh.vertices, problem.model.file_points[best.kept])
     assert best.refitted.error == best.error
@@ -310,6 +312,7 @@ def test_its_folder_holds_the_numbers_of_the_definition(folder, front, problem):
     for row, kept in zip(rows, front.kept, strict=True):
         assert float(row["error"]) == pytest.approx(twin(problem.surface, kept), rel=1e-9, abs=1e-12)
         assert int(row["uncovered"]) == (~kept).sum()
+        assert [row[name] for name in OF_MESH] == ["", "", ""]  # a circle has nothing between its points
         assert row["refitted_error"] == row["error"]
     assert (folder / "front.png").read_bytes().startswith(b"\x89PNG")
     run = json.loads((folder / "run.json").read_text())
@@ -321,7 +324,9 @@ def test_its_page_says_the_same(folder, front, problem):
     page = (folder / "report.html").read_text()
     data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.S)[1])
     for name in MEASURES:
-        assert data["columns"][name] == [getattr(q, name) for q in front.quality]
+        known = [None if name in OF_MESH else getattr(q, name) for q in front.quality]
+        assert data["columns"][name] == known
+    assert '<option value="surface_error">' not in page
     assert (data["model"]["vertices"], data["model"]["triangles"]) == (40, 38)
     assert data["model"]["diagonal"] == problem.surface.diagonal
     assert data["chosen"] == front.best(triangles=10).solution

@@ -80,10 +80,9 @@ def _pick(
     as_json: bool,
 ) -> int:
     import json
-    from dataclasses import asdict
 
     from meshsimp_pymoo.cli.arguments import numbered
-    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, say, tell
+    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, in_numbers, say, tell
     from meshsimp_pymoo.front import Front
 
     front = Front.load(folder, model=model)
@@ -100,7 +99,7 @@ def _pick(
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
-        said = {"mesh": mesh, "solution": number, "free": solution.free, **asdict(solution.quality)}
+        said = {"mesh": mesh, "solution": number, "free": solution.free, **in_numbers(solution.quality)}
         tell(json.dumps(said, indent=2))
     elif not quiet:
         which = f"solution {solution.solution}" if stored else "between two solutions"

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 HELP = "measure a mesh that another tool simplified"
 DESCRIPTION = """\
 Measure OTHER, any simplified mesh of MODEL, by the error of this package: the sum,
-mean, RMS and maximum of the deviations at all vertices of MODEL, and how many of
-them no triangle covers."""
+mean, RMS and maximum of the deviations at all vertices of MODEL, how many of them
+no triangle covers, the mean between the vertices, and the least angles of OTHER."""
 EXAMPLES = """\
 examples:
   meshsimp score face.ply decimated.ply
@@ -70,10 +70,9 @@ def _scored(
     model: str, options: Options, rules: Rules, outside: str | None, other: str, folder: str | None, path: Path | None
 ) -> tuple[dict[str, Any], list[str]]:
     """Return what is said of a mesh, as numbers and in words; draw its error if a file is named."""
-    from dataclasses import asdict
     from pathlib import Path
 
-    from meshsimp_pymoo.cli.terminal import described, in_unit
+    from meshsimp_pymoo.cli.terminal import described, in_numbers, in_unit
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.opening import open_model, open_source
@@ -90,7 +89,7 @@ def _scored(
         raise UsageError(f"{other}: cannot be measured against {surface.model.name}: {problem}") from None
     quality, name, unit = scored.quality, surface.model.name, length_unit(surface.model.georeference)
     summary: dict[str, Any] = {
-        "model": name, "other": str(other), "outside": surface.rules.outside, **asdict(quality),
+        "model": name, "other": str(other), "outside": surface.rules.outside, **in_numbers(quality),
         **known_units(surface.model.georeference),
     }  # fmt: skip
     lines = [f"{other}: {described(quality, unit)}"]

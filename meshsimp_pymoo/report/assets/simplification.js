@@ -100,10 +100,12 @@ function numbers(row) {
     vertices: (value) => `${percent(value / model.vertices)} of ${plainNumber(model.vertices)} kept`,
     error: () => withUnit(measures.error.meaning, measures.error.unit),
     mean_error: (value) => `${percent(value / model.diagonal)} of the model's diagonal`,
+    below_5_degrees: (value) => `${percent(value)} have a least angle below 5 degrees`,
   };
   const rows = [
     ...[...data.measures.filter(isSize), ...data.measures.filter((measure) => !isSize(measure))].map(
-      ({ name, meaning }) => [name, columns[name][row], notes[name]?.(columns[name][row]) ?? meaning]),
+      ({ name, meaning }) => [name, columns[name][row], notes[name]?.(columns[name][row]) ?? meaning])
+      .filter(([, value]) => value !== null), // not measured
     ...refitted(row),
     ...(columns.free.some(Boolean) ? [["free", columns.free[row], `edges ${columns.free[row] ? "chosen for the error" : "by the Delaunay rule"}`]] : []),
     ["solution", columns.solution[row], data.meshes[row] ? `stored as ${data.meshes[row]}` : "not stored as a mesh"],
@@ -120,7 +122,8 @@ function numbers(row) {
     shown.value = value;
     shown.id = `number-${name}`;
     shown.textContent = spell(value);
-    cell.append(shown, measures[name]?.unit || name === "refitted_error" ? data.unit : "");
+    const { unit } = measures[name === "refitted_error" ? "error" : name] ?? {};
+    cell.append(shown, unit === measures.error.unit ? data.unit : unit ? ` ${unit}` : "");
     const remark = document.createElement("td");
     remark.textContent = note;
     line.append(head, cell, remark);
@@ -157,8 +160,9 @@ part("by-error").addEventListener("submit", (event) => {
   const measure = part("measure").value;
   const name = named(measure);
   if (!(most >= 0)) return answer(null, `an error of “${part("most-error").value}”; give a number`);
-  const best = columns[measure].findIndex((error) => error <= most); // sorted by triangles
-  answer(best < 0 ? null : best, `a ${name} of at most ${spell(most)}; the least is ${spell(Math.min(...columns[measure]))}`);
+  const known = columns[measure].filter((error) => error !== null);
+  const best = columns[measure].findIndex((error) => error !== null && error <= most); // sorted by triangles
+  answer(best < 0 ? null : best, `a ${name} of at most ${spell(most)}; the least is ${spell(Math.min(...known))}`);
 });
 
 // ---------------------------------------------------------------------------------------------------- taking home

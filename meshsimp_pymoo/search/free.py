@@ -1,0 +1,463 @@
+"""Free meshes of all sizes: some rungs of a ladder are annealed freely, and what lies between is filled by collapses.
+
+A rung is a number of triangles. It begins as the Delaunay mesh of a subset, is annealed at its size (see
+:mod:`~meshsimp_pymoo.surface.free`) and then thinned down to the next smaller rung, again and again by the collapse
+that adds the least, with the loop that thins Delaunay meshes. Sizes that are wanted on the way down are measured where
+they are met. Rungs know nothing of each other, so that all threads have one each, and one that is finished stays.
+
+A free mesh is no function of a subset, so no objective is ever that of one: it is kept beside an individual, as
+``individual.get("free")``, and only where it is better than the mesh of the individual's own subset.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
+from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.plane.faces import canonical_faces, used_rows
+from meshsimp_pymoo.search.budgets import stopping
+from meshsimp_pymoo.search.greedy import Queue, begin_thinning, go_on_thinning, make_queue
+from meshsimp_pymoo.surface.free import USUAL_RATIO, take_numbers
+from meshsimp_pymoo.surface.measures import REGIONS, TRIANGLES, as_quality, measured
+from meshsimp_pymoo.surface.score import measured_angles
+from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
+from meshsimp_pymoo.workers import on_threads
+
+# Rungs of a ladder, and how many of them are annealed in one generation.
+RUNGS = 40
+ABREAST = 16
+# Models of more vertices are not searched before, only thinned, and are heated less: there is too little time for both.
+LARGE = 50_000
+# Temperature in the beginning, in units of the cost per vertex that may move, for others and for large ones; the share
+# of it that is left in the end; and the share of the moves, or of the time, that accept improvements only, after that.
+HOT, HOT_LARGE = 0.12, 0.05
+COOLING = 0.05
+TAIL = 0.1
+# The share of a budget for subsets, before the rungs.
+SUBSETS_SHARE = 0.3
+# Moves where there is no budget: in all, and at least and at most for each triangle of a rung. The last holds anyway:
+# nothing is gained beyond it, and small rungs leave their time to others.
+TOTAL_MOVES = 3e7
+LEAST_MOVES, MOST_MOVES = 40, 20_000
+# Samples in a triangle from which on looking at them takes most of a move's time.
+CROWD = 20.0
+# With a deadline: the share of a rung's time after which it looks at the clock and cools, moves before any is timed.
+PAUSE = 1 / 256
+FIRST_MOVES = 1000
+# Sizes between the rungs that are measured differ by this share, or by one triangle.
+STEP = 0.015
+# What thinning a rung takes for each of its triangles and for each sample, and measuring it for each sample [s].
+SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 4e-6, 4e-7, 2e-8
+
+# The column of a mesh's numbers behind those of evaluation.
+BETWEEN = REGIONS
+
+
+@dataclass(frozen=True, eq=False)
+class FreeFront:
+    """A free mesh, and those of it that were measured while it was thinned.
+
+    Attributes
+    ----------
+    faces : (M, 3) int32 array
+        Its triangles, as rows of the model's points.
+    removed, onto : (K,) int32 array
+        The vertices that collapsed, in their order, and which vertex each of them fell on.
+    collapses : (J,) int array
+        After how many collapses each mesh was measured, ascending; the first after none.
+    table : (J, 7) float array
+        The numbers of each, as evaluation fills them (see `surface.measures`), then its surface error; NaN where the
+        centroids of the original faces were no samples.
+    moves : int
+        Moves that were made before.
+    """
+
+    faces: IntArray
+    removed: IntArray
+    onto: IntArray
+    collapses: IntArray
+    table: FloatArray
+    moves: int
+
+    def faces_of(self, wanted: Sequence[int], n_vertices: int) -> Iterator[IntArray]:
+        """Yield the triangles of the measured meshes of these numbers, ascending; N vertices in all."""
+        target = np.arange(n_vertices)
+        faces, done = self.faces, 0
+        for row in wanted:
+            last = int(self.collapses[row])
+            steps = slice(done, last)
+            # from the last one on, as what a vertex falls on may collapse later
+            for v, w in zip(self.removed[steps][::-1].tolist(), self.onto[steps][::-1].tolist(), strict=True):
+                target[v] = target[w]
+            if last > done:
+                faces = target[faces]
+                a, b, c = faces.T
+                faces = canonical_faces(faces[(a != b) & (b != c) & (c != a)]).astype(np.int32)
+                target[self.removed[steps]] = self.removed[steps]
+            done = last
+            yield faces
+
+
+@entry
+def _thin(
+    freedom: Any,
+    books: Any,
+    n_all: int,
+    fixed: np.ndarray,
+    queue: Queue,
+    sizes: np.ndarray,
+    share: np.ndarray,
+    stop: np.ndarray,
+    removed: np.ndarray,
+    cost: np.ndarray,
+    triangles: np.ndarray,
+    collapses: np.ndarray,
+    table: np.ndarray,
+) -> tuple[int, int]:
+    """Thin a free mesh down to each of some sizes, descending, and measure what it is there.
+
+    ``share`` is that of each sample behind the vertices in the area. Returns how many vertices collapsed and how many
+    meshes were measured.
+    """
+    free = borrowed(freedom)
+    live = borrowed(books)
+    lent = borrowed(queue)
+    n_removed = 0
+    n_measured = 0
+    n = 0
+    if len(sizes) > 1:
+        n = begin_thinning(free, live, n_all, fixed, stop, lent, removed, cost, triangles)
+    for k in range(len(sizes)):
+        if k > 0:
+            n_removed, n = go_on_thinning(
+                free, live, sizes[k], np.inf, np.inf, stop, lent, n, n_removed, removed, cost, triangles
+            )
+            if stop[0] or n_removed == collapses[n_measured - 1]:
+                break
+        collapses[n_measured] = n_removed
+        take_numbers(free, live, share, table[n_measured])
+        n_measured += 1
+        if k > 0 and triangles[n_removed] > sizes[k]:
+            break
+    return n_removed, n_measured
+
+
+class FreeLadder:
+    """Free meshes on the rungs of a ladder, annealed some rungs at a time.
+
+    Parameters
+    ----------
+    min_height : float
+        Least height of the triangles that come, as a share of their longest edge; 0: any.
+    centroids : bool
+        Whether the centroids of the original faces are samples too, so that the meshes do not merely fit the vertices.
+
+    Attributes
+    ----------
+    sizes : (R,) int array
+        The most triangles of each rung, ascending.
+    offered : (Q,) int array
+        Sizes that are measured where they lie between two rungs, ascending.
+    planned : (R,) int array
+        The most moves of each rung.
+    fronts : dict of int to FreeFront
+        What was found, by rung.
+    """
+
+    def __init__(self, *, min_height: float = USUAL_RATIO, centroids: bool = True) -> None:
+        if not isinstance(min_height, (int, float, np.number)) or not 0.0 <= min_height <= MOST_HEIGHT:
+            raise ValueError(
+                f"min_height={min_height!r} is no share of a triangle's longest edge that all can have; give 0 to "
+                f"{MOST_HEIGHT}, such as {USUAL_RATIO}"
+            )
+        self.min_height = float(min_height)
+        self.centroids = bool(centroids)
+        self.sizes: IntArray = np.empty(0, np.int64)
+        self.offered: IntArray = np.empty(0, np.int64)
+        self.planned: IntArray = np.empty(0, np.int64)
+        self.seeds: IntArray = np.empty(0, np.int64)
+        self.fronts: dict[int, FreeFront] = {}
+
+    @property
+    def moves(self) -> int:
+        """Moves of the finished rungs."""
+        return sum(front.moves for front in self.fronts.values())
+
+    @property
+    def todo(self) -> list[int]:
+        """The rungs that are not finished, those first that are far apart."""
+        return [rung for rung in spread(len(self.sizes)) if rung not in self.fronts]
+
+    def begin(
+        self,
+        sizes: IntArray,
+        offered: IntArray,
+        n_samples: int,
+        random_state: np.random.Generator,
+        moves: int | None = None,
+    ) -> None:
+        """Set the rungs, and the moves of each where they are counted, so that about the same time goes to each.
+
+        Parameters
+        ----------
+        sizes, offered : int arrays
+            See the attributes.
+        n_samples : int
+            How many there are, in all.
+        random_state : numpy.random.Generator
+            Source of randomness.
+        moves : int, optional
+            How many there are for all rungs; by default as many as are usual.
+        """
+        self.sizes, self.offered, self.fronts = sizes, offered, {}
+        self.seeds = random_state.integers(1, 2**63 - 1, size=len(sizes))
+        most = MOST_MOVES * sizes
+        if moves is None:
+            usual = _shared(int(TOTAL_MOVES), sizes, n_samples, most)
+            self.planned = np.maximum(usual, LEAST_MOVES * sizes)
+        else:
+            self.planned = _shared(moves, sizes, n_samples, most)
+
+    def go_on(
+        self,
+        surface: Surface,
+        subset_of: Callable[[int], BoolArray],
+        *,
+        seconds: float | None = None,
+        most: int = ABREAST,
+    ) -> None:
+        """Anneal and thin the next rungs on all threads.
+
+        Parameters
+        ----------
+        surface : Surface
+            What they are meshes of.
+        subset_of : callable
+            Returns the subset (N,) that a rung begins with.
+        seconds : float, optional
+            All that are left, for all rungs that are left; the result then depends on the machine.
+        most : int
+            How many at most.
+        """
+        ground = freedom_of(surface, "free meshes", centroids=self.centroids)
+        todo = self.todo
+        now, later = todo[:most], todo[most:]
+        n_threads = os.cpu_count() or 1
+        # what can be done one after the other, by this generation and by those after it
+        rounds = sum(-(-len(later[k : k + most]) // n_threads) for k in range(0, len(later), most))
+        # the second entry is set by Ctrl-C alone
+        stop = np.zeros(2, np.bool_)
+        waiting = len(now)
+
+        def work(rung: int) -> None:
+            nonlocal waiting
+            share = None
+            if limit is not None:
+                share = (limit - time.perf_counter()) / (rounds + -(-waiting // n_threads))
+            waiting -= 1
+            front = self._found(ground, surface, subset_of(rung), rung, share, stop)
+            if front is not None:
+                self.fronts[rung] = front
+
+        if not self.fronts and now:  # compiling is not their time
+            on_threads(lambda rung: self._compile(ground, surface, subset_of(rung)), now[:1])
+        limit = None if seconds is None else time.perf_counter() + seconds
+        with stopping(stop[:1], seconds):
+            on_threads(work, now, stop=stop)
+
+    def _compile(self, ground: Any, surface: Surface, kept: BoolArray) -> None:
+        """Call what is compiled, so that it is, without doing anything."""
+        with ground.triangulation(kept, min_height=self.min_height) as mesh:
+            mesh.anneal(0, np.ones(1, np.uint64), hot=0.0, cold=0.0, triangles=0)
+            _thinned(mesh, surface, ground.share, np.zeros(2, np.int64), np.ones(1, np.bool_))
+
+    def _found(
+        self, ground: Any, surface: Surface, kept: BoolArray, rung: int, seconds: float | None, stop: BoolArray
+    ) -> FreeFront | None:
+        """Return what is found on a rung; None where it was stopped before it was annealed."""
+        begun = time.perf_counter()
+        sizes = self._wanted(rung)
+        n_samples = surface.n_vertices + len(ground.share)
+        if seconds is not None:
+            size = int(self.sizes[rung])
+            seconds -= SECONDS_A_TRIANGLE * size + (SECONDS_A_SAMPLE + MEASURING * len(sizes)) * n_samples
+        if stop[0]:
+            return None
+        with ground.triangulation(kept, min_height=self.min_height) as mesh:
+            until = None if seconds is None else begun + seconds
+            is_large = surface.n_vertices > LARGE
+            moves = _anneal(mesh, sizes[0], self.seeds[rung], self.planned[rung], until, is_large, stop)
+            if moves is None:
+                return None
+            faces = mesh.faces.astype(np.int32)
+            removed, onto, collapses, table = _thinned(mesh, surface, ground.share, sizes, stop)
+        return None if stop[1:].any() else FreeFront(faces, removed, onto, collapses, table, moves)
+
+    def _wanted(self, rung: int) -> IntArray:
+        """Return the sizes that a rung is measured at, its own first, down to the next smaller one.
+
+        Collapses inside the mesh take two triangles away. Where that matters it goes on to the one after that, which
+        leaves no gap if they are odd and even in turn.
+        """
+        size = self.sizes[rung]
+        below = self.sizes[max(rung - (1 + (size * STEP < 1.0)), 0)]
+        between = self.offered[(self.offered < size) & (self.offered > below)]
+        return np.concatenate([[size], between[::-1], [below] * (below < size)]).astype(np.int64)
+
+    # ------------------------------------------------------------------------------------------- what comes out of it
+
+    def best_of(
+        self,
+        surface: Surface,
+        measure: str,
+        triangles: IntArray,
+        error: FloatArray,
+        surface_error: FloatArray | None = None,
+    ) -> list[FreeMesh | None]:
+        """Return for each of some meshes the free one of least error that is better and not larger; None: there is none.
+
+        Parameters
+        ----------
+        surface : Surface
+            Of all these meshes.
+        measure : str
+            Which error is meant.
+        triangles, error : (P,) arrays
+            Of the meshes.
+        surface_error : (P,) float array, optional
+            Of the meshes, if it must not be higher.
+        """
+        rows = [(rung, row) for rung in sorted(self.fronts) for row in range(len(self.fronts[rung].table))]
+        if not rows:
+            return [None] * len(triangles)
+        table = np.concatenate([self.fronts[rung].table for rung in sorted(self.fronts)])
+        errors = measured(table, measure, surface.total_weight)
+        order = np.lexsort((table[:, TRIANGLES], errors))
+        chosen = np.full(len(triangles), -1)
+        for k in range(len(triangles)):
+            fits = (table[order, TRIANGLES] <= triangles[k]) & (errors[order] < error[k])
+            if surface_error is not None:
+                fits &= table[order, BETWEEN] <= surface_error[k]
+            if fits.any():
+                chosen[k] = order[np.argmax(fits)]
+        by_rung: dict[int, list[int]] = {}
+        for place in np.unique(chosen[chosen >= 0]).tolist():
+            by_rung.setdefault(rows[place][0], []).append(place)
+
+        def meshes_of(rung: int) -> dict[int, FreeMesh]:
+            places = by_rung[rung]
+            faces = self.fronts[rung].faces_of([rows[place][1] for place in places], surface.n_vertices)
+            return {place: _mesh(surface, own, table[place]) for place, own in zip(places, faces, strict=True)}
+
+        found: dict[int, FreeMesh] = {}
+        for meshes in on_threads(meshes_of, by_rung):
+            found |= meshes
+        return [found.get(int(place)) for place in chosen]
+
+
+def ladder(low: int, high: int, n: int = RUNGS) -> IntArray:
+    """Return about n numbers of triangles from ``low`` to ``high``, geometric, odd and even in turn.
+
+    Examples
+    --------
+    >>> ladder(2, 60, 6).tolist()
+    [2, 5, 8, 15, 30, 61]
+    """
+    sizes = np.unique(np.round(np.geomspace(low, high, n)).astype(np.int64))
+    return np.unique(sizes + (sizes - sizes[0] + np.arange(len(sizes))) % 2)
+
+
+def steps_between(low: int, high: int) -> IntArray:
+    """Return numbers of triangles from ``low`` to ``high`` that differ by `STEP`, or by 1.
+
+    Examples
+    --------
+    >>> steps_between(2, 6).tolist(), steps_between(1000, 1050).tolist()
+    ([2, 3, 4, 5, 6], [1000, 1016, 1033, 1050])
+    """
+    n = int(np.ceil(np.log(high / low) / np.log1p(STEP))) + 1
+    return np.unique(np.round(np.geomspace(low, high, n)).astype(np.int64))
+
+
+def _shared(moves: int, sizes: IntArray, n_samples: int, most: IntArray) -> IntArray:
+    """Divide moves among rungs so that each takes the same time, and none makes more than its most."""
+    pace = 1.0 / (1.0 + n_samples / (CROWD * sizes))
+    shares = np.zeros(len(sizes), np.int64)
+    left, of = moves, float(pace.sum())
+    # the smallest first, whose most is the least: what they leave is for the others
+    for rung in np.argsort(sizes, kind="stable"):
+        shares[rung] = min(round(left * (pace[rung] / of)), int(most[rung]))
+        left, of = left - int(shares[rung]), of - pace[rung]
+    return shares
+
+
+def _anneal(
+    mesh: Any, size: int, seed: int, most: int, until: float | None, is_large: bool, stop: BoolArray
+) -> int | None:
+    """Anneal a mesh at a number of triangles; return the moves that were made, None where it was stopped on its way."""
+    state = np.array([seed], np.uint64)
+    size, most = int(size), int(most)
+    hot = (HOT_LARGE if is_large else HOT) * mesh.cost / max(mesh.movable, 1)
+    if until is None:
+        last = round(TAIL * most)
+        made = mesh.anneal(most - last, state, hot=hot, cold=COOLING * hot, triangles=size, stop=stop)
+        made += mesh.anneal(last, state, hot=0.0, cold=0.0, triangles=size, stop=stop)
+        return None if stop[0] else int(made)
+    begun = time.perf_counter()
+    span = max(until - begun, 1e-9)
+    made, share = 0, 0.0
+    while share < 1.0:
+        now = 0.0 if share > 1.0 - TAIL else hot * COOLING ** (share / (1.0 - TAIL))
+        n = FIRST_MOVES if made == 0 else int(np.clip(PAUSE * made / share, 64, most - made))
+        made += mesh.anneal(n, state, hot=now, cold=now, triangles=size, stop=stop)
+        if stop[0]:
+            return None
+        share = max((time.perf_counter() - begun) / span, made / max(most, 1))
+    return made
+
+
+def _thinned(
+    mesh: Any, surface: Surface, share: FloatArray, sizes: IntArray, stop: BoolArray
+) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+    """Thin a mesh to these sizes; return the vertices that collapsed and what they fell on, and what was measured."""
+    n = mesh.movable + 1
+    removed, cost, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
+    collapses, table = np.zeros(len(sizes), np.int64), np.full((len(sizes), REGIONS + 1), np.nan)
+    n_removed, n_measured = _thin(
+        mesh.freedom,
+        mesh.books,
+        surface.n_vertices,
+        surface.pinned,
+        make_queue(surface.n_vertices if len(sizes) > 1 else 0),
+        sizes,
+        share,
+        stop,
+        removed,
+        cost,
+        triangles,
+        collapses,
+        table,
+    )
+    removed = removed[:n_removed].copy()
+    return removed, mesh.freedom.onto[removed], collapses[:n_measured].copy(), table[:n_measured].copy()
+
+
+def _mesh(surface: Surface, faces: IntArray, row: FloatArray) -> FreeMesh:
+    """Return a free mesh with its numbers."""
+    kept = surface.pinned.copy()
+    kept[used_rows(faces)[0]] = True
+    quality = as_quality(
+        row[:REGIONS],
+        surface.total_weight,
+        surface_error=float(row[BETWEEN]),
+        **measured_angles(surface.points[:, :2], faces),
+    )
+    return FreeMesh(kept, faces, quality)
