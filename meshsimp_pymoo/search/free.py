@@ -24,7 +24,7 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.faces import canonical_faces, used_rows
 from meshsimp_pymoo.search.budgets import stopping
-from meshsimp_pymoo.search.greedy import Queue, begin_thinning, go_on_thinning, make_queue
+from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.surface.free import USUAL_RATIO, take_numbers
 from meshsimp_pymoo.surface.measures import REGIONS, TRIANGLES, as_quality, measured
 from meshsimp_pymoo.surface.score import measured_angles
@@ -57,6 +57,8 @@ STEP = 0.015
 # What thinning a rung takes for each of its triangles and for each sample, and measuring it for each sample [s].
 SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 4e-6, 4e-7, 2e-8
 
+# The least height of all triangles is at most this share of their longest edge: that of half a square.
+MOST_HEIGHT = 0.5
 # The column of a mesh's numbers behind those of evaluation.
 BETWEEN = REGIONS
 
@@ -112,7 +114,6 @@ def _thin(
     books: Any,
     n_all: int,
     fixed: np.ndarray,
-    queue: Queue,
     sizes: np.ndarray,
     share: np.ndarray,
     stop: np.ndarray,
@@ -129,16 +130,16 @@ def _thin(
     """
     free = borrowed(freedom)
     live = borrowed(books)
-    lent = borrowed(queue)
+    queue = make_queue(n_all)
     n_removed = 0
     n_measured = 0
     n = 0
     if len(sizes) > 1:
-        n = begin_thinning(free, live, n_all, fixed, stop, lent, removed, cost, triangles)
+        n = begin_thinning(free, live, n_all, fixed, stop, queue, cost, triangles)
     for k in range(len(sizes)):
         if k > 0:
             n_removed, n = go_on_thinning(
-                free, live, sizes[k], np.inf, np.inf, stop, lent, n, n_removed, removed, cost, triangles
+                free, live, sizes[k], np.inf, np.inf, stop, queue, n, n_removed, removed, cost, triangles
             )
             if stop[0] or n_removed == collapses[n_measured - 1]:
                 break
@@ -173,7 +174,8 @@ class FreeLadder:
     """
 
     def __init__(self, *, min_height: float = USUAL_RATIO, centroids: bool = True) -> None:
-        if not isinstance(min_height, (int, float, np.number)) or not 0.0 <= min_height <= MOST_HEIGHT:
+        given: Any = min_height
+        if not isinstance(given, (int, float, np.number)) or not 0.0 <= given <= MOST_HEIGHT:
             raise ValueError(
                 f"min_height={min_height!r} is no share of a triangle's longest edge that all can have; give 0 to "
                 f"{MOST_HEIGHT}, such as {USUAL_RATIO}"
@@ -310,7 +312,7 @@ class FreeLadder:
         size = self.sizes[rung]
         below = self.sizes[max(rung - (1 + (size * STEP < 1.0)), 0)]
         between = self.offered[(self.offered < size) & (self.offered > below)]
-        return np.concatenate([[size], between[::-1], [below] * (below < size)]).astype(np.int64)
+        return np.concatenate([[size], between[::-1], [below] if below < size else []]).astype(np.int64)
 
     # ------------------------------------------------------------------------------------------- what comes out of it
 
@@ -322,7 +324,7 @@ class FreeLadder:
         error: FloatArray,
         surface_error: FloatArray | None = None,
     ) -> list[FreeMesh | None]:
-        """Return for each of some meshes the free one of least error that is better and not larger; None: there is none.
+        """Return for each of some meshes the free one of least error that is better and not larger, or None.
 
         Parameters
         ----------
@@ -428,7 +430,7 @@ def _thinned(
     mesh: Any, surface: Surface, share: FloatArray, sizes: IntArray, stop: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
     """Thin a mesh to these sizes; return the vertices that collapsed and what they fell on, and what was measured."""
-    n = mesh.movable + 1
+    n = surface.n_vertices
     removed, cost, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
     collapses, table = np.zeros(len(sizes), np.int64), np.full((len(sizes), REGIONS + 1), np.nan)
     n_removed, n_measured = _thin(
@@ -436,7 +438,6 @@ def _thinned(
         mesh.books,
         surface.n_vertices,
         surface.pinned,
-        make_queue(surface.n_vertices if len(sizes) > 1 else 0),
         sizes,
         share,
         stop,

@@ -18,7 +18,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -324,54 +324,42 @@ def _cost_again(g: Any, live: Any, v: int, key: np.ndarray, patience: np.ndarray
     patience[v] = np.int64(PATIENCE * cells) if cells > HUB else 0
 
 
-@entry
-def thin(
-    ground: Any,
-    books: Any,
+class Queue(NamedTuple):
+    """The sites that may go, the one that adds the least first: room for N of them."""
+
+    key: np.ndarray  # (2 N,) two of each, see moves.ranked
+    heap: np.ndarray  # (N,)
+    at: np.ndarray  # (N,) where each is in the heap, -1: nowhere
+    # how many removals beside a hub are left before it is costed again; below 0 once there was one
+    patience: np.ndarray  # (N,)
+    around: np.ndarray  # (2 N + 8,) scratch
+
+
+@inner
+def make_queue(n_all: int) -> Queue:
+    """Return room for a thinning of n_all vertices."""
+    return Queue(
+        np.empty(2 * n_all, np.float64),
+        np.empty(n_all, np.int32),
+        np.empty(n_all, np.int32),
+        np.zeros(n_all, np.int32),
+        np.empty(2 * n_all + 8, np.int64),
+    )
+
+
+@inner
+def begin_thinning(
+    g: Any,
+    live: Any,
     n_all: int,
     fixed: np.ndarray,
-    least: int,
-    limit: float,
-    most: float,
     stop: np.ndarray,
-    removed: np.ndarray,
+    queue: Queue,
     error: np.ndarray,
     triangles: np.ndarray,
 ) -> int:
-    """Remove the vertex that adds the least while that is at most ``limit`` and triangles exceed ``least``.
-
-    The sites around one that went are costed again, exactly. Two kinds may cost something else than is known: one of
-    more than ``HUB`` cells, which is costed again when it comes to the top of the heap or ``PATIENCE`` of its cells
-    have seen a removal, as doing so after each would take the square of its cells; and one beside an outline that has
-    changed elsewhere, so that what no triangle covers is near to something else. The errors are exact in any case.
-
-    Parameters
-    ----------
-    ground, books : records
-        Of a surface of ``n_all`` vertices; the books end at the last mesh.
-    fixed : (n_all,) bool array
-        Sites that stay.
-    most : float
-        It ends before the error, as `moves.error_now` has it, exceeds this.
-    stop : (1,) bool array
-        Ends it where another thread sets it.
-    removed : (n,) int array
-        Filled with the vertices removed, in their order; n is the number of sites that are not fixed.
-    error, triangles : (n + 1,) arrays
-        Filled with the error and the number of triangles before the first removal and after each.
-
-    Returns
-    -------
-    int
-        How many were removed.
-    """
-    g = borrowed(ground)
-    live = borrowed(books)
-    key = np.empty(2 * n_all, np.float64)  # two of each, see moves.ranked
-    heap = np.empty(n_all, np.int32)
-    at = np.empty(n_all, np.int32)
-    # How many removals beside a hub are left before it is costed again; below 0 once there was one.
-    patience = np.zeros(n_all, np.int32)
+    """Cost all sites that are not fixed, note what there is before the first removal, return how many may go."""
+    key, heap, at = queue.key, queue.heap, queue.at
     n = 0
     for v in range(n_all):
         if stop[0]:
@@ -379,17 +367,35 @@ def thin(
             break
         at[v] = -1
         if is_site(g, live, v) and not fixed[v]:
-            _cost_again(g, live, v, key, patience)
+            _cost_again(g, live, v, key, queue.patience)
             heap[n] = v
             at[v] = n
             n += 1
     _make_heap(heap, at, key, n)
     error[0] = error_now(g, live)
     triangles[0] = n_triangles(g, live)
-    n_removed = 0
-    is_fresh = True  # whether all sites were costed since the last removal
+    return n
+
+
+@inner
+def go_on_thinning(
+    g: Any,
+    live: Any,
+    least: int,
+    limit: float,
+    most: float,
+    stop: np.ndarray,
+    queue: Queue,
+    n: int,
+    n_removed: int,
+    removed: np.ndarray,
+    error: np.ndarray,
+    triangles: np.ndarray,
+) -> tuple[int, int]:
+    """Go on with :func:`thin` where n may go and ``n_removed`` went; return how many went and may go then."""
+    key, heap, at, patience, around = queue.key, queue.heap, queue.at, queue.patience, queue.around
+    is_fresh = n_removed == 0  # whether all sites were costed since the last removal
     n_passes = 0
-    around = np.empty(2 * n_all + 8, np.int64)
     while n > 0 and triangles[n_removed] > least and not stop[0]:
         v = heap[0]
         if patience[v] < 0:
@@ -456,6 +462,55 @@ def thin(
             _cost_again(g, live, w, key, patience)
             _sift_up(heap, at, key, at[w])
             _sift_down(heap, at, key, at[w], n)
+    return n_removed, n
+
+
+@entry
+def thin(
+    ground: Any,
+    books: Any,
+    n_all: int,
+    fixed: np.ndarray,
+    least: int,
+    limit: float,
+    most: float,
+    stop: np.ndarray,
+    removed: np.ndarray,
+    error: np.ndarray,
+    triangles: np.ndarray,
+) -> int:
+    """Remove the vertex that adds the least while that is at most ``limit`` and triangles exceed ``least``.
+
+    The sites around one that went are costed again, exactly. Two kinds may cost something else than is known: one of
+    more than ``HUB`` cells, which is costed again when it comes to the top of the heap or ``PATIENCE`` of its cells
+    have seen a removal, as doing so after each would take the square of its cells; and one beside an outline that has
+    changed elsewhere, so that what no triangle covers is near to something else. The errors are exact in any case.
+
+    Parameters
+    ----------
+    ground, books : records
+        Of a surface of ``n_all`` vertices; the books end at the last mesh.
+    fixed : (n_all,) bool array
+        Sites that stay.
+    most : float
+        It ends before the error, as `moves.error_now` has it, exceeds this.
+    stop : (1,) bool array
+        Ends it where another thread sets it.
+    removed : (n,) int array
+        Filled with the vertices removed, in their order; n is the number of sites that are not fixed.
+    error, triangles : (n + 1,) arrays
+        Filled with the error and the number of triangles before the first removal and after each.
+
+    Returns
+    -------
+    int
+        How many were removed.
+    """
+    g = borrowed(ground)
+    live = borrowed(books)
+    queue = make_queue(n_all)
+    n = begin_thinning(g, live, n_all, fixed, stop, queue, error, triangles)
+    n_removed, _ = go_on_thinning(g, live, least, limit, most, stop, queue, n, 0, removed, error, triangles)
     return n_removed
 
 

@@ -75,11 +75,9 @@ def deviation_in(xy: np.ndarray, z: np.ndarray, a: int, b: int, c: int, i: int) 
     return abs(((area - wb - wc) * z[a] + wb * z[b] + wc * z[c]) / area - z[i])
 
 
-@inner
-def bare_deviation(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> float:
-    """d_p of a vertex i that no triangle covers; nearest is the side a-b of (a, b, c), at the squared distance gap."""
-    xy = g.xy
-    z = g.z
+@inner(inline=True)
+def _shares_in(xy: np.ndarray, a: int, b: int, c: int, i: int) -> tuple[float, float, float]:
+    """Barycentric coordinates of vertex i in triangle (a, b, c)."""
     ux = xy[2 * b] - xy[2 * a]
     uy = xy[2 * b + 1] - xy[2 * a + 1]
     vx = xy[2 * c] - xy[2 * a]
@@ -89,11 +87,30 @@ def bare_deviation(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> flo
     area = ux * vy - uy * vx
     wb = (dx * vy - dy * vx) / area
     wc = (dy * ux - dx * uy) / area
-    wa = 1.0 - wb - wc
+    return 1.0 - wb - wc, wb, wc
+
+
+@inner(inline=True)
+def is_hardly_bare(xy: np.ndarray, a: int, b: int, c: int, i: int, gap: float) -> bool:
+    """Whether (a, b, c), to whose side a-b vertex i has the squared distance gap, covers it but for rounding."""
+    wa, wb, wc = _shares_in(xy, a, b, c, i)
+    return gap <= REACH * REACH and wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
+
+
+@inner
+def bare_deviation(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> float:
+    """d_p of a vertex i that no triangle covers; nearest is the side a-b of (a, b, c), at the squared distance gap."""
+    xy = g.xy
+    z = g.z
     d = 0.0
-    if gap <= REACH * REACH and wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE:
+    if is_hardly_bare(xy, a, b, c, i, gap):
+        wa, wb, wc = _shares_in(xy, a, b, c, i)
         d = abs(wa * z[a] + wb * z[b] + wc * z[c] - z[i])
     elif g.nearest:
+        ux = xy[2 * b] - xy[2 * a]
+        uy = xy[2 * b + 1] - xy[2 * a + 1]
+        dx = xy[2 * i] - xy[2 * a]
+        dy = xy[2 * i + 1] - xy[2 * a + 1]
         u = min(max((dx * ux + dy * uy) / (ux * ux + uy * uy), 0.0), 1.0)
         ex = u * ux - dx
         ey = u * uy - dy

@@ -30,6 +30,7 @@ from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.plane.stars import turn
 from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE
 from meshsimp_pymoo.surface import moves
+from meshsimp_pymoo.surface.bare import corners_of
 from meshsimp_pymoo.surface.books import (
     BARE_ERROR,
     COVERED,
@@ -38,13 +39,14 @@ from meshsimp_pymoo.surface.books import (
     END,
     N_EMITTED,
     N_THIN,
+    NONE,
     PLAIN,
     SEGMENT,
     Live,
     make_live,
 )
 from meshsimp_pymoo.surface.centroids import centroids_of, with_centroids
-from meshsimp_pymoo.surface.costs import deviation_in
+from meshsimp_pymoo.surface.costs import bare_deviation, deviation_in, is_hardly_bare
 from meshsimp_pymoo.surface.fans import (
     N_CAVITY,
     N_RING,
@@ -70,6 +72,15 @@ from meshsimp_pymoo.surface.fans import (
 )
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.live import build, retake
+from meshsimp_pymoo.surface.measures import (
+    ERROR,
+    MAXIMUM,
+    REGIONS,
+    SQUARES,
+    TRIANGLES,
+    UNCOVERED,
+    VERTICES,
+)
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.moves import answers
 from meshsimp_pymoo.surface.rules import Rules
@@ -527,6 +538,47 @@ def anneal_freely(
     return moves
 
 
+@inner
+def take_numbers(free: Freedom, live: Live, share: np.ndarray, row: np.ndarray) -> None:
+    """Fill a row (7,) with what is said of the mesh: the columns of `measures`, then its surface error.
+
+    ``share`` is the share in the area of each sample behind the vertices, whose deviations make the last; without any
+    it is not a number.
+    """
+    g = free.ground
+    mesh = live.mesh
+    n = free.n_vertices
+    for k in range(REGIONS + 1):
+        row[k] = 0.0
+    row[TRIANGLES] = live.tally[N_EMITTED]
+    for i in range(n + len(share)):
+        d = 0.0
+        if live.bare[i] != COVERED:
+            h = np.int64(live.bare_segment[i])
+            is_bare = True
+            if h != NONE:
+                a, b, c = corners_of(mesh, h)
+                d = bare_deviation(g, a, b, c, i, live.bare_gap[i])
+                is_bare = not is_hardly_bare(g.xy, a, b, c, i, live.bare_gap[i])
+            if i < n and is_bare:
+                row[UNCOVERED] += 1.0
+        elif i < n and live.site[i]:
+            row[VERTICES] += 1.0
+        else:
+            t = np.int64(live.place[i])
+            d = deviation_in(g.xy, g.z, mesh[t], mesh[t + 1], mesh[t + 2], i)
+        if i >= n:
+            row[REGIONS] += share[i - n] * d
+            continue
+        w = free.points[i, 3]
+        row[ERROR] += w * d
+        row[SQUARES] += w * d * d
+        if w > 0.0:
+            row[MAXIMUM] = max(row[MAXIMUM], d)
+    if len(share) == 0:
+        row[REGIONS] = np.nan
+
+
 # ------------------------------------------------------------------------------- thinning: answers to `surface.moves`
 
 
@@ -686,6 +738,7 @@ class FreeGround:
     ) -> None:
         n = model.n_vertices
         weights = np.ones(n) if model.weights is None else model.weights
+        share = np.empty(0)
         if centroids:
             ground, share = with_centroids(ground, model)
             corners = model.faces[centroids_of(model)[3]]
@@ -704,6 +757,8 @@ class FreeGround:
         both = on_border[start] & on_border[indices]
         self.name = model.name
         self.pinned = pinned
+        #: Share of each sample behind the vertices in the area (K,): those of the centroids, or none.
+        self.share = share
         self._sites = sites
         self._freedom = Freedom(
             ground=ground._replace(

@@ -200,6 +200,9 @@ class GridSurface:
     def ground(self) -> None:
         """Return that meshes are evaluated here, but not moved."""
 
+    def free_ground(self, *, centroids: bool) -> None:
+        """Return that meshes of tiles are Delaunay."""
+
     def measuring(self, measure: str) -> Surface:
         """Refuse, as :meth:`ground` says."""
         raise self._no_moves()

@@ -311,6 +311,10 @@ class Surface(Protocol):
         """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
         ...
 
+    def free_ground(self, *, centroids: bool) -> Any | None:
+        """Return what free meshes have in common (see `surface.free`); None where there are none."""
+        ...
+
     def measuring(self, measure: str) -> Surface:
         """Return this surface with another measure of the error for moves, or itself where it is that one."""
         ...
@@ -453,6 +457,27 @@ def movable_ground(surface: Surface, who: str) -> Any:
         raise ValueError(
             f"{who} move vertices by compiled moves, which a {type(surface).__name__} does not have; use an algorithm "
             "that only evaluates, such as nsga2_v1()"
+        )
+    return ground
+
+
+def freedom_of(surface: Surface, who: str, *, centroids: bool) -> Any:
+    """Return what the free meshes of a surface have in common, for somebody who makes some.
+
+    Raises
+    ------
+    TypeError
+        If this is no surface but a model, which has no rules.
+    ValueError
+        If it has none.
+    """
+    require_rules(surface, who)
+    ask = getattr(surface, "free_ground", None)  # a surface of another kind need not know of them
+    ground = None if ask is None else ask(centroids=centroids)
+    if ground is None:
+        raise ValueError(
+            f"{who} are made by moves of edges, which a {type(surface).__name__} does not have; its meshes follow from "
+            "their vertices alone"
         )
     return ground
 
