@@ -200,33 +200,39 @@ class FreeLadder:
 
     def begin(
         self,
+        surface: Surface,
         sizes: IntArray,
         offered: IntArray,
-        n_samples: int,
         random_state: np.random.Generator,
+        *,
         moves: int | None = None,
+        timed: bool = False,
     ) -> None:
-        """Set the rungs, and the moves of each where they are counted, so that about the same time goes to each.
+        """Set the rungs and the most moves of each, which take about the same time on all of them.
 
         Parameters
         ----------
+        surface : Surface
+            What they are meshes of.
         sizes, offered : int arrays
             See the attributes.
-        n_samples : int
-            How many there are, in all.
         random_state : numpy.random.Generator
             Source of randomness.
         moves : int, optional
             How many there are for all rungs; by default as many as are usual.
+        timed : bool
+            Whether time ends them, too: then by default as many as anything is gained by.
         """
+        n_samples = surface.n_vertices + len(freedom_of(surface, "free meshes", centroids=self.centroids).share)
         self.sizes, self.offered, self.fronts = sizes, offered, {}
         self.seeds = random_state.integers(1, 2**63 - 1, size=len(sizes))
         most = MOST_MOVES * sizes
-        if moves is None:
-            usual = _shared(int(TOTAL_MOVES), sizes, n_samples, most)
-            self.planned = np.maximum(usual, LEAST_MOVES * sizes)
-        else:
+        if moves is not None:
             self.planned = _shared(moves, sizes, n_samples, most)
+        elif timed:
+            self.planned = most
+        else:
+            self.planned = np.maximum(_shared(int(TOTAL_MOVES), sizes, n_samples, most), LEAST_MOVES * sizes)
 
     def go_on(
         self,
@@ -319,20 +325,20 @@ class FreeLadder:
     def best_of(
         self,
         surface: Surface,
-        measure: str,
+        measures: Sequence[str],
         triangles: IntArray,
-        error: FloatArray,
+        errors: FloatArray,
         surface_error: FloatArray | None = None,
     ) -> list[FreeMesh | None]:
-        """Return for each of some meshes the free one of least error that is better and not larger, or None.
+        """Return for each of some meshes the best free one that is no larger, and better; None where there is none.
 
         Parameters
         ----------
         surface : Surface
             Of all these meshes.
-        measure : str
-            Which error is meant.
-        triangles, error : (P,) arrays
+        measures : sequence of str
+            Which errors are meant: the first must be lower and decides, the others must not be higher.
+        triangles, errors : (P,) and (P, k) arrays
             Of the meshes.
         surface_error : (P,) float array, optional
             Of the meshes, if it must not be higher.
@@ -341,13 +347,14 @@ class FreeLadder:
         if not rows:
             return [None] * len(triangles)
         table = np.concatenate([self.fronts[rung].table for rung in sorted(self.fronts)])
-        errors = measured(table, measure, surface.total_weight)
-        order = np.lexsort((table[:, TRIANGLES], errors))
+        own = np.column_stack([measured(table, name, surface.total_weight) for name in measures])
+        order = np.lexsort((table[:, TRIANGLES], own[:, 0]))
+        own, sizes, between = own[order], table[order, TRIANGLES], table[order, BETWEEN]
         chosen = np.full(len(triangles), -1)
         for k in range(len(triangles)):
-            fits = (table[order, TRIANGLES] <= triangles[k]) & (errors[order] < error[k])
+            fits = (sizes <= triangles[k]) & (own[:, 0] < errors[k, 0]) & (own <= errors[k]).all(axis=1)
             if surface_error is not None:
-                fits &= table[order, BETWEEN] <= surface_error[k]
+                fits &= between <= surface_error[k]
             if fits.any():
                 chosen[k] = order[np.argmax(fits)]
         by_rung: dict[int, list[int]] = {}
@@ -365,12 +372,12 @@ class FreeLadder:
         return [found.get(int(place)) for place in chosen]
 
 
-def ladder(low: int, high: int, n: int = RUNGS) -> IntArray:
+def ladder_of(low: int, high: int, n: int = RUNGS) -> IntArray:
     """Return about n numbers of triangles from ``low`` to ``high``, geometric, odd and even in turn.
 
     Examples
     --------
-    >>> ladder(2, 60, 6).tolist()
+    >>> ladder_of(2, 60, 6).tolist()
     [2, 5, 8, 15, 30, 61]
     """
     sizes = np.unique(np.round(np.geomspace(low, high, n)).astype(np.int64))
@@ -387,6 +394,26 @@ def steps_between(low: int, high: int) -> IntArray:
     """
     n = int(np.ceil(np.log(high / low) / np.log1p(STEP))) + 1
     return np.unique(np.round(np.geomspace(low, high, n)).astype(np.int64))
+
+
+def surface_errors(surface: Surface, X: BoolArray, triangles: IntArray, *, until: float | None = None) -> FloatArray:
+    """Return the surface error of subsets (P, N) with these numbers of triangles (P,).
+
+    Those that are not begun by ``perf_counter() = until`` count as the next larger one that was; they are spread over
+    all.
+    """
+    order = np.argsort(-np.asarray(triangles), kind="stable")
+    found = np.full(len(X), np.nan)
+
+    def measure(place: int) -> None:
+        if until is None or time.perf_counter() < until:
+            found[place] = surface.simplify(X[order[place]] | surface.pinned).quality.surface_error
+
+    on_threads(measure, spread(len(X)))
+    known = np.maximum.accumulate(np.where(np.isnan(found), -1, np.arange(len(X))))
+    errors = np.empty(len(X))
+    errors[order] = np.where(known < 0, 0.0, found[known])
+    return errors
 
 
 def _shared(moves: int, sizes: IntArray, n_samples: int, most: IntArray) -> IntArray:
