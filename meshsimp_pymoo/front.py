@@ -1158,11 +1158,9 @@ class Freeing:
         meshes = ladder.best_of(surface, (*names, *others), triangles, errors[rows], between)
         if self.wish and len(rows) == len(before):
             meshes.append(ladder.wished(surface, names[0], self.wish))
-        found = [(mesh.quality, mesh.kept, mesh.faces) for mesh in meshes if mesh is not None]
-        is_own = [mesh is None for mesh in meshes[: len(before)]]
-        found += [
-            own for own, stays in zip(zip(quality, kept, before.faces, strict=True), is_own, strict=True) if stays
-        ]
+        found: list[tuple[Quality, BoolArray, IntArray | None]] = []
+        found += [(mesh.quality, mesh.kept, mesh.faces) for mesh in meshes if mesh is not None]
+        found += [(quality[row], kept[row], before.faces[row]) for row in range(len(before)) if meshes[row] is None]
         F = _objectives([q for q, _, _ in found], before.objectives)
         missed = [float(shortfall(asdict(q), others)) for q, _, _ in found]
         best = _best_rows(np.column_stack([F, missed]), [q for q, _, _ in found])
