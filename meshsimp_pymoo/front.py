@@ -52,7 +52,6 @@ from meshsimp_pymoo.storage import (
     write_front,
     write_solution,
 )
-from meshsimp_pymoo.surface.free import USUAL_RATIO
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import (
@@ -69,7 +68,7 @@ from meshsimp_pymoo.surface.measures import (
     quality_of,
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
-from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
     Refitted,

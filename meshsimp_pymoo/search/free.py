@@ -26,8 +26,9 @@ from meshsimp_pymoo.plane.faces import canonical_faces, used_rows
 from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
-from meshsimp_pymoo.surface.free import USUAL_RATIO, take_numbers
+from meshsimp_pymoo.surface.free import take_numbers
 from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_quality
+from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
 from meshsimp_pymoo.workers import on_threads
@@ -65,8 +66,6 @@ N_OTHERS, OTHERS_SHARE = 8, 0.15
 # What thinning a rung takes for each of its triangles and for each sample, and measuring it for each sample [s].
 SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 4e-6, 4e-7, 2e-8
 
-# The least height of all triangles is at most this share of their longest edge: that of half a square.
-MOST_HEIGHT = 0.5
 # The column of a mesh's numbers behind those of evaluation.
 BETWEEN = REGIONS
 
@@ -185,10 +184,10 @@ class FreeLadder:
 
     def __init__(self, *, min_height: float = USUAL_RATIO, centroids: bool = True) -> None:
         given: Any = min_height
-        if not isinstance(given, (int, float, np.number)) or not 0.0 <= given <= MOST_HEIGHT:
+        if not isinstance(given, (int, float, np.number)) or not 0.0 <= given <= MOST_RATIO:
             raise ValueError(
                 f"min_height={min_height!r} is no share of a triangle's longest edge that all can have; give 0 to "
-                f"{MOST_HEIGHT}, such as {USUAL_RATIO}"
+                f"{MOST_RATIO}, such as {USUAL_RATIO}"
             )
         self.min_height = float(min_height)
         self.centroids = bool(centroids)
@@ -292,13 +291,14 @@ class FreeLadder:
                 self.fronts[rung] = front
 
         if not self.fronts and now:  # compiling is not their time
-            on_threads(lambda rung: self._compile(ground, surface, subset_of(rung)), now[:1])
+            on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1])
         limit = None if seconds is None else time.perf_counter() + seconds
         with stopping(stop[:1], seconds):
             on_threads(work, now, stop=stop)
 
-    def _compile(self, ground: Any, surface: Surface, kept: BoolArray) -> None:
-        """Call what is compiled, so that it is, without doing anything."""
+    def compile_for(self, surface: Surface, kept: BoolArray) -> None:
+        """Call what is compiled, so that it is, on a subset (N,) that stays as it is."""
+        ground = freedom_of(surface, "free meshes", centroids=self.centroids)
         with ground.triangulation(kept, min_height=self.min_height) as mesh:
             mesh.anneal(0, np.ones(1, np.uint64), hot=0.0, cold=0.0, triangles=0)
             _thinned(mesh, surface, ground.share, np.zeros(2, np.int64), np.ones(1, np.bool_))

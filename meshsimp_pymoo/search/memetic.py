@@ -49,7 +49,7 @@ from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start, at_hand
-from meshsimp_pymoo.surface.free import USUAL_RATIO
+from meshsimp_pymoo.surface.rules import USUAL_RATIO
 from meshsimp_pymoo.surface.surface import Surface, freedom_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
@@ -437,15 +437,18 @@ class MemeticSearch(GeneticAlgorithm):
             return
         limit = time_limit(self)
         self.take_free(until=None if limit is None else time.perf_counter() + limit[1] + limit[2])
-        n_left = len(self.free.todo) if len(self.free.sizes) else RUNGS * bool((self.pop.get("F")[:, 0] > 0.0).any())
-        if n_left:
-            n = len(self.free.sizes) or RUNGS
-            warnings.warn(
-                f"{self.problem.model.name}: the search ended before {n_left} of {n} sizes were annealed freely; the "
-                "meshes there are as good as those of other sizes, thinned, or Delaunay",
-                SearchWarning,
-                stacklevel=2,
+        if (self.pop.get("F")[:, 0] > 0.0).any() and not self.free.fronts:
+            said = "any size was annealed freely: all meshes are Delaunay"
+        elif self.free.todo:
+            said = (
+                f"{len(self.free.todo)} of {len(self.free.sizes)} sizes were annealed freely: meshes there are those of "
+                "other sizes, thinned, or Delaunay"
             )
+        else:
+            return
+        warnings.warn(
+            f"{self.problem.model.name}: the search ended before {said}; search longer", SearchWarning, stacklevel=2
+        )
 
     def _add_between(self) -> None:
         """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
