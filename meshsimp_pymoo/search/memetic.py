@@ -78,8 +78,9 @@ FEWEST = 8
 LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
 MOST_SHARE = 0.3
-# With free meshes as much again, for measuring what they are to be better than.
-MEASURED_AGAIN = 2.0
+# With free meshes as much again of the time, and seconds a million vertices, for measuring what they are to be better
+# than; large models have nothing to be filled then but what their thinning has.
+FREE_SECONDS = 25.0
 # The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
 IDLE = 12
 # In the final front neighbours differ by this share of the error, or by the smaller one where a rung is better than the
@@ -273,9 +274,11 @@ def time_limit(algorithm: Any, share: float = 1.0) -> tuple[float, float, float]
     whole = seconds_given(algorithm)
     if whole is None:
         return None
-    last = min(max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6), MOST_SHARE * whole)
-    if getattr(algorithm, "free", None) is not None:
-        last = min(MEASURED_AGAIN * last, MOST_SHARE * whole)
+    n_var, is_free = algorithm.problem.n_var, getattr(algorithm, "free", None) is not None
+    last = max(LAST_SHARE * whole, FILL_SECONDS * n_var / 1e6 if n_var <= LARGE or not is_free else 0.0)
+    if is_free:
+        last += LAST_SHARE * whole + FREE_SECONDS * n_var / 1e6
+    last = min(last, MOST_SHARE * whole)
     return share * whole, share * (whole - last) - (time.time() - algorithm.start_time), last
 
 
@@ -441,8 +444,8 @@ class MemeticSearch(GeneticAlgorithm):
             said = "any size was annealed freely: all meshes are Delaunay"
         elif self.free.todo:
             said = (
-                f"{len(self.free.todo)} of {len(self.free.sizes)} sizes were annealed freely: meshes there are those of "
-                "other sizes, thinned, or Delaunay"
+                f"{len(self.free.todo)} of {len(self.free.sizes)} sizes were annealed freely: meshes there are those "
+                "of other sizes, thinned, or Delaunay"
             )
         else:
             return
@@ -462,7 +465,7 @@ class MemeticSearch(GeneticAlgorithm):
         limit = time_limit(self)
         seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
         if seconds is not None and self.free is not None:
-            seconds /= MEASURED_AGAIN
+            seconds /= 2.0
         X = between_the_rungs(
             surface,
             pop.get("X"),
