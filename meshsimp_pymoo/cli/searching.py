@@ -69,8 +69,8 @@ from meshsimp_pymoo.warming import SEARCH, WISH
 REFIT_SHARE = 0.3
 # Of that time, the share for measuring what a search was to start from.
 MEASURED_SHARE = 0.4
-# Of that time, the share for measuring the meshes of the front whole, which evaluation has not.
-WHOLE_SHARE = 0.3
+# The share of what whoever interrupts a search waits, until when the meshes of the front are measured whole.
+WHOLE_SHARE = 0.7
 # What measuring takes for each triangle of a mesh, beside what it takes for each vertex of the model [s].
 SECONDS_A_TRIANGLE = 5e-7
 # What writing takes about: for any model, and times the root of its vertices [s].
