@@ -74,8 +74,8 @@ FREEING_SECONDS = 15.0
 REFIT_SHARE = 0.3
 # Of that time, the share for measuring what a search was to start from.
 MEASURED_SHARE = 0.4
-# Of that time, the share for measuring the meshes of the front whole, which evaluation has not.
-WHOLE_SHARE = 0.3
+# The share of what whoever interrupts a search waits, until when the meshes of the front are measured whole.
+WHOLE_SHARE = 0.7
 # Of that time, the share for measuring what free meshes are to be better than.
 FREE_SHARE = 0.2
 # What measuring takes for each triangle of a mesh, beside what it takes for each vertex of the model [s].
