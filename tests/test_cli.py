@@ -151,6 +151,7 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
         "algorithm": "nsga2_v1",
         "population": 12,
         "threads": None,
+        "free": False,
         "format": "ply",
         "meshes": 100,
         "refit": False,

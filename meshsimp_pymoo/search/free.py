@@ -58,6 +58,8 @@ CROWD = 20.0
 # With a deadline: the share of a rung's time after which it looks at the clock and cools, moves before any is timed.
 PAUSE = 1 / 64
 FIRST_MOVES = 1000
+# How late a rung may be with a deadline [s].
+LATE = 0.05
 # Sizes between the rungs that are measured differ by this share, or by one triangle.
 STEP = 0.015
 # Where one mesh is wished for: sizes as shares of the number of triangles, or of those of the mesh that holds the wish
@@ -295,7 +297,8 @@ class FreeLadder:
         if not self.fronts and now:  # compiling is not their time
             on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1])
         limit = None if seconds is None else time.perf_counter() + seconds
-        with stopping(stop[:1], seconds):
+        # a rung that is a little late is not thrown away
+        with stopping(stop[:1], None if seconds is None else seconds + LATE):
             on_threads(work, now, stop=stop)
 
     def compile_for(self, surface: Surface, kept: BoolArray) -> None:
@@ -330,8 +333,8 @@ class FreeLadder:
     def _wanted(self, rung: int) -> IntArray:
         """Return the sizes that a rung is measured at, its own first, down to the next smaller one.
 
-        Collapses inside the mesh take two triangles away. Where that matters it goes on to the one after that, which
-        leaves no gap if they are odd and even in turn.
+        Collapses inside the mesh take two triangles away. Where that matters it goes on to the one after that, so that
+        of rungs that are odd and even in turn one or the other has nearly every size.
         """
         size = self.sizes[rung]
         below = self.sizes[max(rung - (1 + (size * STEP < 1.0)), 0)]
