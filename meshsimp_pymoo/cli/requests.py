@@ -206,7 +206,7 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
     **{
         (option(name), "Delaunay meshes"): (
             _is_free_alone(name),
-            "it is said of free ones; leave it out, or add --free",
+            "it is of free ones; leave it out, or add --free",
         )
         for name in ("free_height", "no_centroids")
     },
