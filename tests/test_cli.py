@@ -862,7 +862,8 @@ def test_free_meshes_are_written_as_they_are_measured_and_judged_by_what_is_wish
         assert json.loads(capsys.readouterr().out)["error"] == pytest.approx(chosen.error, rel=1e-6)
 
 
-def test_interrupted_while_a_front_is_freed_it_is_written_with_what_is_finished(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("options", [QUICK, ("--moves", "20000", "--population", "16")], ids=["afterwards", "memetic"])
+def test_interrupted_while_meshes_are_freed_the_front_has_those_finished(tmp_path, monkeypatch, capsys, options):
     real = searching.FreeLadder._found
 
     def interrupted(self, *given):
@@ -871,9 +872,9 @@ def test_interrupted_while_a_front_is_freed_it_is_written_with_what_is_finished(
         return real(self, *given)
 
     monkeypatch.setattr(searching.FreeLadder, "_found", interrupted)
-    assert run("simplify", "face:200", "-o", tmp_path / "out", "--free", *QUICK, "--no-page") == 130
+    assert run("simplify", "face:200", "-o", tmp_path / "out", "--free", *options, "--no-page") == 130
     said = capsys.readouterr().err
-    assert re.search(r"\d+ of \d+ sizes are not annealed freely", said)
+    assert options != QUICK or re.search(r"\d+ of \d+ sizes are not annealed freely", said)
     front = Front.load(tmp_path / "out")
     assert 0 < front.n_free < len(front)
     assert front.run["interrupted"] is True

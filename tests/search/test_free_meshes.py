@@ -274,20 +274,27 @@ def test_what_is_finished_when_the_search_is_interrupted_is_kept(monkeypatch):
     assert 0 < front.n_free < len(front)
 
 
-def test_time_ends_it_and_what_is_left_out_is_said(monkeypatch):
+@pytest.mark.filterwarnings(
+    "ignore::meshsimp_pymoo.errors.SearchWarning"
+)  # where others are at work there is less time
+def test_time_ends_it():
     problem = MeshProblem("face:200")
     begun = time.perf_counter()
-    result = minimize(problem, memetic(20, triangulation="free"), TimeBasedTermination(1.0), seed=1)
+    result = minimize(problem, memetic(20, triangulation="free"), TimeBasedTermination(0.6), seed=1)
     assert time.perf_counter() - begun < 3.0
     assert Front.from_result(result).n_free > 0
+    begun = time.perf_counter()
+    assert Front.from_result(result)[::4].free(time=0.3).n_free > 0
+    assert time.perf_counter() - begun < 2.0
+
+
+def test_what_is_left_out_is_said(monkeypatch, problem):
     with pytest.warns(SearchWarning, match="ended before any size was annealed freely: all meshes are Delaunay"):
         minimize(problem, memetic(20, triangulation="free"), ("n_eval", 20), seed=1)
     real = FreeLadder._found
-    monkeypatch.setattr(
-        FreeLadder, "_found", lambda self, *given: None if given[3] == 3 else real(self, *given[:4], 0.01, given[5])
-    )
+    monkeypatch.setattr(FreeLadder, "_found", lambda self, *given: None if given[3] == 3 else real(self, *given))
     with pytest.warns(SearchWarning, match=r"ended before 1 of \d+ sizes were annealed freely"):
-        minimize(problem, memetic(20, triangulation="free"), TimeBasedTermination(1.5), seed=1)
+        minimize(problem, memetic(20, triangulation="free"), Moves(5_000), seed=1)
 
 
 def test_large_models_are_only_thinned_before(monkeypatch):
