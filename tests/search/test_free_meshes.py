@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -179,6 +180,35 @@ def test_no_triangle_that_comes_is_flatter_than_was_asked_for():
         assert (lowest >= 0.3) == (least == 0.3)
 
 
+def test_the_best_one_is_no_larger_and_nothing_that_counts_is_higher():
+    own = surface("face:200")
+    ladder = found_on(own, [20, 40])
+    # error, triangles, vertices, squares, maximum, uncovered; surface error
+    rows = [[5, 10, 8, 0, 9, 0, 1], [6, 10, 8, 0, 3, 0, 1], [7, 8, 8, 0, 3, 0, 2], [4, 12, 8, 0, 1, 0, 1]]
+    ladder.fronts = {0: dataclasses.replace(ladder.fronts[1], table=np.array(rows, float))}
+
+    def chosen(names, triangles, errors, between=None):
+        found = ladder.best_of(
+            own,
+            names,
+            np.array([triangles]),
+            np.array([errors], float),
+            None if between is None else np.array([between]),
+        )
+        return None if found[0] is None else found[0].quality.error
+
+    assert chosen(["error"], 12, [9]) == 4
+    assert chosen(["error"], 11, [9]) == 5
+    assert chosen(["error", "max_error"], 11, [9, 4]) == 6
+    assert chosen(["error", "max_error"], 11, [9, 2]) is None
+    assert chosen(["error"], 11, [5]) is None
+    assert chosen(["error"], 9, [9], 2.0) == 7
+    assert chosen(["error"], 9, [9], 1.5) is None
+    assert ladder.wished(own, "error", {"max_error": 3.0}).quality.triangles == 8
+    assert ladder.wished(own, "error", {"max_error": 3.0, "triangles": 11}).quality.error == 6
+    assert ladder.wished(own, "error", {"max_error": 0.5}) is None
+
+
 # ------------------------------------------------------------------------------------------------------- in the search
 
 
@@ -274,9 +304,7 @@ def test_what_is_finished_when_the_search_is_interrupted_is_kept(monkeypatch):
     assert 0 < front.n_free < len(front)
 
 
-@pytest.mark.filterwarnings(
-    "ignore::meshsimp_pymoo.errors.SearchWarning"
-)  # where others are at work there is less time
+@pytest.mark.filterwarnings("ignore::meshsimp_pymoo.errors.SearchWarning")  # on a busy machine there is less
 def test_time_ends_it():
     problem = MeshProblem("face:200")
     begun = time.perf_counter()
