@@ -21,6 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 import numpy as np
@@ -37,6 +38,7 @@ from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
 from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
+from meshsimp_pymoo.search.free import MEASURED_SHARE, FreeLadder, rungs_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import at_hand, begun
 from meshsimp_pymoo.search.targeted import TargetedSearch, require_for_a_wish, targeted
@@ -66,8 +68,16 @@ from meshsimp_pymoo.surface.measures import (
     quality_of,
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
-from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import FreeMesh, Refitted, Simplified, Surface, free_faces, measured_meshes
+from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
+from meshsimp_pymoo.surface.surface import (
+    FreeMesh,
+    Refitted,
+    Simplified,
+    Surface,
+    free_faces,
+    freedom_of,
+    measured_meshes,
+)
 from meshsimp_pymoo.surface.units import length_unit
 from meshsimp_pymoo.surface.weld import pieces
 
@@ -440,13 +450,7 @@ class Front(Sequence[FrontSolution]):
         F = _objectives(quality, problem.objectives)
         if others:  # where none holds all, by how much the others are missed counts beside
             F = np.column_stack([F, [float(shortfall(asdict(q), others)) for q in quality]])
-        best = {row.tobytes() for row in non_dominated(F)}
-        first: dict[bytes, int] = {}
-        for row in np.lexsort((table[:, ERROR], table[:, TRIANGLES])):
-            key = (F[row] + 0.0).tobytes()
-            if key in best:
-                first.setdefault(key, int(row))
-        chosen = list(first.values())
+        chosen = _best_rows(F, quality)
         subsets = [*rows, *(row for some in known for row in some), *(mesh.kept for mesh in meshes)]
         solutions = np.empty((len(chosen), problem.n_var), dtype=bool)
         for solution, row in zip(solutions, usable[chosen], strict=True):
@@ -640,6 +644,63 @@ class Front(Sequence[FrontSolution]):
         """What the model is called."""
         recorded = (self.run.get("model") or {}).get("name")
         return str(recorded or self.model.name)
+
+    # ------------------------------------------------------------------------------------------------------ free meshes
+
+    def free(
+        self,
+        *,
+        time: float | None = None,
+        moves: int | None = None,
+        seed: int = 1,
+        min_height: float = USUAL_RATIO,
+        centroids: bool = True,
+    ) -> Front:
+        """Return the front with free meshes, whose edges are chosen for the error, where these are better.
+
+        Forty of the solutions at most are annealed freely at their number of triangles, each from its vertices, and
+        thinned down to the next smaller one; see :mod:`~meshsimp_pymoo.search.free`. A solution is replaced by a free
+        mesh that is no larger if what was minimised first is lower and nothing else that was minimised is higher, nor
+        the surface error where ``centroids`` count. The smallest of them all, or the most accurate, that holds what the
+        front was searched for (:func:`~meshsimp_pymoo.targeted`) comes along.
+
+        Parameters
+        ----------
+        time : float, optional
+            Seconds to search for; what is found then depends on the machine.
+        moves : int, optional
+            Moves to try instead; by default thirty million, more for large models: a million take half a second or so
+            of one core.
+        seed : int
+            Of the random moves.
+        min_height : float
+            Least height of the triangles that come, as a share of their longest edge; 0: any.
+        centroids : bool
+            Whether the centroids of the original's faces count beside its vertices; otherwise the meshes fit the
+            vertices and may be wrong between them.
+
+        Raises
+        ------
+        ValueError
+            If an argument makes no sense, or the surface has no free meshes, as that of tiles.
+        TypeError
+            If both budgets are given.
+
+        Examples
+        --------
+        >>> from meshsimp_pymoo import memetic
+        >>> front = Front.from_result(minimize(MeshProblem("face:200"), memetic(12), Moves(20_000), seed=1))
+        >>> freed = front.free(moves=100_000)
+        >>> freed.n_free > 0, freed.best(triangles=60).error < front.best(triangles=60).error
+        (True, True)
+        """
+        budget = budget_of(time, moves)
+        ladder = FreeLadder(min_height=min_height, centroids=centroids)
+        freeing = Freeing(self, ladder, moves=budget, timed=time is not None, seed=seed, wish=self.run.get("wish"))
+        limit = None if time is None else perf_counter() + (1.0 - MEASURED_SHARE) * time
+        while freeing.go_on(None if limit is None else limit - perf_counter()):
+            pass
+        return freeing.front()
 
     # --------------------------------------------------------------------------------------------------------- choosing
 
@@ -1016,6 +1077,122 @@ class Front(Sequence[FrontSolution]):
         return self.name
 
 
+class Freeing:
+    """Makes free meshes for a front, some sizes at a time; see :meth:`Front.free`.
+
+    Parameters
+    ----------
+    front : Front
+        The front.
+    ladder : FreeLadder
+        What finds them.
+    moves : int, optional
+        How many there are; by default as many as are usual.
+    timed : bool
+        Whether time ends them.
+    seed : int
+        Of the random moves.
+    wish : mapping of str to float, optional
+        What the front was searched for: most of the time goes to that, and the limits that held hold then.
+    """
+
+    def __init__(
+        self,
+        front: Front,
+        ladder: FreeLadder,
+        *,
+        moves: int | None = None,
+        timed: bool = False,
+        seed: int = 1,
+        wish: Mapping[str, float] | None = None,
+    ) -> None:
+        self.before = front
+        self.ladder = ladder
+        self.wish = dict(wish or {})
+        self.seed = seed
+        #: The solution that holds the wish, if any does.
+        self.held: int | None = None
+        surface, answer = front.surface, None
+        freedom_of(surface, "free meshes", centroids=ladder.centroids)
+        if self.wish:
+            try:
+                answer = self.held = front.best(**self.wish).solution
+            except Missed as missed:
+                answer = missed.nearest.solution
+        sizes, shares, offered = rungs_of(front.F[:, [0, -1]], self.wish, answer)
+        generator = np.random.default_rng(seed)
+        ladder.begin(surface, sizes, offered, generator, shares=shares, moves=moves, timed=timed)
+
+    def go_on(self, seconds: float | None = None) -> bool:
+        """Anneal the next sizes, with so many seconds for all that are left; return whether any are left then."""
+        front, ladder = self.before, self.ladder
+        n_left, F = len(ladder.todo), front.F
+
+        def subset_of(rung: int) -> BoolArray:
+            fits = np.flatnonzero(F[:, -1] <= ladder.sizes[rung])
+            kept: BoolArray = front.kept[fits[np.argmin(F[fits, 0])]] | front.surface.pinned
+            return kept
+
+        if n_left and (seconds is None or seconds > 0.0):
+            ladder.go_on(front.surface, subset_of, seconds=seconds)
+        return 0 < len(ladder.todo) < n_left
+
+    def front(self, *, until: float | None = None) -> Front:
+        """Return the front with what was found so far.
+
+        Solutions that are not measured whole by ``perf_counter() = until`` stay as they are.
+        """
+        before, ladder, surface = self.before, self.ladder, self.before.surface
+        names, kept = before.objectives[:-1], np.asarray(before.kept)
+        quality = measured_meshes(surface, kept, before.quality, faces=before.faces, until=until)
+        F, others = _objectives(quality, before.objectives), beside(self.wish, names[0])
+        # what was wished for beside that may rise as far as its limit
+        within = [np.maximum([getattr(q, name) for q in quality], most) for name, most in others.items()]
+        errors, triangles = np.column_stack([F[:, :-1], *within]), F[:, -1].astype(np.int64)
+        rows = list(range(len(before)))
+        if self.held is not None and "triangles" in self.wish:  # one more is looked for that may have as many
+            rows.append(self.held)
+            triangles = np.append(triangles, int(self.wish["triangles"]))
+        between = np.array([quality[row].surface_error for row in rows]) if ladder.centroids else None
+        meshes = ladder.best_of(surface, (*names, *others), triangles, errors[rows], between)
+        if self.wish and len(rows) == len(before):
+            meshes.append(ladder.wished(surface, names[0], self.wish))
+        found: list[tuple[Quality, BoolArray, IntArray | None]] = []
+        found += [(mesh.quality, mesh.kept, mesh.faces) for mesh in meshes if mesh is not None]
+        found += [(quality[row], kept[row], before.faces[row]) for row in range(len(before)) if meshes[row] is None]
+        F = _objectives([q for q, _, _ in found], before.objectives)
+        missed = [float(shortfall(asdict(q), others)) for q, _, _ in found]
+        best = _best_rows(np.column_stack([F, missed]), [q for q, _, _ in found])
+        qualities, subsets, faces = zip(*(found[row] for row in best), strict=True)
+        facts = {"seed": self.seed, "moves": ladder.moves, "min_height": ladder.min_height}
+        return Front(
+            measured_meshes(surface, np.array(subsets), qualities, faces=faces, until=until),
+            np.array(subsets),
+            faces=faces,
+            problem=before._problem,
+            surface=surface,
+            run=before.run | {"free": facts | {"centroids": ladder.centroids}},
+            series=before.series,
+        )
+
+
+def budget_of(time: float | None, moves: int | None) -> int | None:
+    """Return the moves that are asked for, if any are, and not time.
+
+    Raises
+    ------
+    TypeError
+        If both are given.
+    ValueError
+        If one makes no sense.
+    """
+    if time is not None and moves is not None:
+        raise TypeError(f"time={time} does not go with moves={moves}: each says how long to search; leave one out")
+    if time is not None and not time > 0:
+        raise ValueError(f"time={time} is no time to search for; give seconds")
+    return None if moves is None else Moves(moves).n_max_moves
+
+
 def _say_limits() -> None:
     """Let the signature and the documentation of ``best`` name every measure."""
     own = inspect.signature(Front.best)
@@ -1119,10 +1296,7 @@ def simplify_to(
     limits = checked_limits(
         {"triangles": triangles, "max_error": max_error, "mean_error": mean_error, "rms_error": rms_error}
     )
-    if time is not None and moves is not None:
-        raise TypeError(f"time={time} does not go with moves={moves}: each says how long to search; leave one out")
-    if time is not None and not time > 0:
-        raise ValueError(f"time={time} is no time to search for; give seconds")
+    budget_of(time, moves)
     if not isinstance(problem, MeshProblem):
         problem = MeshProblem(problem)
     require_for_a_wish(problem)
@@ -1154,6 +1328,17 @@ def _is_feasible(problem: MeshProblem, row: FloatArray) -> bool:
 
 def _objectives(quality: Sequence[Quality], names: Sequence[str]) -> FloatArray:
     return np.array([[getattr(q, name) for name in names] for q in quality], dtype=np.float64)
+
+
+def _best_rows(F: FloatArray, quality: Sequence[Quality]) -> list[int]:
+    """Return which rows no other one beats, each once, sorted by triangles, then error."""
+    best = {row.tobytes() for row in non_dominated(F)}
+    first: dict[bytes, int] = {}
+    for row in np.lexsort(([q.error for q in quality], [q.triangles for q in quality])):
+        key = (F[row] + 0.0).tobytes()
+        if key in best:
+            first.setdefault(key, int(row))
+    return list(first.values())
 
 
 def _png(figure: Any) -> bytes:

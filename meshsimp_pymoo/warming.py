@@ -138,6 +138,13 @@ def _tiles() -> None:
     tiled_front(open_grid(np.add.outer(side, side**2 % 7)), tile=LEAST_TILE)
 
 
+def _free() -> None:
+    from meshsimp_pymoo.search.free import FreeLadder
+
+    surface = _square()
+    FreeLadder().compile_for(surface, surface.pinned)
+
+
 def _scores() -> None:
     surface = _square()
     surface.score(surface.points, surface.faces[:2])
@@ -187,6 +194,9 @@ PARTS = (
     Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 6.6, False),
     Part("thinning", ("search.greedy:thin",), _thinning, 16.6, True),
     Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True),
+    Part(
+        "free meshes", ("surface.free:_open", "surface.free:anneal_freely", "search.free:_thin"), _free, 24.0, False
+    ),
     Part("insertion", ("search.greedy:_grow",), _insertion, 4.5, False),
     Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 3.4, True),
     Part(
@@ -204,6 +214,8 @@ PARTS = (
 
 #: What a search with the default algorithm needs.
 SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
+#: What free meshes need besides.
+FREE = ("free meshes",)
 #: What a search for one mesh needs: its first answer is inserted.
 WISH = (*SEARCH, "insertion")
 

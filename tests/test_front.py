@@ -22,6 +22,7 @@ import pytest
 import trimesh
 from matplotlib.figure import Figure
 from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.population import Population
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from samples import freed
@@ -55,7 +56,7 @@ from meshsimp_pymoo.report.figures import plot_mesh
 from meshsimp_pymoo.search.display import errors_at, usual_sizes
 from meshsimp_pymoo.settings import LARGEST
 from meshsimp_pymoo.storage import FRONT_COLUMNS, read_front
-from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
 from meshsimp_pymoo.surface.surface import FreeMesh
 
 
@@ -211,6 +212,22 @@ def test_a_free_mesh_that_is_no_better_than_its_subset_is_left(result):
     assert Front.from_result(alone, ends=False).quality == (own.quality,)
 
 
+def test_of_three_objectives_the_first_decides_what_is_taken_and_all_decide_what_stays():
+    problem = MeshProblem("face:200", objectives=("error", "max_error", "triangles"))
+    one = Population.new(X=problem.pinned[None] | (np.arange(200) % 4 == 0))
+    (own,) = Front.from_population(problem, one)
+    mesh = freed(problem.surface, one[0].X)
+    for error, largest, kinds in (
+        (0.9, 0.9, [True]),
+        (0.9, 1.1, [True, False]),
+        (1.1, 0.9, [False]),
+        (1, 0.9, [False]),
+    ):
+        said = dataclasses.replace(mesh.quality, error=error * own.error, max_error=largest * own.max_error)
+        one[0].set("free", dataclasses.replace(mesh, quality=said))
+        assert sorted((s.free for s in Front.from_population(problem, one)), reverse=True) == kinds
+
+
 def test_limits_hold_for_the_numbers_of_the_free_mesh(result):
     """A wish and a constraint that the Delaunay mesh misses and the free one meets, and the other way round."""
     one = copy.deepcopy(result.opt[[len(result.opt) // 2]])
@@ -218,11 +235,19 @@ def test_limits_hold_for_the_numbers_of_the_free_mesh(result):
     one[0].set("free", mesh)
     (own,) = Front.from_subsets(result.problem, one.get("X"))
     assert mesh.quality.error < own.error
-    between = (mesh.quality.error + own.error) / 2
-    bounded = MeshProblem("face:200", max_objective=between)
-    with pytest.raises(LookupError, match="meets the constraints"):
-        Front.from_subsets(bounded, one.get("X"))
-    assert Front.from_population(bounded, one).n_free == 1
+    for measure in OBJECTIVES:
+        low = dataclasses.replace(mesh.quality, **{measure: 0.9 * getattr(own, measure)})
+        one[0].set("free", dataclasses.replace(mesh, quality=low))
+        for bound, n_free in ((0.95, 1), (0.85, 0)):
+            objectives = (measure, "triangles")
+            bounded = MeshProblem("face:200", objectives=objectives, max_objective=bound * getattr(own, measure))
+            with pytest.raises(LookupError, match="meets the constraints"):
+                Front.from_subsets(bounded, one.get("X"))
+            if n_free:
+                assert Front.from_population(bounded, one).n_free == 1
+                continue
+            with pytest.raises(LookupError, match="meets the constraints"):
+                Front.from_population(bounded, one)
     high = dataclasses.replace(mesh, quality=dataclasses.replace(mesh.quality, max_error=2 * own.max_error))
     one[0].set("free", high)
     wish = {"triangles": own.triangles, "max_error": own.max_error}

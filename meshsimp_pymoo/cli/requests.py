@@ -13,10 +13,10 @@ from meshsimp_pymoo.cli.arguments import option, settings_from, wishes_of
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import listed
-from meshsimp_pymoo.search.presets import DEFAULT
+from meshsimp_pymoo.search.presets import DEFAULT, PRESETS
 from meshsimp_pymoo.search.wishes import SEARCHED, measure_for
 from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
-from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
 
 Part = TypeVar("Part")
 
@@ -70,6 +70,20 @@ class Wish:
 
 
 @dataclass(frozen=True)
+class Free:
+    """Whether edges are chosen for the error too, and how."""
+
+    free: bool = False
+    free_height: float = USUAL_RATIO
+    no_centroids: bool = False
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """What free meshes are to be, as Python calls it."""
+        return {"min_height": self.free_height, "centroids": not self.no_centroids}
+
+
+@dataclass(frozen=True)
 class Output:
     """What to write where, and what to show."""
 
@@ -102,6 +116,7 @@ class Request:
     rules: Rules
     search: Search
     wish: Wish
+    free: Free
     output: Output
     tiling: Tiling
     #: What is minimised, if the command line says so; ``rules`` have what a wish makes of it.
@@ -118,6 +133,11 @@ class Request:
         return "targeted" if self.is_targeted else self.search.algorithm
 
     @property
+    def is_freed(self) -> bool:
+        """Whether the front is freed when the search is done, which does not do it itself."""
+        return self.free.free and (self.is_targeted or not PRESETS[self.search.algorithm].frees)
+
+    @property
     def wanted(self) -> dict[str, Any]:
         """What of it is worth a place in the record of any results: which mesh was wanted, how meshes are written."""
         shown = {name: getattr(self.output, name) for name in ("format", "meshes")}
@@ -127,7 +147,7 @@ class Request:
     def recorded(self) -> dict[str, Any]:
         """What of it is worth a place in the record of what was searched, beside options and rules."""
         search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
-        return search | {"algorithm": self.algorithm} | self.wanted | {"refit": self.output.refit}
+        return search | {"algorithm": self.algorithm} | asdict(self.free) | self.wanted | {"refit": self.output.refit}
 
 
 def request_of(args: argparse.Namespace) -> Request:
@@ -140,6 +160,7 @@ def request_of(args: argparse.Namespace) -> Request:
         rules=settings_from(args, Rules, measure=measure or Rules().measure),
         search=_part(Search, args),
         wish=Wish(wishes_of(args), args.pick == "knee"),
+        free=_part(Free, args),
         output=_part(Output, args, folder=Path(folder)),
         tiling=_part(Tiling, args),
         measure=measure,
@@ -164,6 +185,11 @@ def _lowers_another(request: Request) -> bool:
     return False
 
 
+def _is_free_alone(name: str) -> Callable[[Request], bool]:
+    """Return what tells whether something is said of free meshes where there are none."""
+    return lambda request: not request.free.free and getattr(request.free, name) != getattr(Free(), name)
+
+
 # What does not go with what, whatever the model is: two options, when that is so, and why, with the way out. What tiles
 # do not know is said in cli/tiling.py.
 REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
@@ -176,6 +202,13 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
         "a wish for an error lowers that error, as --measure {wished} does; leave --measure out, or take the mesh out "
         "of a front that was searched by it (meshsimp pick)",
     ),
+    **{
+        (option(name), "Delaunay meshes"): (
+            _is_free_alone(name),
+            "it is said of free ones; leave it out, or add --free",
+        )
+        for name in ("free_height", "no_centroids")
+    },
 }
 
 

@@ -36,7 +36,7 @@ from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
 from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, listed
-from meshsimp_pymoo.front import Front, FrontSolution, starting_front
+from meshsimp_pymoo.front import Freeing, Front, FrontSolution, starting_front
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.budgets import Moves, WholeGenerations, moves_of
 from meshsimp_pymoo.search.checkpoint import (
@@ -47,7 +47,9 @@ from meshsimp_pymoo.search.checkpoint import (
     read_checkpoint,
     restore,
 )
-from meshsimp_pymoo.search.memetic import SECONDS_A_VERTEX, sweep_generations
+from meshsimp_pymoo.search.free import MEASURED_SHARE as MEASURED_SHARE_OF_FREE
+from meshsimp_pymoo.search.free import SUBSETS_SHARE, FreeLadder
+from meshsimp_pymoo.search.memetic import SECONDS_A_VERTEX, MemeticSearch, sweep_generations
 from meshsimp_pymoo.search.operators import NestedSubsets
 from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
 from meshsimp_pymoo.search.starting import Start, begun
@@ -64,14 +66,18 @@ from meshsimp_pymoo.storage import (
 )
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.surface import Refitted
-from meshsimp_pymoo.warming import SEARCH, WISH
+from meshsimp_pymoo.warming import FREE, SEARCH, WISH
 
+# Seconds that freeing a front is thought to take where nobody says how long.
+FREEING_SECONDS = 15.0
 # Of the time that is given, the share kept for the best heights of the meshes.
 REFIT_SHARE = 0.3
 # Of that time, the share for measuring what a search was to start from.
 MEASURED_SHARE = 0.4
-# Of that time, the share for measuring the meshes of the front whole, which evaluation has not.
-WHOLE_SHARE = 0.3
+# The share of what whoever interrupts a search waits, until when the meshes of the front are measured whole.
+WHOLE_SHARE = 0.7
+# Of that time, the share for measuring what free meshes are to be better than.
+FREE_SHARE = 0.2
 # What measuring takes for each triangle of a mesh, beside what it takes for each vertex of the model [s].
 SECONDS_A_TRIANGLE = 5e-7
 # What writing takes about: for any model, and times the root of its vertices [s].
@@ -105,7 +111,9 @@ def _simplify(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
-    parts = (*(WISH if request.is_targeted else SEARCH), *(["scores"] if output.refit else []))
+    parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
+    if output.refit or request.free.no_centroids:
+        parts.append("scores")
     with compiling(parts, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
@@ -113,6 +121,10 @@ def _simplify(request: Request, shown: Stages) -> int:
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
         _refuse_impossible(problem, request.wish, quiet=output.quiet)
+    if search.time is not None:
+        seconds = _search_seconds(request, search.time)
+        shown.expect("freeing", (1.0 - SUBSETS_SHARE) * seconds if request.is_freed else 0.0)
+        shown.expect("searching", SUBSETS_SHARE * seconds if request.is_freed else seconds)
     shown.expect("writing", WRITING_SECONDS[0] + WRITING_SECONDS[1] * problem.n_var**0.5)
     keeper = Keeper(problem, request, {"read_seconds": read_seconds, "compile_seconds": compiled.seconds})
     if is_drawn_only:
@@ -205,8 +217,9 @@ def budget(request: Request) -> dict[str, float]:
         return found
     if request.is_targeted:
         return {"moves": USUAL_BUDGET}
-    sweeps = PRESETS[search.algorithm].sweeps
-    return {"generations": sweep_generations(search.population) if sweeps else DEFAULT_GENERATIONS}
+    if PRESETS[search.algorithm].sweeps:
+        return {"generations": sweep_generations(search.population, free=request.free.free)}
+    return {"generations": DEFAULT_GENERATIONS}
 
 
 def _set_up(problem: MeshProblem, request: Request) -> Any:
@@ -220,13 +233,30 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
         "moves": Moves,
     }
     ((kind, amount),) = budget(request).items()
-    if kind == "time" and request.output.refit:
-        amount *= 1.0 - REFIT_SHARE
+    if kind == "time":
+        amount = _search_seconds(request, amount)
+    if request.is_freed:
+        if kind == "time":
+            amount *= SUBSETS_SHARE
+        elif search.moves is not None:
+            amount -= _free_moves(amount)
     if request.is_targeted:
         algorithm: Any = targeted(pop_size=search.population, **request.wish.limits)  # type: ignore[arg-type]
+    elif request.free.free and preset.frees:
+        algorithm = preset.function(pop_size=search.population, triangulation="free", **request.free.how)
     else:
         algorithm = preset.function(pop_size=search.population)
     return algorithm.setup(problem, termination=terminations[kind](amount), seed=search.seed)
+
+
+def _search_seconds(request: Request, seconds: float) -> float:
+    """Return what is left of the time without that for the best heights."""
+    return seconds * (1.0 - REFIT_SHARE) if request.output.refit else seconds
+
+
+def _free_moves(moves: float) -> int:
+    """Return how many of the moves a front is freed by; at least one is for the search."""
+    return int((1.0 - SUBSETS_SHARE) * (moves - 1))
 
 
 def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | None:
@@ -248,6 +278,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
                         say(words)
                 else:
                     words = front_in_words(problem.model, algorithm.evaluator.n_eval, algorithm.opt.get("F"))
+                    words += _freed_in_words(getattr(algorithm, "free", None))
                 found, generations = algorithm.opt, algorithm.n_iter - 1
                 show(0.0 if timed else algorithm.termination.perc, words)  # the clock knows better
                 keeper.keep()
@@ -257,6 +288,9 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
         interrupted, until = True, time.perf_counter() + WAIT_SECONDS
         if found is None and (starts := _begun(problem, algorithm)):
             say(f"the search had not begun yet; the front is of {' and '.join(map(str, starts))}, of its start")
+    measured_by = None if until is None else until - (1.0 - WHOLE_SHARE) * WAIT_SECONDS
+    if interrupted and isinstance(algorithm, MemeticSearch):  # what is finished of its free meshes
+        algorithm.take_free(until=time.perf_counter() + FREE_SHARE * WAIT_SECONDS)
     if found is None:
         X = _subsets_begun(problem, algorithm)
         if X is None:
@@ -270,7 +304,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             found,
             ends=True,
             wish=keeper.request.wish.limits if keeper.request.is_targeted else None,
-            until=None if until is None else until - (1.0 - WHOLE_SHARE) * WAIT_SECONDS,
+            until=measured_by,
         )
     except LookupError:
         raise UsageError(
@@ -278,7 +312,54 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             "inside its outline; search longer, or pass --footprint hull"
         ) from None
     front.series |= starting_front(problem, algorithm, interrupted=interrupted)
-    return _Found(front, generations, algorithm.evaluator.n_eval, moves_of(algorithm), seconds, until)
+    result = _Found(front, generations, algorithm.evaluator.n_eval, moves_of(algorithm), seconds, until)
+    if keeper.request.is_freed and not interrupted:
+        _free(result, keeper.request, shown, time.perf_counter() - start + before)
+    return result
+
+
+def _free(found: _Found, request: Request, shown: Stages, seconds: float) -> None:
+    """Free the front that a search came back with, in the time that is left of it; ``seconds`` are gone."""
+    search, moves = request.search, request.search.moves
+    whole = None if search.time is None else _search_seconds(request, search.time)
+    ladder = FreeLadder(**request.free.how)
+    freeing = Freeing(
+        found.front,
+        ladder,
+        moves=None if moves is None else _free_moves(moves),
+        timed=whole is not None,
+        seed=search.seed,
+        wish=request.wish.limits,
+    )
+    begun = time.perf_counter()
+    until = None if whole is None else begun + (whole - seconds) * (1.0 - MEASURED_SHARE_OF_FREE)
+    if until is None:
+        shown.expect("freeing", FREEING_SECONDS)
+    try:
+        with answering("stopping: the front so far is written next"), shown.stage("freeing", "freeing") as show:
+            more = True
+            while more:
+                stop_if_interrupted()
+                more = freeing.go_on(None if until is None else until - time.perf_counter())
+                n = len(ladder.sizes)
+                show(0.0 if until is not None else len(ladder.fronts) / max(n, 1), _freed_in_words(ladder)[2:])
+            stop_if_interrupted()
+    except KeyboardInterrupt:
+        found.until = time.perf_counter() + WAIT_SECONDS
+    if ladder.todo:
+        say(
+            f"{len(ladder.todo)} of {len(ladder.sizes)} sizes are not annealed freely in the time; the meshes there "
+            "are those of other sizes, thinned, or Delaunay"
+        )
+    found.front = freeing.front(until=None if found.until is None else found.until - (1 - WHOLE_SHARE) * WAIT_SECONDS)
+    found.seconds = seconds + time.perf_counter() - begun
+
+
+def _freed_in_words(ladder: FreeLadder | None) -> str:
+    """Return how far free meshes are, behind what else is said."""
+    if ladder is None or not len(ladder.sizes):
+        return ""
+    return f", free meshes of {len(ladder.fronts)} of {len(ladder.sizes)} sizes"
 
 
 def _answer_in_words(algorithm: Any, *, first: bool) -> str:
@@ -363,6 +444,7 @@ class Keeper:
             "population": search.population,
             "seed": search.seed,
             **budget(self.request),
+            **(asdict(self.request.free) if self.request.free.free else {}),
             **({"refit": True} if self.output.refit and search.time is not None else {}),  # takes a share of the time
             **{name: versions.get(name) for name in ("meshsimp-pymoo", "pymoo", "numpy")},
         }
@@ -440,6 +522,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
             "begun": keeper.begun,
             "seconds": round(found.seconds, 3),
             **{name: round(seconds, 3) for name, seconds in keeper.before.items()},
+            **({"free_seconds": round(shown.seconds["freeing"], 3)} if "freeing" in shown.seconds else {}),
             **({} if fitted is None else {"refit_seconds": round(shown.seconds["refitting"], 3)}),
             "interrupted": found.until is not None,
         }

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from meshsimp_pymoo.cli.preparing import compiling
-from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Request, Search, Tiling
+from meshsimp_pymoo.cli.requests import TILED_FROM, Free, Output, Request, Search, Tiling
 from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, WRITING, Stages, answering, say, stop_if_interrupted
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
@@ -33,6 +33,7 @@ KNOWN: dict[type[Any], tuple[str, ...]] = {
     Search: ("seed", "threads", "checkpoint", "time"),
     Rules: FREE_RULES,
     Options: ("up", "spacing", "nodata", "window", "band", "encoding", "scale"),
+    Free: (),
     Output: ("folder", "overwrite", "format", "meshes", "page", "quiet", "json"),
 }
 
@@ -161,7 +162,7 @@ def _has_pieces(out: Path) -> bool:
 
 def _refuse_unknown(request: Request) -> None:
     rules = replace(request.rules, measure=request.measure or Rules().measure)
-    for part in (request.search, rules, request.options, request.output):
+    for part in (request.search, rules, request.options, request.free, request.output):
         for item in fields(part):
             if item.name not in KNOWN[type(part)] and getattr(part, item.name) != item.default:
                 raise UsageError(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,15 +25,19 @@ from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.faces import canonical_faces, used_rows
 from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
-from meshsimp_pymoo.surface.free import USUAL_RATIO, take_numbers
-from meshsimp_pymoo.surface.measures import REGIONS, TRIANGLES, as_quality, measured
+from meshsimp_pymoo.search.wishes import shortfall
+from meshsimp_pymoo.surface.free import take_numbers
+from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_quality
+from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
 from meshsimp_pymoo.workers import on_threads
 
-# Rungs of a ladder, and how many of them are annealed in one generation.
+# Rungs of a ladder, and how many of them are annealed in one generation. They are geometric, but closer to arithmetic
+# below this share of the largest: moves of the smallest meshes of large models take long, and few people want those.
 RUNGS = 40
 ABREAST = 16
+SMALL_SHARE = 1e-3
 # Models of more vertices are not searched before, only thinned, and are heated less: there is too little time for both.
 LARGE = 50_000
 # Temperature in the beginning, in units of the cost per vertex that may move, for others and for large ones; the share
@@ -43,6 +47,8 @@ COOLING = 0.05
 TAIL = 0.1
 # The share of a budget for subsets, before the rungs.
 SUBSETS_SHARE = 0.3
+# The share of the time for a front that is freed in which its meshes are measured.
+MEASURED_SHARE = 0.05
 # Moves where there is no budget: in all, and at least and at most for each triangle of a rung. The last holds anyway:
 # nothing is gained beyond it, and small rungs leave their time to others.
 TOTAL_MOVES = 3e7
@@ -50,15 +56,18 @@ LEAST_MOVES, MOST_MOVES = 40, 20_000
 # Samples in a triangle from which on looking at them takes most of a move's time.
 CROWD = 20.0
 # With a deadline: the share of a rung's time after which it looks at the clock and cools, moves before any is timed.
-PAUSE = 1 / 256
+PAUSE = 1 / 64
 FIRST_MOVES = 1000
 # Sizes between the rungs that are measured differ by this share, or by one triangle.
 STEP = 0.015
+# Where one mesh is wished for: sizes as shares of the number of triangles, or of those of the mesh that holds the wish
+# so far, which free ones of fewer may hold, with their shares of the time; and those of some others of the front.
+AROUND_A_SIZE = ((0.85, 0.5), (1.0, 2.0), (1.0, 2.0), (1.18, 0.5))
+AROUND_AN_ERROR = ((0.65, 1.0), (0.72, 1.0), (0.8, 1.0), (0.89, 1.0), (1.0, 1.0))
+N_OTHERS, OTHERS_SHARE = 8, 0.15
 # What thinning a rung takes for each of its triangles and for each sample, and measuring it for each sample [s].
-SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 4e-6, 4e-7, 2e-8
+SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 2.5e-6, 1.2e-7, 1.5e-8
 
-# The least height of all triangles is at most this share of their longest edge: that of half a square.
-MOST_HEIGHT = 0.5
 # The column of a mesh's numbers behind those of evaluation.
 BETWEEN = REGIONS
 
@@ -138,16 +147,16 @@ def _thin(
         n = begin_thinning(free, live, n_all, fixed, stop, queue, cost, triangles)
     for k in range(len(sizes)):
         if k > 0:
+            if triangles[n_removed] <= sizes[k]:  # a collapse takes two away
+                continue
             n_removed, n = go_on_thinning(
                 free, live, sizes[k], np.inf, np.inf, stop, queue, n, n_removed, removed, cost, triangles
             )
-            if stop[0] or n_removed == collapses[n_measured - 1]:
+            if stop[0] or triangles[n_removed] > sizes[k]:
                 break
         collapses[n_measured] = n_removed
         take_numbers(free, live, share, table[n_measured])
         n_measured += 1
-        if k > 0 and triangles[n_removed] > sizes[k]:
-            break
     return n_removed, n_measured
 
 
@@ -167,6 +176,8 @@ class FreeLadder:
         The most triangles of each rung, ascending.
     offered : (Q,) int array
         Sizes that are measured where they lie between two rungs, ascending.
+    shares : (R,) float array
+        How much of the time each rung is to have, in any unit.
     planned : (R,) int array
         The most moves of each rung.
     fronts : dict of int to FreeFront
@@ -175,15 +186,16 @@ class FreeLadder:
 
     def __init__(self, *, min_height: float = USUAL_RATIO, centroids: bool = True) -> None:
         given: Any = min_height
-        if not isinstance(given, (int, float, np.number)) or not 0.0 <= given <= MOST_HEIGHT:
+        if not isinstance(given, (int, float, np.number)) or not 0.0 <= given <= MOST_RATIO:
             raise ValueError(
                 f"min_height={min_height!r} is no share of a triangle's longest edge that all can have; give 0 to "
-                f"{MOST_HEIGHT}, such as {USUAL_RATIO}"
+                f"{MOST_RATIO}, such as {USUAL_RATIO}"
             )
         self.min_height = float(min_height)
         self.centroids = bool(centroids)
         self.sizes: IntArray = np.empty(0, np.int64)
         self.offered: IntArray = np.empty(0, np.int64)
+        self.shares: FloatArray = np.empty(0)
         self.planned: IntArray = np.empty(0, np.int64)
         self.seeds: IntArray = np.empty(0, np.int64)
         self.fronts: dict[int, FreeFront] = {}
@@ -200,33 +212,45 @@ class FreeLadder:
 
     def begin(
         self,
+        surface: Surface,
         sizes: IntArray,
         offered: IntArray,
-        n_samples: int,
         random_state: np.random.Generator,
+        *,
+        shares: FloatArray | None = None,
         moves: int | None = None,
+        timed: bool = False,
     ) -> None:
-        """Set the rungs, and the moves of each where they are counted, so that about the same time goes to each.
+        """Set the rungs and the most moves of each, by the time that these take about.
 
         Parameters
         ----------
+        surface : Surface
+            What they are meshes of.
         sizes, offered : int arrays
             See the attributes.
-        n_samples : int
-            How many there are, in all.
         random_state : numpy.random.Generator
             Source of randomness.
+        shares : (R,) float array, optional
+            See the attributes; all have the same by default.
         moves : int, optional
             How many there are for all rungs; by default as many as are usual.
+        timed : bool
+            Whether time ends them, too: then by default as many as anything is gained by.
         """
+        n_samples = surface.n_vertices + len(freedom_of(surface, "free meshes", centroids=self.centroids).share)
         self.sizes, self.offered, self.fronts = sizes, offered, {}
+        self.shares = np.ones(len(sizes)) if shares is None else shares
         self.seeds = random_state.integers(1, 2**63 - 1, size=len(sizes))
         most = MOST_MOVES * sizes
-        if moves is None:
-            usual = _shared(int(TOTAL_MOVES), sizes, n_samples, most)
-            self.planned = np.maximum(usual, LEAST_MOVES * sizes)
+        # moves of each in the same time
+        pace = self.shares / (1.0 + n_samples / (CROWD * sizes))
+        if moves is not None:
+            self.planned = _divided(moves, pace, most)
+        elif timed:
+            self.planned = most
         else:
-            self.planned = _shared(moves, sizes, n_samples, most)
+            self.planned = np.maximum(_divided(int(TOTAL_MOVES), pace, most), LEAST_MOVES * sizes)
 
     def go_on(
         self,
@@ -251,32 +275,32 @@ class FreeLadder:
         """
         ground = freedom_of(surface, "free meshes", centroids=self.centroids)
         todo = self.todo
-        now, later = todo[:most], todo[most:]
+        now = todo[:most]
         n_threads = os.cpu_count() or 1
-        # what can be done one after the other, by this generation and by those after it
-        rounds = sum(-(-len(later[k : k + most]) // n_threads) for k in range(0, len(later), most))
+        waiting = float(self.shares[todo].sum())
         # the second entry is set by Ctrl-C alone
         stop = np.zeros(2, np.bool_)
-        waiting = len(now)
 
         def work(rung: int) -> None:
             nonlocal waiting
-            share = None
+            own = None
             if limit is not None:
-                share = (limit - time.perf_counter()) / (rounds + -(-waiting // n_threads))
-            waiting -= 1
-            front = self._found(ground, surface, subset_of(rung), rung, share, stop)
+                # threads work side by side, but no rung on more than one
+                own = (limit - time.perf_counter()) * min(n_threads * self.shares[rung] / waiting, 1.0)
+            waiting -= self.shares[rung]
+            front = self._found(ground, surface, subset_of(rung), rung, own, stop)
             if front is not None:
                 self.fronts[rung] = front
 
         if not self.fronts and now:  # compiling is not their time
-            on_threads(lambda rung: self._compile(ground, surface, subset_of(rung)), now[:1])
+            on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1])
         limit = None if seconds is None else time.perf_counter() + seconds
         with stopping(stop[:1], seconds):
             on_threads(work, now, stop=stop)
 
-    def _compile(self, ground: Any, surface: Surface, kept: BoolArray) -> None:
-        """Call what is compiled, so that it is, without doing anything."""
+    def compile_for(self, surface: Surface, kept: BoolArray) -> None:
+        """Call what is compiled, so that it is, on a subset (N,) that stays as it is."""
+        ground = freedom_of(surface, "free meshes", centroids=self.centroids)
         with ground.triangulation(kept, min_height=self.min_height) as mesh:
             mesh.anneal(0, np.ones(1, np.uint64), hot=0.0, cold=0.0, triangles=0)
             _thinned(mesh, surface, ground.share, np.zeros(2, np.int64), np.ones(1, np.bool_))
@@ -319,61 +343,95 @@ class FreeLadder:
     def best_of(
         self,
         surface: Surface,
-        measure: str,
+        measures: Sequence[str],
         triangles: IntArray,
-        error: FloatArray,
+        errors: FloatArray,
         surface_error: FloatArray | None = None,
     ) -> list[FreeMesh | None]:
-        """Return for each of some meshes the free one of least error that is better and not larger, or None.
+        """Return for each of some meshes the best free one that is no larger, and better; None where there is none.
 
         Parameters
         ----------
         surface : Surface
             Of all these meshes.
-        measure : str
-            Which error is meant.
-        triangles, error : (P,) arrays
+        measures : sequence of str
+            Which errors are meant: the first must be lower and decides, the others must not be higher.
+        triangles, errors : (P,) and (P, k) arrays
             Of the meshes.
         surface_error : (P,) float array, optional
             Of the meshes, if it must not be higher.
         """
-        rows = [(rung, row) for rung in sorted(self.fronts) for row in range(len(self.fronts[rung].table))]
-        if not rows:
+        table = self._table()
+        if not len(table):
             return [None] * len(triangles)
-        table = np.concatenate([self.fronts[rung].table for rung in sorted(self.fronts)])
-        errors = measured(table, measure, surface.total_weight)
-        order = np.lexsort((table[:, TRIANGLES], errors))
+        own = np.column_stack([_values(table, name, surface) for name in measures])
+        order = np.lexsort((table[:, TRIANGLES], own[:, 0]))
+        own, sizes, between = own[order], table[order, TRIANGLES], table[order, BETWEEN]
         chosen = np.full(len(triangles), -1)
         for k in range(len(triangles)):
-            fits = (table[order, TRIANGLES] <= triangles[k]) & (errors[order] < error[k])
+            fits = (sizes <= triangles[k]) & (own[:, 0] < errors[k, 0]) & (own <= errors[k]).all(axis=1)
             if surface_error is not None:
-                fits &= table[order, BETWEEN] <= surface_error[k]
+                fits &= between <= surface_error[k]
             if fits.any():
                 chosen[k] = order[np.argmax(fits)]
-        by_rung: dict[int, list[int]] = {}
-        for place in np.unique(chosen[chosen >= 0]).tolist():
-            by_rung.setdefault(rows[place][0], []).append(place)
-
-        def meshes_of(rung: int) -> dict[int, FreeMesh]:
-            places = by_rung[rung]
-            faces = self.fronts[rung].faces_of([rows[place][1] for place in places], surface.n_vertices)
-            return {place: _mesh(surface, own, table[place]) for place, own in zip(places, faces, strict=True)}
-
-        found: dict[int, FreeMesh] = {}
-        for meshes in on_threads(meshes_of, by_rung):
-            found |= meshes
+        found = self._meshes(surface, table, chosen[chosen >= 0])
         return [found.get(int(place)) for place in chosen]
 
+    def wished(self, surface: Surface, measure: str, limits: Mapping[str, float]) -> FreeMesh | None:
+        """Return the free mesh that limits ask for, by measure; None where none holds them all.
 
-def ladder(low: int, high: int, n: int = RUNGS) -> IntArray:
-    """Return about n numbers of triangles from ``low`` to ``high``, geometric, odd and even in turn.
+        With a number of triangles that of the least error (``measure``), else the smallest.
+        """
+        table = self._table()
+        if not len(table):
+            return None
+        values = {name: _values(table, name, surface) for name in {*limits, measure}}
+        fitting = np.flatnonzero(np.broadcast_to(shortfall(values, limits), len(table)) == 0.0)
+        if not len(fitting):
+            return None
+        by_size, by_error = table[fitting, TRIANGLES], values[measure][fitting]
+        order = np.lexsort((by_size, by_error) if "triangles" in limits else (by_error, by_size))
+        place = int(fitting[order[0]])
+        return self._meshes(surface, table, np.array([place]))[place]
+
+    def _table(self) -> FloatArray:
+        """Return the numbers of all meshes (J, 7), rung by rung."""
+        tables = [self.fronts[rung].table for rung in sorted(self.fronts)]
+        return np.concatenate(tables) if tables else np.empty((0, REGIONS + 1))
+
+    def _meshes(self, surface: Surface, table: FloatArray, places: IntArray) -> dict[int, FreeMesh]:
+        """Return the meshes of some rows of the table."""
+        rungs = sorted(self.fronts)
+        first = np.cumsum([0, *(len(self.fronts[rung].table) for rung in rungs)])
+        found: dict[int, FreeMesh] = {}
+
+        def add(k: int) -> None:
+            own = [place for place in np.unique(places).tolist() if first[k] <= place < first[k + 1]]
+            faces = self.fronts[rungs[k]].faces_of([place - int(first[k]) for place in own], surface.n_vertices)
+            found.update({place: _mesh(surface, mesh, table[place]) for place, mesh in zip(own, faces, strict=True)})
+
+        on_threads(add, range(len(rungs)))
+        return found
+
+
+def _values(table: FloatArray, name: str, surface: Surface) -> FloatArray:
+    """Return a measure of each mesh of a table (J, 7)."""
+    of = MEASURES[name].of
+    assert of is not None  # neither an objective nor a wish is of the whole mesh
+    values: FloatArray = of(table, surface.total_weight)
+    return values
+
+
+def ladder_of(low: int, high: int, n: int = RUNGS) -> IntArray:
+    """Return about n numbers of triangles from ``low`` to ``high``, odd and even in turn; see `SMALL_SHARE`.
 
     Examples
     --------
-    >>> ladder(2, 60, 6).tolist()
-    [2, 5, 8, 15, 30, 61]
+    >>> ladder_of(2, 60, 6).tolist(), ladder_of(2, 60_000, 6).tolist()
+    ([2, 5, 8, 17, 32, 61], [2, 185, 910, 3779, 15124, 60001])
     """
-    sizes = np.unique(np.round(np.geomspace(low, high, n)).astype(np.int64))
+    shift = SMALL_SHARE * high
+    sizes = np.unique(np.round(np.geomspace(low + shift, high + shift, n) - shift).astype(np.int64))
     return np.unique(sizes + (sizes - sizes[0] + np.arange(len(sizes))) % 2)
 
 
@@ -383,22 +441,70 @@ def steps_between(low: int, high: int) -> IntArray:
     Examples
     --------
     >>> steps_between(2, 6).tolist(), steps_between(1000, 1050).tolist()
-    ([2, 3, 4, 5, 6], [1000, 1016, 1033, 1050])
+    ([2, 3, 4, 5, 6], [1000, 1012, 1025, 1037, 1050])
     """
     n = int(np.ceil(np.log(high / low) / np.log1p(STEP))) + 1
     return np.unique(np.round(np.geomspace(low, high, n)).astype(np.int64))
 
 
-def _shared(moves: int, sizes: IntArray, n_samples: int, most: IntArray) -> IntArray:
-    """Divide moves among rungs so that each takes the same time, and none makes more than its most."""
-    pace = 1.0 / (1.0 + n_samples / (CROWD * sizes))
-    shares = np.zeros(len(sizes), np.int64)
+def rungs_of(F: FloatArray, limits: Mapping[str, float], answer: int | None) -> tuple[IntArray, FloatArray, IntArray]:
+    """Return the rungs for a front (S, 2) of error and triangles, ascending, their shares, and the sizes offered.
+
+    Where a mesh is wished for they are around it: row ``answer``, or what ``limits`` say of the triangles.
+    """
+    triangles = np.unique(F[F[:, 0] > 0.0, 1]).astype(np.int64)
+    if not len(triangles):
+        return triangles, np.empty(0), triangles
+    if answer is None:
+        return _some(triangles, RUNGS), np.ones(min(RUNGS, len(triangles))), triangles
+    around = AROUND_A_SIZE if "triangles" in limits else AROUND_AN_ERROR
+    size = limits.get("triangles", F[answer, 1])
+    rungs = [(max(int(share * size), int(triangles[0])), weight) for share, weight in around]
+    rungs += [(int(other), OTHERS_SHARE) for other in _some(triangles, N_OTHERS)]
+    rungs.sort()
+    sizes, shares = (np.array(column) for column in zip(*rungs, strict=True))
+    steps = steps_between(int(min(around)[0] * size) or 1, int(max(around)[0] * size) or 1)
+    return sizes, shares, np.union1d(triangles, steps)
+
+
+def _some(numbers: IntArray, n: int) -> IntArray:
+    """Return n of them at most, even in their order."""
+    return numbers[np.unique(np.round(np.linspace(0, len(numbers) - 1, min(n, len(numbers)))).astype(int))]
+
+
+def surface_errors(surface: Surface, X: BoolArray, triangles: IntArray, *, until: float | None = None) -> FloatArray:
+    """Return the surface error of subsets (P, N) with these numbers of triangles (P,).
+
+    Those that are not begun by ``perf_counter() = until`` count as the next larger one that was; they are spread over
+    all.
+    """
+    order = np.argsort(-np.asarray(triangles), kind="stable")
+    found = np.full(len(X), np.nan)
+
+    def measure(place: int) -> None:
+        if until is None or time.perf_counter() < until:
+            found[place] = surface.simplify(X[order[place]] | surface.pinned).quality.surface_error
+
+    on_threads(measure, spread(len(X)))
+    known = np.maximum.accumulate(np.where(np.isnan(found), -1, np.arange(len(X))))
+    errors = np.empty(len(X))
+    errors[order] = np.where(known < 0, 0.0, found[known])
+    return errors
+
+
+def _divided(moves: int, pace: FloatArray, most: IntArray) -> IntArray:
+    """Divide moves among rungs by their pace, so that none makes more than its most.
+
+    >>> _divided(100, np.array([1.0, 1.0, 2.0]), np.array([10, 1000, 1000])).tolist()
+    [10, 30, 60]
+    """
+    found = np.zeros(len(pace), np.int64)
     left, of = moves, float(pace.sum())
-    # the smallest first, whose most is the least: what they leave is for the others
-    for rung in np.argsort(sizes, kind="stable"):
-        shares[rung] = min(round(left * (pace[rung] / of)), int(most[rung]))
-        left, of = left - int(shares[rung]), of - pace[rung]
-    return shares
+    # those first that need least of their share: what they leave is for the others
+    for rung in np.argsort(most / pace, kind="stable"):
+        found[rung] = min(round(left * (pace[rung] / of)), int(most[rung]))
+        left, of = left - int(found[rung]), of - pace[rung]
+    return found
 
 
 def _anneal(

@@ -8,11 +8,16 @@ had their turn, a sweep, the next sweep begins, with twice as many moves, or wit
 has left. One slow sweep gives better meshes than several quick ones.
 
 The error on a rung never grows, so the front is never worse than the thinning it started from.
+
+With free meshes a sweep or two are only the beginning: some rungs of the ladder are then annealed freely, as
+:mod:`~meshsimp_pymoo.search.free` says, and what is best of them is kept beside the individuals, whose objectives are
+those of their subsets all the same.
 """
 
 from __future__ import annotations
 
 import time
+import warnings
 from typing import Any
 
 import numpy as np
@@ -22,17 +27,30 @@ from pymoo.core.mating import Mating
 from pymoo.core.population import Population
 from pymoo.core.survival import Survival
 from pymoo.termination.max_eval import MaximumFunctionCallTermination
+from pymoo.termination.max_gen import MaximumGenerationTermination
 from pymoo.util.display.multi import MultiObjectiveOutput
 from pymoo.util.optimum import filter_optimum
 
 from meshsimp_pymoo.arrays import spread
+from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
+from meshsimp_pymoo.search.free import (
+    ABREAST,
+    LARGE,
+    RUNGS,
+    SUBSETS_SHARE,
+    FreeLadder,
+    ladder_of,
+    steps_between,
+    surface_errors,
+)
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start, at_hand
-from meshsimp_pymoo.surface.surface import Surface, movable_ground
+from meshsimp_pymoo.surface.rules import USUAL_RATIO
+from meshsimp_pymoo.surface.surface import Surface, freedom_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
 # Rungs that get a child in the same generation.
@@ -60,6 +78,9 @@ FEWEST = 8
 LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
 MOST_SHARE = 0.3
+# With free meshes as much again of the time, and seconds a million vertices, for measuring what they are to be better
+# than; large models have nothing to be filled then but what their thinning has.
+FREE_SECONDS = 25.0
 # The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
 IDLE = 12
 # In the final front neighbours differ by this share of the error, or by the smaller one where a rung is better than the
@@ -69,6 +90,9 @@ STEP = 0.015
 SMALL_STEP = 0.008
 BETWEEN = 24
 ENTRIES = 2e8
+# What edges can be chosen by, and the generations of those that are chosen for the error.
+TRIANGULATIONS = ("delaunay", "free")
+FREE_GENERATIONS = -(-RUNGS // ABREAST)
 
 
 class SizeLadder(Survival):
@@ -83,23 +107,28 @@ class SizeLadder(Survival):
 
     def best(self, problem: Any, pop: Population) -> NDArray[np.int64]:
         """Return for each rung the row of its best individual in the population, -1 where none is small enough."""
-        F = pop.get("F")
         if self.rungs is None:
-            self.rungs = np.unique(F[:, 1])
-        violation = pop.get("CV").ravel() if problem.has_constraints() else np.zeros(len(pop))
-        # By violation, then error, then triangles: the first of those small enough is a rung's best.
-        order = np.lexsort((F[:, 1], F[:, 0], violation))
-        triangles = F[order, 1]
-        rows = np.full(len(self.rungs), -1)
-        for k, rung in enumerate(self.rungs):
-            fitting = np.flatnonzero(triangles <= rung)
-            if len(fitting):
-                rows[k] = order[fitting[0]]
-        return rows
+            self.rungs = np.unique(pop.get("F")[:, 1])
+        return _best_rows(problem, pop, self.rungs)
 
     def _do(self, problem: Any, pop: Population, *args: Any, n_survive: int | None = None, **kwargs: Any) -> Population:
         rows = self.best(problem, pop)
         return pop[np.unique(rows[rows >= 0])]
+
+
+def _best_rows(problem: Any, pop: Population, rungs: NDArray[Any]) -> NDArray[np.int64]:
+    """Return for each number of triangles the row of the best individual of at most that many, -1: there is none."""
+    F = pop.get("F")
+    violation = pop.get("CV").ravel() if problem.has_constraints() else np.zeros(len(pop))
+    # By violation, then error, then triangles: the first of those small enough is a rung's best.
+    order = np.lexsort((F[:, 1], F[:, 0], violation))
+    triangles = F[order, 1]
+    rows = np.full(len(rungs), -1)
+    for k, rung in enumerate(rungs):
+        fitting = np.flatnonzero(triangles <= rung)
+        if len(fitting):
+            rows[k] = order[fitting[0]]
+    return rows
 
 
 class DownTheLadder(Mating):
@@ -169,7 +198,7 @@ class DownTheLadder(Mating):
         temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
         parents = rows[turn if fresh else turn + 1]
         moves = self._moves(algorithm, self._work(problem, pop, rows), turn, chains)
-        limit = time_limit(algorithm)
+        limit = time_limit(algorithm, _subsets_share(algorithm))
         begun = time.perf_counter()
         children = relocate_all(
             problem.surface,
@@ -208,11 +237,12 @@ class DownTheLadder(Mating):
         """Return the moves of the rungs whose turn it is, given the work of all rungs."""
         left = sum(work[chain[self.step :]].sum() for chain in chains)
         within = part_of(getattr(algorithm, "termination", None), Moves)
-        deadline = time_limit(algorithm)
+        share = _subsets_share(algorithm)
+        deadline = time_limit(algorithm, share)
         if within is None or deadline is not None:
             moves = np.ceil(self._pace(deadline, work.sum(), left) * work[turn])
         if within is not None:
-            planned = self._share_of(within.n_max_moves, work[turn], left)
+            planned = self._share_of(round(share * within.n_max_moves), work[turn], left)
             moves = planned if deadline is None else np.minimum(moves, planned)
         return moves.astype(np.int64)
 
@@ -236,35 +266,61 @@ class DownTheLadder(Mating):
         return np.diff(np.round(np.cumsum(work) / work.sum() * whole), prepend=0.0)
 
 
-def time_limit(algorithm: Any) -> tuple[float, float, float] | None:
-    """Return the seconds a run has, those left for its sweeps, and those kept for its end; None: it has no limit."""
+def time_limit(algorithm: Any, share: float = 1.0) -> tuple[float, float, float] | None:
+    """Return the seconds a run has, or a share of them, those left of these, and those kept for its end.
+
+    None: it has no limit.
+    """
     whole = seconds_given(algorithm)
     if whole is None:
         return None
-    last = min(max(LAST_SHARE * whole, FILL_SECONDS * algorithm.problem.n_var / 1e6), MOST_SHARE * whole)
-    return whole, whole - last - (time.time() - algorithm.start_time), last
+    n_var, is_free = algorithm.problem.n_var, getattr(algorithm, "free", None) is not None
+    last = max(LAST_SHARE * whole, FILL_SECONDS * n_var / 1e6 if n_var <= LARGE or not is_free else 0.0)
+    if is_free:
+        last += LAST_SHARE * whole + FREE_SECONDS * n_var / 1e6
+    last = min(last, MOST_SHARE * whole)
+    return share * whole, share * (whole - last) - (time.time() - algorithm.start_time), last
+
+
+def _subsets_share(algorithm: Any) -> float:
+    """Return the share of a budget that is for subsets; the rest is for free meshes."""
+    if getattr(algorithm, "free", None) is None:
+        return 1.0
+    return 0.0 if algorithm.problem.n_var > LARGE else SUBSETS_SHARE
 
 
 class MemeticSearch(GeneticAlgorithm):
-    """The algorithm of :func:`memetic`; in the end it fills the gaps between the rungs."""
+    """The algorithm of :func:`memetic`; in the end it fills the gaps between the rungs.
+
+    Attributes
+    ----------
+    free : FreeLadder or None
+        The free meshes, if there are to be any.
+    """
 
     pop: Any
     opt: Any
 
-    def __init__(self, pop_size: int, triangles: tuple[int, int] | None, **kwargs: Any) -> None:
+    def __init__(
+        self, pop_size: int, triangles: tuple[int, int] | None, free: FreeLadder | None = None, **kwargs: Any
+    ) -> None:
         super().__init__(pop_size, **kwargs)
         self.triangles = triangles
+        self.free = free
         self.idle = 0
 
     @property
     def moves(self) -> int:
         """Moves of the annealing that were made so far."""
-        return int(self.mating.moves_done)
+        return int(self.mating.moves_done) + (0 if self.free is None else self.free.moves)
 
     def _setup(self, problem: Any, **kwargs: Any) -> None:
         if problem.n_obj != 2:
             raise ValueError(f"memetic() is for two objectives and the problem has {problem.n_obj}; use nsga3()")
-        movable_ground(surface_of(problem, self), "the memetic search and its thinning")
+        surface = surface_of(problem, self)
+        movable_ground(surface, "the memetic search and its thinning")
+        if self.free is not None:
+            freedom_of(surface, "free meshes", centroids=self.free.centroids)
         super()._setup(problem, **kwargs)
 
     def _initialize_infill(self) -> Population:
@@ -283,6 +339,8 @@ class MemeticSearch(GeneticAlgorithm):
         super()._initialize_advance(infills=infills, **kwargs)
 
     def _infill(self) -> Population:
+        if self.free is not None and self._are_subsets_done():
+            return self._anneal_freely(self.free)
         deadline = time_limit(self)
         if deadline is not None and deadline[1] <= 0.0:
             self.termination.force_termination = True
@@ -292,9 +350,73 @@ class MemeticSearch(GeneticAlgorithm):
         )
         # All of them known: no child may be left to find, and a budget of evaluations would never be used up.
         self.idle = 0 if len(children) else self.idle + 1
-        if self.idle >= max(IDLE, 2 * sweep_generations(self.pop_size)):
+        if self._is_idle() and self.free is None:
             self.termination.force_termination = True
         return children
+
+    def _is_idle(self) -> bool:
+        return self.idle >= max(IDLE, 2 * sweep_generations(self.pop_size))
+
+    def _are_subsets_done(self) -> bool:
+        """Whether free meshes have their turn: subsets have had their share, or one sweep where there is no budget."""
+        share, end = _subsets_share(self), self.termination
+        if share == 0.0 or self._is_idle():
+            return True
+        deadline, moves = time_limit(self, share), part_of(end, Moves)
+        generations = part_of(end, MaximumGenerationTermination)
+        if deadline is None and moves is None and generations is None:
+            return self.mating.sweep > 0
+        return (
+            (deadline is not None and deadline[1] <= 0.0)
+            or (moves is not None and self.mating.moves_done >= round(share * moves.n_max_moves))
+            or (generations is not None and generations.n_max_gen - self.n_iter < FREE_GENERATIONS)
+        )
+
+    def _anneal_freely(self, free: FreeLadder) -> Population:
+        """Anneal the next rungs freely; no subset comes of it."""
+        limit, moves = time_limit(self), part_of(self.termination, Moves)
+        F, surface = self.pop.get("F"), self.problem.surface
+        deviates = F[F[:, 0] > 0.0, 1].astype(int)
+        if not len(free.sizes) and len(deviates):
+            low, high = int(deviates.min()), int(deviates.max())
+            free.begin(
+                surface,
+                ladder_of(low, high),
+                steps_between(low, high),
+                self.random_state,
+                moves=None if moves is None else moves.n_max_moves - self.mating.moves_done,
+                timed=limit is not None,
+            )
+        n_left = len(free.todo)
+        if n_left and (limit is None or limit[1] > 0.0):
+            rows = _best_rows(self.problem, self.pop, free.sizes)
+            free.go_on(
+                surface,
+                lambda rung: self.pop[rows[rung]].X | surface.pinned,
+                seconds=None if limit is None else limit[1],
+            )
+        if not 0 < len(free.todo) < n_left:
+            self.termination.force_termination = True
+        return Population.create()
+
+    def take_free(self, *, until: float | None = None) -> None:
+        """Keep beside each individual of the optimum the best free mesh that is no larger and better; none, where none.
+
+        It has a lower error, and no higher one between the vertices if it was searched by that too.
+
+        Parameters
+        ----------
+        until : float, optional
+            After ``perf_counter() = until`` no more of the individuals' meshes are measured between the vertices.
+        """
+        free = self.free
+        if free is None or self.opt is None or not len(self.opt):
+            return
+        surface, F, X = self.problem.surface, self.opt.get("F"), self.opt.get("X")
+        between = surface_errors(surface, X, F[:, 1], until=until) if free.centroids and free.fronts else None
+        meshes = free.best_of(surface, self.problem.objectives[:1], F[:, 1], F[:, :1], between)
+        for one, mesh in zip(self.opt, meshes, strict=True):
+            one.set("free", mesh)
 
     def _advance(self, infills: Any = None, **kwargs: Any) -> None:
         if not len(infills):
@@ -313,6 +435,25 @@ class MemeticSearch(GeneticAlgorithm):
             super().next()
 
     def _finalize(self) -> None:
+        self._add_between()
+        if self.free is None:
+            return
+        limit = time_limit(self)
+        self.take_free(until=None if limit is None else time.perf_counter() + limit[1] + limit[2])
+        if (self.pop.get("F")[:, 0] > 0.0).any() and not self.free.fronts:
+            said = "any size was annealed freely: all meshes are Delaunay"
+        elif self.free.todo:
+            said = (
+                f"{len(self.free.todo)} of {len(self.free.sizes)} sizes were annealed freely: meshes there are those "
+                "of other sizes, thinned, or Delaunay"
+            )
+        else:
+            return
+        warnings.warn(
+            f"{self.problem.model.name}: the search ended before {said}; search longer", SearchWarning, stacklevel=2
+        )
+
+    def _add_between(self) -> None:
         """Add meshes between the rungs: the next larger rung's, thinned, or the thinned model, if that is better."""
         pop = self.pop
         surface = self.problem.surface
@@ -323,6 +464,8 @@ class MemeticSearch(GeneticAlgorithm):
             return
         limit = time_limit(self)
         seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
+        if seconds is not None and self.free is not None:
+            seconds /= 2.0
         X = between_the_rungs(
             surface,
             pop.get("X"),
@@ -420,6 +563,9 @@ def memetic(
     *,
     triangles: tuple[int, int] | None = None,
     moves_per_vertex: float | None = None,
+    triangulation: str = "delaunay",
+    min_height: float = USUAL_RATIO,
+    centroids: bool = True,
     **kwargs: Any,
 ) -> MemeticSearch:
     """Return the seeded memetic algorithm: thinning, then annealing down a ladder of sizes.
@@ -439,13 +585,25 @@ def memetic(
         Moves of the annealing for each kept vertex in the first sweep, twice as many in each later one, up to 1000. By
         default as many as make twenty million in all, within 20 and 1000; with a budget in moves or time as many as
         fit.
+    triangulation : {"delaunay", "free"}
+        With "free" some .3 of the budget are for subsets (nothing beyond thinning for models of more than 50 000
+        vertices), the rest for free meshes: their edges are searched too. They are kept beside the individuals, as
+        ``individual.get("free")``, where they are better: ``F`` of a result is that of ``X`` all the same, and
+        :meth:`Front.from_result` takes them over. Where there is no budget thirty million free moves are made, more for
+        large models.
+    min_height : float
+        Least height of the triangles that free meshes come to have, as a share of their longest edge; 0: any.
+    centroids : bool
+        Whether free meshes are searched by the error at the centroids of the original's faces, too, and taken only
+        where the surface error is not higher. Otherwise they fit the vertices and may be wrong between them.
     **kwargs
         Further arguments of pymoo's ``GeneticAlgorithm``; they replace those set here.
 
     Raises
     ------
     ValueError
-        If ``moves_per_vertex`` is negative.
+        If ``moves_per_vertex`` is negative, or what is said of free meshes makes no sense; when the search begins, if
+        the surface has none.
     TypeError
         If ``kwargs`` has a selection, crossover or mutation, which this algorithm does in one step.
 
@@ -465,6 +623,15 @@ def memetic(
     """
     if moves_per_vertex is not None and not moves_per_vertex >= 0:
         raise ValueError(f"moves_per_vertex = {moves_per_vertex} is no number of at least 0")
+    if triangulation not in TRIANGULATIONS:
+        raise ValueError(
+            f"triangulation={triangulation!r} is unknown; use one of {', '.join(map(repr, TRIANGULATIONS))}"
+        )
+    is_free = triangulation == "free"
+    if not is_free and (min_height, centroids) != (USUAL_RATIO, True):
+        raise ValueError(
+            f"min_height={min_height!r} and centroids={centroids!r} are for free meshes; give triangulation='free' too"
+        )
     for name in ("selection", "crossover", "mutation"):
         if name in kwargs:
             raise TypeError(f"memetic() makes its children in one step; give mating=... in place of {name}=...")
@@ -480,12 +647,13 @@ def memetic(
         "advance_after_initial_infill": True,
         "n_offsprings": CHAINS,
     }
-    algorithm = MemeticSearch(pop_size, triangles, **(defaults | kwargs))
+    free = FreeLadder(min_height=min_height, centroids=centroids) if is_free else None
+    algorithm = MemeticSearch(pop_size, triangles, free, **(defaults | kwargs))
     # What pymoo's constructor would put here cannot compare bool vectors.
-    algorithm.termination = kwargs.get("termination", ("n_gen", sweep_generations(pop_size)))
+    algorithm.termination = kwargs.get("termination", ("n_gen", sweep_generations(pop_size, free=is_free)))
     return algorithm
 
 
-def sweep_generations(pop_size: int) -> int:
-    """Return the generations that a sweep of so many rungs takes, the first population included."""
-    return 1 + -(-pop_size // CHAINS)
+def sweep_generations(pop_size: int, *, free: bool = False) -> int:
+    """Return the generations that a sweep of so many rungs takes, the first population and free meshes included."""
+    return 1 + -(-pop_size // CHAINS) + FREE_GENERATIONS * free

@@ -42,6 +42,8 @@ class Preset:
         About how many evaluations a generation makes for each individual.
     measured_by : tuple of str
         The kinds of budget that measure its work; seconds fit all.
+    frees : bool
+        Whether it makes free meshes itself, ``triangulation="free"``; fronts of others can be freed.
     """
 
     home: str
@@ -51,6 +53,7 @@ class Preset:
     sweeps: bool = False
     evaluations: float = 1.0
     measured_by: tuple[str, ...] = ("generations", "evaluations")
+    frees: bool = False
 
     @property
     def function(self) -> Callable[..., Any]:
@@ -67,6 +70,7 @@ PRESETS: dict[str, Preset] = {
         is_the_papers=False,
         sweeps=True,
         measured_by=("moves",),
+        frees=True,
     ),
     "nsga2_v1": Preset(home="search.nsga:nsga2_v1", about="NSGA-II, uniform crossover"),
     "nsga2_v2": Preset(home="search.nsga:nsga2_v2", about="NSGA-II, crossover OAX over L4", evaluations=2.1),

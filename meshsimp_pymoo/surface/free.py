@@ -83,15 +83,13 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.moves import answers
-from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
 from meshsimp_pymoo.workers import Reserve
 
 # How far the corners of the plane are from the unit square; their differences with all vertices are exact there.
 FAR = 0.5
 # No triangle that comes is lower than this in the unit square, whatever else is asked for: single precision holds it.
 LEAST_HEIGHT = 2.0**-21
-# Least height of triangles that come, as a share of their longest edge, where nothing is said.
-USUAL_RATIO = 0.1
 # Triangles compared where a vertex comes.
 TRIES = 4
 # Of so many flips outside the mesh one is made: they cost nothing and change what can come next.

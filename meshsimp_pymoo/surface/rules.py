@@ -11,6 +11,9 @@ from meshsimp_pymoo.surface.measures import OBJECTIVES
 FOOTPRINTS = ("model", "hull")
 OUTSIDES = ("nearest", "ignore")
 PINS = ("corners", "hull", "border")
+# Least height of the triangles that free meshes come to have, as a share of their longest edge, where nothing is said;
+# and the most that can be asked for: no triangle of a square cut in two is higher.
+USUAL_RATIO, MOST_RATIO = 0.1, 0.5
 
 
 @dataclass(frozen=True)

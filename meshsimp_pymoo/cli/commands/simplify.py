@@ -19,6 +19,8 @@ examples:
       search for a minute, take the best compromise
   meshsimp simplify scan.obj --max-error 0.1 --time 20s --format obj
       the smallest that deviates nowhere by more than 0.1
+  meshsimp simplify dem.asc --triangles 5000 --free --refit --time 60s
+      the least error at so many triangles: edges chosen for it, then heights
   meshsimp simplify grid.npy --spacing 30 --nodata=-9999
       a height grid
   meshsimp simplify scan.laz --classes 2 --max-edge 5 --format landxml
@@ -28,7 +30,15 @@ examples:
 """
 
 # About how long each stage takes [s], until more is known.
-STAGES = {"starting": 0.7, "reading": 0.5, "compiling": 0.0, "searching": 20.0, "refitting": 0.0, "writing": 2.0}
+STAGES = {
+    "starting": 0.7,
+    "reading": 0.5,
+    "compiling": 0.0,
+    "searching": 20.0,
+    "freeing": 0.0,
+    "refitting": 0.0,
+    "writing": 2.0,
+}
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -43,15 +53,17 @@ def add(parser: argparse.ArgumentParser) -> None:
         duration,
         mesh_count,
         tile,
+        typed,
         whole,
     )
-    from meshsimp_pymoo.cli.requests import TILED_FROM, Output, Search
+    from meshsimp_pymoo.cli.requests import TILED_FROM, Free, Output, Search
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.formats.table import all_formats, listed, written_formats
     from meshsimp_pymoo.search.presets import DEFAULT_GENERATIONS, PRESETS
     from meshsimp_pymoo.search.wishes import USUAL_BUDGET
+    from meshsimp_pymoo.settings import Real
     from meshsimp_pymoo.surface.measures import OBJECTIVES
-    from meshsimp_pymoo.surface.rules import Rules
+    from meshsimp_pymoo.surface.rules import MOST_RATIO, Rules
 
     parser.add_argument("-o", "--output", metavar="OUT", help="folder to make (default: MODEL_front, here)")
     parser.add_argument("--overwrite", action="store_true", help="replace results that are in OUT already")
@@ -97,6 +109,26 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     search.add_argument(
         "--threads", type=whole(1), metavar="N", help="(default: all cores; the results do not depend on it)"
+    )
+    search.add_argument(
+        "--free",
+        action="store_true",
+        help="choose the edges of the meshes for the error too, instead of by the Delaunay rule: less error at equal "
+        "triangles. memetic does so in the search; of another algorithm, or where a mesh is wanted, the front is freed "
+        "in the last part of the time. For pictures, printing, games; keep Delaunay meshes for hydrology and finite "
+        "elements",
+    )
+    search.add_argument(
+        "--free-height",
+        type=typed(Real(0, most=MOST_RATIO).from_text),
+        default=Free.free_height,
+        metavar="R",
+        help="least height of the triangles that come, as a share of their longest edge; 0: any (default: %(default)s)",
+    )
+    search.add_argument(
+        "--no-centroids",
+        action="store_true",
+        help="free meshes for the error at the vertices alone: less there, but more between them",
     )
     add_checkpoint(search, "the state of the search is saved in OUT", " (tiles are always saved)")
 
