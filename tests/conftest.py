@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import gc
+import hashlib
 import os
+import pickle
 from pathlib import Path
+from typing import Any
 
 import pytest
 from browser import launched, playwright_engine
 from counts import SLOW
 from hypothesis import settings
 
+from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -34,6 +39,12 @@ def pytest_itemcollected(item: pytest.Item) -> None:
         item.add_marker("slow")
 
 
+def pytest_collection_finish() -> None:
+    """Let the garbage collector pass over tests and modules: the command collects all there is, .2 s each time."""
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Divide folders among two processes, on any machine: some tests start two themselves. A file is quicker in one."""
     return 2 if any((config.invocation_params.dir / argument).is_dir() for argument in config.args) else 0
@@ -50,6 +61,33 @@ def _compiled() -> None:
     """Compile what searches need, in two processes, where it is missing: else the first test that searches does."""
     with Warming(SEARCH) as warming:
         warming.finish()
+
+
+FRONT_FIGURE = figures.front_figure
+
+
+def sketch(surface: Any, *told: Any, **marks: Any) -> Any:
+    """Return a figure without axes, of pixels that tell what the picture of a front would be drawn from."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(1, 1), dpi=32)
+    drawn = hashlib.sha256(pickle.dumps((surface.model.hash, surface.rules, told, marks)))
+    figure.figimage(list(map(list, 32 * [drawn.digest()])))
+    return figure
+
+
+@pytest.fixture(scope="module")
+def sketched():
+    """Let the commands of a module draw sketches, a tenth of the work, but for tests that ask for `drawn`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "front_figure", sketch)
+        yield
+
+
+@pytest.fixture
+def drawn(sketched, monkeypatch):
+    """Let a test of such a module draw its pictures."""
+    monkeypatch.setattr(figures, "front_figure", FRONT_FIGURE)
 
 
 @pytest.fixture(scope="session")

@@ -42,6 +42,9 @@ from meshsimp_pymoo.storage import MESHES_BY_DEFAULT, read_front
 from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES, OF_MESH, Measure, Quality
 from meshsimp_pymoo.surface.rules import Rules
 
+# How pictures look is shown in tests/report.
+pytestmark = pytest.mark.usefixtures("sketched")
+
 PAPERS = ("--algorithm", "nsga2_v1")
 # The default search takes several times as long: what is not about it is done with another.
 DEFAULT = ("--generations", "2", "--population", "8")
@@ -77,6 +80,7 @@ def one_line(capsys):
 # -------------------------------------------------------------------------------------------------------- the main job
 
 
+@pytest.mark.usefixtures("drawn")
 def test_simplify_writes_a_front_that_reads_back_and_meshes_that_open(tmp_path, capsys):
     assert run("simplify", "face:200", "-o", tmp_path / "out", "--meshes", "all", *DEFAULT) == 0
     out, err = capsys.readouterr()

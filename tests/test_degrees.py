@@ -85,6 +85,7 @@ def referee(points, vertices, faces, scale):
 
 
 pytestmark = [
+    pytest.mark.usefixtures("sketched"),  # how pictures look is shown in tests/report
     pytest.mark.filterwarnings("ignore:.*its coordinates are degrees:meshsimp_pymoo.errors.ModelWarning"),
     pytest.mark.filterwarnings("ignore::PendingDeprecationWarning"),  # rasterio multiplies transforms in an old way
     pytest.mark.filterwarnings("ignore:Arrays of 2-dimensional vectors:DeprecationWarning"),

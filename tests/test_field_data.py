@@ -13,6 +13,9 @@ import trimesh
 from meshsimp_pymoo import Front, MeshProblem
 from meshsimp_pymoo.cli import main
 
+# How pictures look is shown in tests/report.
+pytestmark = pytest.mark.usefixtures("sketched")
+
 QUICK = ("--algorithm", "nsga2_v1", "--population", "8", "--generations", "2", "--no-page")
 
 

@@ -315,12 +315,12 @@ def tried(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -> 
                 d = cost_at(free, i, abs(z0 + rise[k, 0] * dx + rise[k, 1] * dy - points[i, 2]))
                 cost[k] += d
                 whole += d
+                if whole > most:
+                    return np.inf
                 sample[n_samples] = i
                 owner[n_samples] = k
                 n_samples += 1
             i = np.int64(following[i]) if q >= 0 else np.int64(-1)
-        if whole > most:
-            return np.inf
     fan.number[N_SAMPLES] = n_samples
     return whole - before
 

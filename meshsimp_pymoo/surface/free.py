@@ -94,6 +94,13 @@ LEAST_HEIGHT = 2.0**-21
 TRIES = 4
 # Of so many flips outside the mesh one is made: they cost nothing and change what can come next.
 IDLE = 8
+# Moves look at a window of so many triangles and the vertices there, which the processor's cache holds; after so many
+# moves it goes on by half of that, along the curve that the records follow.
+WINDOW = 2000
+VISIT = 4000
+# What the centroids weigh, all together, of what the vertices do. As much as these, and the error at the vertices is
+# 1 % higher (3 % at a fifth of the vertices of a large model), that between them 2 % lower (5 %).
+CENTROIDS = 0.5
 # From so many samples on, books that are not used are given back: hundreds of bytes a sample each.
 LARGE = 900_000
 
@@ -261,6 +268,13 @@ def _inside(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -
     return change
 
 
+@inner(inline=True)
+def _drawn(n: int, first: float, share: float, state: np.ndarray) -> int:
+    """Draw one of n things in a window on them, which starts at a share of all and is of another."""
+    k = int(first * n) + below(state, max(int(share * n), 1))
+    return k if k < n else k - n
+
+
 @inner
 def _flip(free: Freedom, live: Live, h: int, most: int, limit: float, state: np.ndarray) -> float:
     """Flip the edge of halfedge h; return the change of cost, inf where it stays."""
@@ -371,7 +385,9 @@ def _meet(one: Fan, two: Fan) -> bool:
 
 
 @inner
-def _swap(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.ndarray) -> int:
+def _swap(
+    free: Freedom, live: Live, v: int, most: int, limit: float, first: float, share: float, state: np.ndarray
+) -> int:
     """Let site v inside the mesh collapse and a vertex come where the cost is large; return that, -1: nothing changed.
 
     The cavity is the star of v, which stays where there is room for two triangles more.
@@ -381,7 +397,7 @@ def _swap(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.
     n_records = live.tally[END] >> 3
     t = np.int64(-1)
     for _ in range(TRIES):
-        r = below(state, n_records)
+        r = _drawn(n_records, first, share, state)
         if live.kind[r] & EMITTED and (t < 0 or live.subtotal[r] > live.subtotal[t >> 3]):
             t = r * RECORD
     if t < 0:
@@ -487,31 +503,40 @@ def anneal_freely(
     shares: FreeShares,
     state: np.ndarray,
     stop: np.ndarray,
+    visited: np.ndarray,
     accepted: np.ndarray,
 ) -> int:
     """Walk among free meshes of at most ``most`` triangles; return the number of moves that were tried.
 
     The temperature falls from ``hot`` to ``cold``; 0 accepts improvements only. ``movable[:n_movable[0]]`` are the
-    sites that may go, ``accepted`` counts flips, shifts and swaps.
+    sites that may go, ``visited`` the steps made so far, ``accepted`` counts flips, shifts and swaps.
     """
     free = borrowed(freedom)
     live = borrowed(books)
     state = borrowed(state)
     movable = borrowed(movable)
     temperature = hot
+    n_records = live.tally[END] >> 3
+    share = min(WINDOW / n_records, 1.0)
+    first = 0.0
     for step in range(moves):
         if step % 64 == 0:
             if stop[0]:
+                visited[0] += step
                 return step
+            n_records = live.tally[END] >> 3
+            if share < 1.0:
+                first = 0.5 * share * ((visited[0] + step) // VISIT)
+                first -= int(first)
             temperature = hot * (cold / hot) ** (step / moves) if hot > 0.0 else 0.0
         # what costs nothing is refused in the end: it would go on for ever
         limit = -temperature * np.log(unit(state)) if hot > 0.0 else -1e-300
         what = unit(state)
         if what < shares.flip or n_movable[0] == 0:
-            h = below(state, 3 * (live.tally[END] >> 3))
-            accepted[0] += _flip(free, live, h // 3 * RECORD + h % 3, most, limit, state) < np.inf
+            t = _drawn(n_records, first, share, state) * RECORD
+            accepted[0] += _flip(free, live, t + below(state, 3), most, limit, state) < np.inf
             continue
-        q = below(state, n_movable[0])
+        q = _drawn(n_movable[0], first, share, state)
         v = movable[q]
         if not take_star(live, free.fan, v):
             continue
@@ -523,7 +548,7 @@ def anneal_freely(
             accepted[1] += w >= 0
         else:
             if inside:
-                w = _swap(free, live, v, most, limit, state)
+                w = _swap(free, live, v, most, limit, first, share, state)
             else:
                 w = _swap_outline(free, live, v, most, limit, state)
             accepted[2] += w >= 0
@@ -533,6 +558,7 @@ def anneal_freely(
                 n_movable[0] += 1
             movable[q] = w
     retake(live, len(free.ground.z))
+    visited[0] += moves
     return moves
 
 
@@ -720,8 +746,8 @@ class FreeGround:
     sites : callable
         Returns the rows of kept vertices (N,), one for each place: one of those that stay where there is one.
     centroids : bool
-        Whether the centroids of the original faces are samples too: as many vertices more, each with the weight of its
-        face's corners and the share of its area.
+        Whether the centroids of the original faces are samples too, together of `CENTROIDS` of the weight of all
+        vertices: each has the share of its face's area, and the weight of its corners.
     """
 
     def __init__(
@@ -740,7 +766,7 @@ class FreeGround:
         if centroids:
             ground, share = with_centroids(ground, model)
             corners = model.faces[centroids_of(model)[3]]
-            weights = np.concatenate([weights, len(model.faces) * share * weights[corners].mean(axis=1)])
+            weights = np.concatenate([weights, CENTROIDS * n * share * weights[corners].mean(axis=1)])
         n_samples = len(ground.z)
         low, high = -FAR, 1.0 + FAR
         xy = np.vstack([ground.xy.reshape(-1, 2), [[high, high], [low, high], [low, low], [high, low]]])
@@ -813,6 +839,7 @@ class FreeTriangulation:
         self._movable = np.empty(n, np.int64)
         self._movable[: len(rows)] = rows
         self._n_movable = np.array([len(rows)])
+        self._visited = np.zeros(1, np.int64)
         self.accepted = np.zeros(3, np.int64)
 
     @property
@@ -878,6 +905,7 @@ class FreeTriangulation:
                 shares,
                 state,
                 np.zeros(1, np.bool_) if stop is None else stop,
+                self._visited,
                 self.accepted,
             )
         )

@@ -200,8 +200,6 @@ def test_a_vertex_moves_to_where_it_belongs():
 def test_vertices_of_the_outline_slide_and_swap_along_the_border():
     """Vertices of the border that are badly chosen: what lies beyond the outline costs its distance."""
     rated = surface(build_model(load("horseshoe:200")))
-    border = np.zeros(rated.n_vertices, bool)
-    border[rated.border] = True
     kept = rated.pinned.copy()
     kept[rated.border[::6]] = True
     for shares, at_least in ((FreeShares(0.0, 1.0), 0.9), (FreeShares(0.0, 0.0), 0.9), (FreeShares(), 0.8)):
@@ -214,9 +212,7 @@ def test_vertices_of_the_outline_slide_and_swap_along_the_border():
             assert free.triangles == triangles
             assert free.cost < at_least * cost
             assert free.cost == pytest.approx(cost_from_scratch(free))
-            used = np.unique(free.faces)
-            assert border[used].all()  # the subset had no others
-            assert set(used) - set(np.flatnonzero(kept))
+            assert set(np.unique(free.faces)) - set(np.flatnonzero(kept))
 
 
 @pytest.mark.parametrize("name", ["jacksboro:11", "face:300"])

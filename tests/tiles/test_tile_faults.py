@@ -429,7 +429,7 @@ def test_a_damaged_record_of_what_the_tiles_belong_to_is_named(path, whole, tmp_
 
 
 LIMITED = """
-import resource, sys
+import mmap, resource, sys  # numpy imports mmap when it maps a file, which is after the limit is set
 from pathlib import Path
 import meshsimp_pymoo.cli.searching
 from meshsimp_pymoo.cli import main

@@ -25,6 +25,9 @@ from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles.thin import thin_tile
 
+# How pictures look is shown in tests/report.
+pytestmark = pytest.mark.usefixtures("sketched")
+
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
