@@ -201,6 +201,8 @@ class FreeLadder:
         self.planned: IntArray = np.empty(0, np.int64)
         self.seeds: IntArray = np.empty(0, np.int64)
         self.fronts: dict[int, FreeFront] = {}
+        # what all but the annealing was thought to take, and took [s]
+        self.thought, self.took = 0.0, 0.0
 
     @property
     def moves(self) -> int:
@@ -315,19 +317,23 @@ class FreeLadder:
         begun = time.perf_counter()
         sizes = self._wanted(rung)
         n_samples = surface.n_vertices + len(ground.share)
-        if seconds is not None:
-            size = int(self.sizes[rung])
-            seconds -= SECONDS_A_TRIANGLE * size + (SECONDS_A_SAMPLE + MEASURING * len(sizes)) * n_samples
+        thought = SECONDS_A_TRIANGLE * int(sizes[0]) + (SECONDS_A_SAMPLE + MEASURING * len(sizes)) * n_samples
+        if seconds is not None:  # more on a machine that is slow or busy
+            seconds -= thought * (max(self.took / self.thought, 1.0) if self.thought > 0.0 else 1.0)
         if stop[0]:
             return None
         with ground.triangulation(kept, min_height=self.min_height) as mesh:
             until = None if seconds is None else begun + seconds
             is_large = surface.n_vertices > LARGE
+            ready = time.perf_counter()
             moves = _anneal(mesh, sizes[0], self.seeds[rung], self.planned[rung], until, is_large, stop)
             if moves is None:
                 return None
+            annealed = time.perf_counter()
             faces = mesh.faces.astype(np.int32)
             removed, onto, collapses, table = _thinned(mesh, surface, ground.share, sizes, stop)
+        self.thought += thought
+        self.took += time.perf_counter() - annealed + ready - begun
         return None if stop[1:].any() else FreeFront(faces, removed, onto, collapses, table, moves)
 
     def _wanted(self, rung: int) -> IntArray:

@@ -466,13 +466,15 @@ class MemeticSearch(GeneticAlgorithm):
         seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
         if seconds is not None and self.free is not None:
             seconds /= 2.0
+        # where subsets were not searched there is nothing to thin
+        share = 1.0 if _subsets_share(self) == 0.0 else 0.5
         X = between_the_rungs(
             surface,
             pop.get("X"),
             pop.get("F"),
             most=self.survival.rungs[-1],
             seconds=seconds,
-            measured=None if seconds is None else measurable(self.problem, seconds / 2.0),
+            measured=None if seconds is None else measurable(self.problem, share * seconds),
         )
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)
