@@ -27,7 +27,7 @@ from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
 from meshsimp_pymoo.surface.free import take_numbers
-from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_quality
+from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, UNCOVERED, as_quality
 from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
@@ -62,6 +62,8 @@ FIRST_MOVES = 1000
 LATE = 0.05
 # Sizes between the rungs that are measured differ by this share, or by one triangle.
 STEP = 0.015
+# The time of a rung grows with this power of its size, and ebbs away towards all triangles, where little can be gained.
+TIME_POWER = 0.3
 # Where one mesh is wished for: sizes as shares of the number of triangles, or of those of the mesh that holds the wish
 # so far, which free ones of fewer may hold, with their shares of the time; and those of some others of the front.
 AROUND_A_SIZE = ((0.85, 0.5), (1.0, 2.0), (1.0, 2.0), (1.18, 0.5))
@@ -179,7 +181,7 @@ class FreeLadder:
     offered : (Q,) int array
         Sizes that are measured where they lie between two rungs, ascending.
     shares : (R,) float array
-        How much of the time each rung is to have, in any unit.
+        How much of the time each rung is to have, in any unit; :func:`usual_shares` by default.
     planned : (R,) int array
         The most moves of each rung.
     fronts : dict of int to FreeFront
@@ -236,7 +238,7 @@ class FreeLadder:
         random_state : numpy.random.Generator
             Source of randomness.
         shares : (R,) float array, optional
-            See the attributes; all have the same by default.
+            See the attributes.
         moves : int, optional
             How many there are for all rungs; by default as many as are usual.
         timed : bool
@@ -244,7 +246,7 @@ class FreeLadder:
         """
         n_samples = surface.n_vertices + len(freedom_of(surface, "free meshes", centroids=self.centroids).share)
         self.sizes, self.offered, self.fronts = sizes, offered, {}
-        self.shares = np.ones(len(sizes)) if shares is None else shares
+        self.shares = usual_shares(sizes, surface.n_vertices) if shares is None else shares
         self.seeds = random_state.integers(1, 2**63 - 1, size=len(sizes))
         most = MOST_MOVES * sizes
         # moves of each in the same time
@@ -444,6 +446,19 @@ def ladder_of(low: int, high: int, n: int = RUNGS) -> IntArray:
     return np.unique(sizes + (sizes - sizes[0] + np.arange(len(sizes))) % 2)
 
 
+def usual_shares(sizes: IntArray, n_vertices: int) -> FloatArray:
+    """Return how much of the time rungs have; see `TIME_POWER`.
+
+    Examples
+    --------
+    >>> usual_shares(np.array([20, 200, 2000]), 1000).round(2).tolist()
+    [0.26, 0.48, 0.05]
+    """
+    of_all = np.minimum(sizes / (2.0 * n_vertices), 1.0)
+    shares: FloatArray = of_all**TIME_POWER * (1.05 - of_all)
+    return shares
+
+
 def steps_between(low: int, high: int) -> IntArray:
     """Return numbers of triangles from ``low`` to ``high`` that differ by `STEP`, or by 1.
 
@@ -567,9 +582,15 @@ def _thinned(
 
 
 def _mesh(surface: Surface, faces: IntArray, row: FloatArray) -> FreeMesh:
-    """Return a free mesh with its numbers."""
+    """Return a free mesh with its numbers.
+
+    Where several segments of the outline are nearest to a vertex, it is a matter of the written mesh which one counts:
+    so it is measured again where some are not covered.
+    """
     kept = surface.pinned.copy()
     kept[used_rows(faces)[0]] = True
+    if row[UNCOVERED] > 0:
+        return FreeMesh(kept, faces, surface.of_faces(faces).quality)
     quality = as_quality(
         row[:REGIONS],
         surface.total_weight,
