@@ -99,8 +99,8 @@ def test_all_meshes_are_measured_as_their_faces_are(model, weighted, footprint, 
                 assert is_canonical(faces)
                 assert faces.dtype == np.int32
                 said, numbers = asdict(mesh.quality), asdict(own.of_faces(faces).quality)
-                if not centroids:
-                    assert np.isnan(said.pop("surface_error"))
+                if not centroids and np.isnan(said["surface_error"]):  # no sample says it
+                    del said["surface_error"]
                 assert said == pytest.approx({name: numbers[name] for name in said}, rel=1e-9, abs=1e-12)
                 np.testing.assert_array_equal(
                     np.flatnonzero(mesh.kept & ~own.pinned),
