@@ -1165,7 +1165,7 @@ def main(argv=None) -> int:
     parser.add_argument("--best", nargs="?", const="compare", choices=("compare", "write"), help=text)
     text = (
         f"variants of the search, {ABLATION_SECONDS:g} s each (--budgets S: S): "
-        f"{', '.join(['delaunay', *VARIANTS, 'free', *FREE_VARIANTS])}; 'delaunay' (default) and 'free': all of a kind"
+        f"{'; '.join([*VARIANTS, *FREE_VARIANTS])}; 'delaunay' (default) and 'free': all of a kind"
     )
     parser.add_argument("--ablation", nargs="*", metavar="VARIANT", help=text)
     text = f"true fronts of this many small models; default: {ENUMERABLE}"
