@@ -38,10 +38,10 @@ from meshsimp_pymoo.surface.books import (
 )
 from meshsimp_pymoo.surface.costs import is_inside
 from meshsimp_pymoo.surface.ground import Ground
-from meshsimp_pymoo.surface.live import collect, enter_region, new_record
+from meshsimp_pymoo.surface.live import MOST_LOOKED_THROUGH, collect, enter_region, new_record
 
 # Vertices with more triangles around stay where they are; the most in searches are some 20.
-MOST_AROUND = 64
+MOST_AROUND = MOST_LOOKED_THROUGH
 
 # Entries of ``number``: triangles that go, vertices of the ring, the side of the ring that the fan's first triangle
 # stands on, the fan's triangles, its apex, and the samples that were looked at.
@@ -205,6 +205,16 @@ def is_covered(live: Live, fan: Fan) -> bool:
 # ------------------------------------------------------------------------------------------- where the region stays
 
 
+@inner(inline=True)
+def _is_high(free: Freedom, ux: float, uy: float, vx: float, vy: float) -> bool:
+    """Whether a triangle with these two edges from one corner, counter-clockwise, is as high as it must be."""
+    wx = vx - ux
+    wy = vy - uy
+    area = ux * vy - uy * vx
+    longest = max(ux * ux + uy * uy, vx * vx + vy * vy, wx * wx + wy * wy)
+    return area >= free.ratio * longest and area >= free.height * np.sqrt(longest)
+
+
 @inner
 def has_shape(free: Freedom, fan: Fan) -> bool:
     """Whether all triangles of the fan are as they must be; fill their rays and planes."""
@@ -222,10 +232,7 @@ def has_shape(free: Freedom, fan: Fan) -> bool:
         i = np.int64(fan.ring[side_of(fan, k + 1)])
         vx, vy, vz = points[i, 0] - x0, points[i, 1] - y0, points[i, 2] - z0
         area = ux * vy - uy * vx
-        wx = vx - ux
-        wy = vy - uy
-        longest = max(ux * ux + uy * uy, vx * vx + vy * vy, wx * wx + wy * wy)
-        if not (area >= free.ratio * longest and area >= free.height * np.sqrt(longest)):
+        if not _is_high(free, ux, uy, vx, vy):
             return False
         ray[k + 1, 0] = vx
         ray[k + 1, 1] = vy
@@ -446,6 +453,7 @@ def is_shown(free: Freedom, live: Live, fan: Fan) -> int:
     A triangle is emitted where the footprint holds it, and must then have the shape.
     """
     g = free.ground
+    points = free.points
     mesh = live.mesh
     apex = fan.number[APEX]
     more = 0
@@ -460,7 +468,8 @@ def is_shown(free: Freedom, live: Live, fan: Fan) -> int:
             return NOT
         fan.shown[k] = 0
         if max(a, b, apex) < free.n_vertices and is_inside(g, a, b, apex):
-            if not _is_fit(free, a, b, apex):
+            x0, y0 = points[apex, 0], points[apex, 1]
+            if not _is_high(free, points[a, 0] - x0, points[a, 1] - y0, points[b, 0] - x0, points[b, 1] - y0):
                 return NOT
             fan.shown[k] = 1
             more += 1
@@ -568,14 +577,14 @@ def done_outside(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: flo
     fan.moved[1] = w
     before = amount[COVERED_ERROR] + amount[BARE_ERROR]
     collect(live, fan.cavity, n_cavity)
-    _exchange(live, v, w)
+    _replace_site(live, v, w)
     _write(live, fan)
     for k in range(n):
         t = fan.record[k]
         kind[t >> 3] = PLAIN if fan.shown[k] else 0
         live.region[k] = t
     live.tally[N_REGION] = n
-    enter_region(free.ground, live, False)
+    enter_region(free.ground, live, False, True)
     change = amount[COVERED_ERROR] + amount[BARE_ERROR] - before
     if not change <= limit:
         undone(free, live, fan)
@@ -590,7 +599,7 @@ def undone(free: Freedom, live: Live, fan: Fan) -> None:
     n = fan.number[N_FAN]
     n_cavity = fan.number[N_CAVITY]
     collect(live, fan.record, n)
-    _exchange(live, fan.moved[1], fan.moved[0])
+    _replace_site(live, fan.moved[1], fan.moved[0])
     for k in range(n - 1, n_cavity - 1, -1):
         t = fan.record[k]
         live.free[live.tally[N_FREE]] = t
@@ -609,7 +618,7 @@ def undone(free: Freedom, live: Live, fan: Fan) -> None:
     for j in range(fan.number[N_RING]):
         mesh[fan.rim[j] + 4] = fan.inside[j]
     live.tally[N_REGION] = n_cavity
-    enter_region(free.ground, live, False)
+    enter_region(free.ground, live, False, True)
     # the sums are what they were, without the rounding of having come and gone
     live.amount[COVERED_ERROR] = fan.sums[0]
     live.amount[BARE_ERROR] = fan.sums[1]
@@ -617,7 +626,7 @@ def undone(free: Freedom, live: Live, fan: Fan) -> None:
 
 
 @inner
-def _exchange(live: Live, v: int, w: int) -> None:
+def _replace_site(live: Live, v: int, w: int) -> None:
     """Let v be a sample again and w be a site, where their triangles are collected."""
     count = live.tally
     pool = live.pool
@@ -640,18 +649,3 @@ def _exchange(live: Live, v: int, w: int) -> None:
         count[N_SITES] += 1
         live.touched[count[N_TOUCHED]] = w
         count[N_TOUCHED] += 1
-
-
-@inner
-def _is_fit(free: Freedom, a: int, b: int, c: int) -> bool:
-    """Whether one triangle is as it must be."""
-    points = free.points
-    ux = points[a, 0] - points[c, 0]
-    uy = points[a, 1] - points[c, 1]
-    vx = points[b, 0] - points[c, 0]
-    vy = points[b, 1] - points[c, 1]
-    wx = vx - ux
-    wy = vy - uy
-    area = ux * vy - uy * vx
-    longest = max(ux * ux + uy * uy, vx * vx + vy * vy, wx * wx + wy * wy)
-    return area >= free.ratio * longest and area >= free.height * np.sqrt(longest)

@@ -88,7 +88,8 @@ from meshsimp_pymoo.workers import Reserve
 
 # How far the corners of the plane are from the unit square; their differences with all vertices are exact there.
 FAR = 0.5
-# No triangle that comes is lower than this in the unit square, whatever else is asked for: single precision holds it.
+# No triangle that comes is lower than this in the unit square, whatever else is asked for: single precision holds it,
+# in coordinates from a corner of the model.
 LEAST_HEIGHT = 2.0**-21
 # Triangles compared where a vertex comes.
 TRIES = 4
@@ -573,6 +574,8 @@ def take_numbers(free: Freedom, live: Live, share: np.ndarray, row: np.ndarray) 
     mesh = live.mesh
     n = free.n_vertices
     for k in range(REGIONS + 1):
+        row[k] = np.nan
+    for k in (ERROR, VERTICES, SQUARES, MAXIMUM, UNCOVERED, REGIONS):
         row[k] = 0.0
     row[TRIANGLES] = live.tally[N_EMITTED]
     for i in range(n + len(share)):

@@ -213,12 +213,17 @@ def _settle(g: Ground, live: Live, half: bool) -> None:
                     _settle_thin(live, s)
         for q in range(count[N_REGION]):
             kind[region[q] >> 3] &= ~IN_REGION
-    enter_region(g, live, half)
+    enter_region(g, live, half, False)
 
 
 @inner
-def enter_region(g: Ground, live: Live, half: bool) -> None:
-    """Enter the triangles of the region, whose kind is known, into the books and place the pooled vertices."""
+def enter_region(g: Ground, live: Live, half: bool, closed: bool) -> None:
+    """Enter the triangles of the region, whose kind is known, into the books and place the pooled vertices.
+
+    With ``closed`` these lie in the region, which has no ghost and at most `MOST_LOOKED_THROUGH` triangles: one that by
+    rounding lies in none of them is in the one that it is least outside of. (Walks may go on for ever where
+    triangulations are not Delaunay.)
+    """
     xy = g.xy
     z = g.z
     mesh = live.mesh
@@ -278,7 +283,9 @@ def enter_region(g: Ground, live: Live, half: bool) -> None:
                 t = s
                 found = True
                 break
-        if not found:
+        if not found and closed:
+            t = _least_outside(xy, mesh, region, count[N_REGION], i)
+        elif not found:
             t = locate(xy, mesh, t, xy[2 * i], xy[2 * i + 1], g.exact_area)
         r = t >> 3
         place[i] = t
@@ -313,6 +320,24 @@ def enter_region(g: Ground, live: Live, half: bool) -> None:
         amount[PEAK] = whole
     elif whole < RETAKEN_BELOW * amount[PEAK]:
         retake(live, len(g.z))
+
+
+@inner
+def _least_outside(xy: np.ndarray, mesh: np.ndarray, region: np.ndarray, n: int, i: int) -> int:
+    """Return the triangle of the region that vertex i is least outside of, by twice the area with a side."""
+    best = np.int64(region[0])
+    most = -np.inf
+    for q in range(n):
+        t = np.int64(region[q])
+        least = np.inf
+        for k in range(3):
+            a, b = np.int64(mesh[t + k]), np.int64(mesh[t + (k + 1) % 3])
+            ux, uy = xy[2 * b] - xy[2 * a], xy[2 * b + 1] - xy[2 * a + 1]
+            least = min(least, ux * (xy[2 * i + 1] - xy[2 * a + 1]) - uy * (xy[2 * i] - xy[2 * a]))
+        if least > most:
+            most = least
+            best = t
+    return best
 
 
 @inner
