@@ -195,7 +195,7 @@ PARTS = (
     Part("thinning", ("search.greedy:thin",), _thinning, 16.6, True),
     Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True),
     Part(
-        "free meshes", ("surface.free:_open", "surface.free:anneal_freely", "search.free:_thin"), _free, 24.0, False
+        "free meshes", ("surface.free:_open", "surface.free:anneal_freely", "search.free:_thin"), _free, 12.0, False
     ),
     Part("insertion", ("search.greedy:_grow",), _insertion, 4.5, False),
     Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 3.4, True),

@@ -155,6 +155,7 @@ def test_the_record_of_the_run_holds_what_is_needed_to_repeat_it(tmp_path):
         "algorithm": "nsga2_v1",
         "population": 12,
         "threads": None,
+        "free": False,
         "format": "ply",
         "meshes": 100,
         "refit": False,
@@ -821,6 +822,83 @@ def test_pick_copies_what_is_stored_even_if_the_model_is_gone(tmp_path, roof_ply
     assert run("pick", tmp_path / "out", "--solution", stored, "-o", tmp_path / "a.obj") == 2
     assert re.search(r"out: its model cannot be read \(.*roof\.ply: no such file.*--model FILE", one_line(capsys))
     assert not (tmp_path / "a.obj").exists()
+
+
+FREE = ("--free", "--moves", "20000", "--population", "16")
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("memetic", FREE),
+        ("memetic for the vertices alone", (*FREE, "--no-centroids", "--free-height", "0", "--measure", "rms")),
+        ("a wish", (*FREE, "--triangles", "61", "--refit")),
+        ("two wishes", (*FREE, "--triangles", "80", "--max-error", "14")),
+        ("a wish for an error", (*FREE, "--mean-error", "3")),
+        ("the paper's", ("--free", "--time", "1s", "--population", "12", *PAPERS)),
+    ],
+)
+def test_free_meshes_are_written_as_they_are_measured_and_judged_by_what_is_wished_for(tmp_path, capsys, kind, options):
+    out = tmp_path / "out"
+    assert run("simplify", "face:200", "-o", out, *options, "--no-page", "--json") == 0
+    said = json.loads(capsys.readouterr().out)
+    record = json.loads((out / "run.json").read_text())
+    assert record["settings"]["free"] is True
+    front = Front.load(out)
+    assert front.n_free > 0
+    for solution in [*front][::5]:
+        found = front.surface.of_faces(solution.faces).quality
+        for name in MEASURES:
+            assert getattr(found, name) == pytest.approx(getattr(solution, name), rel=1e-9, abs=1e-9)
+    finished = kind not in ("memetic", "memetic for the vertices alone")
+    assert ("free" in record) == finished
+    if finished and "--moves" in options:
+        assert record["moves"] + record["free"]["moves"] <= 20_000
+        assert record["free"]["moves"] > 10_000
+    if "wish" in kind:
+        limits = record["wish"]
+        chosen = front[record["chosen"]]
+        assert chosen.solution == front.best(**limits).solution
+        assert all(getattr(chosen, name) <= most for name, most in limits.items())
+        assert chosen.free is said["chosen"]["free"]
+        assert chosen.free or "triangles" not in limits
+        assert run("score", "face:200", out / "chosen.ply", "--json") == 0
+        assert json.loads(capsys.readouterr().out)["error"] == pytest.approx(chosen.error, rel=1e-6)
+
+
+@pytest.mark.parametrize("options", [QUICK, ("--moves", "20000", "--population", "16")], ids=["afterwards", "memetic"])
+def test_interrupted_while_meshes_are_freed_the_front_has_those_finished(tmp_path, monkeypatch, capsys, options):
+    real = searching.FreeLadder._found
+
+    def interrupted(self, *given):
+        if len(self.fronts) == 3:
+            raise KeyboardInterrupt
+        return real(self, *given)
+
+    monkeypatch.setattr(searching.FreeLadder, "_found", interrupted)
+    assert run("simplify", "face:200", "-o", tmp_path / "out", "--free", *options, "--no-page") == 130
+    said = capsys.readouterr().err
+    assert options != QUICK or re.search(r"\d+ of \d+ sizes are not annealed freely", said)
+    front = Front.load(tmp_path / "out")
+    assert 0 < front.n_free < len(front)
+    assert front.run["interrupted"] is True
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--free-height", "0.2"), "--free-height does not go with Delaunay meshes: it is of free ones; leave it out"),
+        (("--no-centroids",), "--no-centroids does not go with Delaunay meshes: it is of free ones"),
+        (("--free", "--tile", "64"), "--free does not go with tiles, which are thinned and not searched; leave it out"),
+        (("--free", "--free-height", "0.7"), "'0.7' is larger than 0.5"),
+        (("--free", "--free-height", "-1"), "'-1' is below 0"),
+        (("--free", "--moves", "100", *PAPERS), "--moves is for --algorithm memetic"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_with_free_meshes_is_refused_in_one_line(tmp_path, capsys, options, message):
+    assert run("simplify", "jacksboro:24", "-o", tmp_path / "out", *options) == 2
+    assert message in one_line(capsys)
+    assert not (tmp_path / "out").exists()
 
 
 def test_free_meshes_of_a_search_are_written_picked_scored_and_reported_by_their_own_faces(

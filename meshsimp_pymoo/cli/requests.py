@@ -147,7 +147,8 @@ class Request:
     def recorded(self) -> dict[str, Any]:
         """What of it is worth a place in the record of what was searched, beside options and rules."""
         search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
-        return search | {"algorithm": self.algorithm} | asdict(self.free) | self.wanted | {"refit": self.output.refit}
+        free = asdict(self.free) if self.free.free else {"free": False}
+        return search | {"algorithm": self.algorithm} | free | self.wanted | {"refit": self.output.refit}
 
 
 def request_of(args: argparse.Namespace) -> Request:
@@ -205,7 +206,7 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
     **{
         (option(name), "Delaunay meshes"): (
             _is_free_alone(name),
-            "it is said of free ones; leave it out, or add --free",
+            "it is of free ones; leave it out, or add --free",
         )
         for name in ("free_height", "no_centroids")
     },

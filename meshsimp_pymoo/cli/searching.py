@@ -288,7 +288,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
         interrupted, until = True, time.perf_counter() + WAIT_SECONDS
         if found is None and (starts := _begun(problem, algorithm)):
             say(f"the search had not begun yet; the front is of {' and '.join(map(str, starts))}, of its start")
-    measured_by = None if until is None else until - (1.0 - WHOLE_SHARE) * WAIT_SECONDS
+    measured_until = None if until is None else until - (1.0 - WHOLE_SHARE) * WAIT_SECONDS
     if interrupted and isinstance(algorithm, MemeticSearch):  # what is finished of its free meshes
         algorithm.take_free(until=time.perf_counter() + FREE_SHARE * WAIT_SECONDS)
     if found is None:
@@ -304,7 +304,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
             found,
             ends=True,
             wish=keeper.request.wish.limits if keeper.request.is_targeted else None,
-            until=measured_by,
+            until=measured_until,
         )
     except LookupError:
         raise UsageError(

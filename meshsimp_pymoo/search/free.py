@@ -27,7 +27,7 @@ from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
 from meshsimp_pymoo.surface.free import take_numbers
-from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_quality
+from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, UNCOVERED, as_quality
 from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
@@ -58,8 +58,12 @@ CROWD = 20.0
 # With a deadline: the share of a rung's time after which it looks at the clock and cools, moves before any is timed.
 PAUSE = 1 / 64
 FIRST_MOVES = 1000
+# How late a rung may be with a deadline [s].
+LATE = 0.05
 # Sizes between the rungs that are measured differ by this share, or by one triangle.
 STEP = 0.015
+# The time of a rung grows with this power of its size, and ebbs away towards all triangles, where little can be gained.
+TIME_POWER = 0.3
 # Where one mesh is wished for: sizes as shares of the number of triangles, or of those of the mesh that holds the wish
 # so far, which free ones of fewer may hold, with their shares of the time; and those of some others of the front.
 AROUND_A_SIZE = ((0.85, 0.5), (1.0, 2.0), (1.0, 2.0), (1.18, 0.5))
@@ -177,7 +181,7 @@ class FreeLadder:
     offered : (Q,) int array
         Sizes that are measured where they lie between two rungs, ascending.
     shares : (R,) float array
-        How much of the time each rung is to have, in any unit.
+        How much of the time each rung is to have, in any unit; :func:`usual_shares` by default.
     planned : (R,) int array
         The most moves of each rung.
     fronts : dict of int to FreeFront
@@ -199,6 +203,8 @@ class FreeLadder:
         self.planned: IntArray = np.empty(0, np.int64)
         self.seeds: IntArray = np.empty(0, np.int64)
         self.fronts: dict[int, FreeFront] = {}
+        # what all but the annealing was thought to take, and took [s]
+        self.thought, self.took = 0.0, 0.0
 
     @property
     def moves(self) -> int:
@@ -232,7 +238,7 @@ class FreeLadder:
         random_state : numpy.random.Generator
             Source of randomness.
         shares : (R,) float array, optional
-            See the attributes; all have the same by default.
+            See the attributes.
         moves : int, optional
             How many there are for all rungs; by default as many as are usual.
         timed : bool
@@ -240,7 +246,7 @@ class FreeLadder:
         """
         n_samples = surface.n_vertices + len(freedom_of(surface, "free meshes", centroids=self.centroids).share)
         self.sizes, self.offered, self.fronts = sizes, offered, {}
-        self.shares = np.ones(len(sizes)) if shares is None else shares
+        self.shares = usual_shares(sizes, surface.n_vertices) if shares is None else shares
         self.seeds = random_state.integers(1, 2**63 - 1, size=len(sizes))
         most = MOST_MOVES * sizes
         # moves of each in the same time
@@ -295,7 +301,8 @@ class FreeLadder:
         if not self.fronts and now:  # compiling is not their time
             on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1])
         limit = None if seconds is None else time.perf_counter() + seconds
-        with stopping(stop[:1], seconds):
+        # a rung that is a little late is not thrown away
+        with stopping(stop[:1], None if seconds is None else seconds + LATE):
             on_threads(work, now, stop=stop)
 
     def compile_for(self, surface: Surface, kept: BoolArray) -> None:
@@ -312,26 +319,30 @@ class FreeLadder:
         begun = time.perf_counter()
         sizes = self._wanted(rung)
         n_samples = surface.n_vertices + len(ground.share)
-        if seconds is not None:
-            size = int(self.sizes[rung])
-            seconds -= SECONDS_A_TRIANGLE * size + (SECONDS_A_SAMPLE + MEASURING * len(sizes)) * n_samples
+        thought = SECONDS_A_TRIANGLE * int(sizes[0]) + (SECONDS_A_SAMPLE + MEASURING * len(sizes)) * n_samples
+        if seconds is not None:  # more on a machine that is slow or busy
+            seconds -= thought * (max(self.took / self.thought, 1.0) if self.thought > 0.0 else 1.0)
         if stop[0]:
             return None
         with ground.triangulation(kept, min_height=self.min_height) as mesh:
             until = None if seconds is None else begun + seconds
             is_large = surface.n_vertices > LARGE
+            ready = time.perf_counter()
             moves = _anneal(mesh, sizes[0], self.seeds[rung], self.planned[rung], until, is_large, stop)
             if moves is None:
                 return None
+            annealed = time.perf_counter()
             faces = mesh.faces.astype(np.int32)
             removed, onto, collapses, table = _thinned(mesh, surface, ground.share, sizes, stop)
+        self.thought += thought
+        self.took += time.perf_counter() - annealed + ready - begun
         return None if stop[1:].any() else FreeFront(faces, removed, onto, collapses, table, moves)
 
     def _wanted(self, rung: int) -> IntArray:
         """Return the sizes that a rung is measured at, its own first, down to the next smaller one.
 
-        Collapses inside the mesh take two triangles away. Where that matters it goes on to the one after that, which
-        leaves no gap if they are odd and even in turn.
+        Collapses inside the mesh take two triangles away. Where that matters it goes on to the one after that, so that
+        of rungs that are odd and even in turn one or the other has nearly every size.
         """
         size = self.sizes[rung]
         below = self.sizes[max(rung - (1 + (size * STEP < 1.0)), 0)]
@@ -433,6 +444,19 @@ def ladder_of(low: int, high: int, n: int = RUNGS) -> IntArray:
     shift = SMALL_SHARE * high
     sizes = np.unique(np.round(np.geomspace(low + shift, high + shift, n) - shift).astype(np.int64))
     return np.unique(sizes + (sizes - sizes[0] + np.arange(len(sizes))) % 2)
+
+
+def usual_shares(sizes: IntArray, n_vertices: int) -> FloatArray:
+    """Return how much of the time rungs have; see `TIME_POWER`.
+
+    Examples
+    --------
+    >>> usual_shares(np.array([20, 200, 2000]), 1000).round(2).tolist()
+    [0.26, 0.48, 0.05]
+    """
+    of_all = np.minimum(sizes / (2.0 * n_vertices), 1.0)
+    shares: FloatArray = of_all**TIME_POWER * (1.05 - of_all)
+    return shares
 
 
 def steps_between(low: int, high: int) -> IntArray:
@@ -558,9 +582,15 @@ def _thinned(
 
 
 def _mesh(surface: Surface, faces: IntArray, row: FloatArray) -> FreeMesh:
-    """Return a free mesh with its numbers."""
+    """Return a free mesh with its numbers.
+
+    Where several segments of the outline are nearest to a vertex, it is a matter of the written mesh which one counts:
+    so it is measured again where some are not covered.
+    """
     kept = surface.pinned.copy()
     kept[used_rows(faces)[0]] = True
+    if row[UNCOVERED] > 0:
+        return FreeMesh(kept, faces, surface.of_faces(faces).quality)
     quality = as_quality(
         row[:REGIONS],
         surface.total_weight,

@@ -81,6 +81,8 @@ MOST_SHARE = 0.3
 # With free meshes as much again of the time, and seconds a million vertices, for measuring what they are to be better
 # than; large models have nothing to be filled then but what their thinning has.
 FREE_SECONDS = 25.0
+# The share of what is left in the end for that; the rest is for making the meshes that are chosen.
+MEASURED_LAST = 0.7
 # The search ends after so many generations, and two sweeps, that found nothing new; each of them begins hotter.
 IDLE = 12
 # In the final front neighbours differ by this share of the error, or by the smaller one where a rung is better than the
@@ -439,7 +441,8 @@ class MemeticSearch(GeneticAlgorithm):
         if self.free is None:
             return
         limit = time_limit(self)
-        self.take_free(until=None if limit is None else time.perf_counter() + limit[1] + limit[2])
+        left = None if limit is None else MEASURED_LAST * (limit[1] + limit[2])
+        self.take_free(until=None if left is None else time.perf_counter() + left)
         if (self.pop.get("F")[:, 0] > 0.0).any() and not self.free.fronts:
             said = "any size was annealed freely: all meshes are Delaunay"
         elif self.free.todo:
@@ -466,13 +469,15 @@ class MemeticSearch(GeneticAlgorithm):
         seconds = None if limit is None else max(limit[1] + limit[2], 0.0)
         if seconds is not None and self.free is not None:
             seconds /= 2.0
+        # where subsets were not searched there is nothing to thin
+        share = 1.0 if _subsets_share(self) == 0.0 else 0.5
         X = between_the_rungs(
             surface,
             pop.get("X"),
             pop.get("F"),
             most=self.survival.rungs[-1],
             seconds=seconds,
-            measured=None if seconds is None else measurable(self.problem, seconds / 2.0),
+            measured=None if seconds is None else measurable(self.problem, share * seconds),
         )
         if len(X):
             extra = self.eliminate_duplicates.do(Population.new(X=X), pop)

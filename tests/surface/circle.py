@@ -186,6 +186,9 @@ class Circle:
         measure = OBJECTIVES[self.rules.measure]
         return Round(np.ascontiguousarray(self.places.ravel()), measure.power, measure.is_sum)
 
+    def free_ground(self, *, centroids: bool) -> None:
+        """Return that its meshes follow from their vertices."""
+
     def measuring(self, measure: str) -> Surface:
         """Return the circle with another measure."""
         other = copy.copy(self)

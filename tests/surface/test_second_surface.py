@@ -427,6 +427,14 @@ def crossed(problem, crossover):
     return crossover._do(problem, X, random_state=np.random.default_rng(1))
 
 
+def test_it_has_no_free_meshes_and_says_so(problem, front):
+    message = "free meshes are made by moves of edges, which a Circle does not have"
+    with pytest.raises(ValueError, match=message):
+        minimize(problem, memetic(10, triangulation="free"), ("n_gen", 2), seed=1)
+    with pytest.raises(ValueError, match=message):
+        front.free(moves=10)
+
+
 def test_a_curve_alone_has_no_rules():
     curve = Curve(np.zeros((3, 3)))
     with pytest.raises(TypeError, match=r"a Curve has no rules; give a surface, such as problem\.surface"):
