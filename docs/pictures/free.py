@@ -1,6 +1,6 @@
 """Draw ``free.png``: originals, and Delaunay and free meshes of equally many triangles.
 
-``python docs/pictures/free.py`` makes it anew, in two minutes; the same moves and seed give the same meshes.
+``python docs/pictures/free.py`` makes it anew, in a minute or two; the same moves and seed give the same meshes.
 """
 
 from __future__ import annotations
