@@ -27,7 +27,7 @@ from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
 from meshsimp_pymoo.surface.free import take_numbers
-from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, UNCOVERED, as_quality
+from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_quality
 from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
@@ -582,15 +582,9 @@ def _thinned(
 
 
 def _mesh(surface: Surface, faces: IntArray, row: FloatArray) -> FreeMesh:
-    """Return a free mesh with its numbers.
-
-    Where several segments of the outline are nearest to a vertex, it is a matter of the written mesh which one counts:
-    so it is measured again where some are not covered.
-    """
+    """Return a free mesh with its numbers."""
     kept = surface.pinned.copy()
     kept[used_rows(faces)[0]] = True
-    if row[UNCOVERED] > 0:
-        return FreeMesh(kept, faces, surface.of_faces(faces).quality)
     quality = as_quality(
         row[:REGIONS],
         surface.total_weight,

@@ -225,8 +225,8 @@ class HeightSurface:
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Measure a mesh of the model's own vertices with any edges: a free one.
 
-        The rule is that of :meth:`score`, whose numbers these are but for rounding; a vertex of the mesh that it covers
-        does not deviate at all.
+        The rule is that of :meth:`simplify`; :meth:`score` says the same but for rounding, and but for vertices outside
+        to which several places of the outline are equally near. A vertex of the mesh that it covers does not deviate.
 
         Parameters
         ----------
@@ -271,7 +271,7 @@ class HeightSurface:
         """
         ground, between, n = self._ground, self._between, self.n_vertices
         both = ground._replace(xy=np.r_[ground.xy, between.xy], z=np.r_[ground.z, between.z])
-        deviation, covered = mesh_deviation(both, vertices, faces)
+        deviation, covered = mesh_deviation(both, vertices, faces, planar=own is not None)
         of_mesh = {"surface_error": float((between.share * deviation[n:]).sum())}
         of_mesh |= measured_angles(np.asarray(vertices, float)[:, :2], np.asarray(faces))
         deviation, covered = deviation[:n], covered[:n]

@@ -51,7 +51,9 @@ def measured_angles(xy: FloatArray, faces: IntArray) -> dict[str, float]:
     return {"min_angle_median": float(np.median(angles)), "below_5_degrees": float((angles < THIN_DEGREES).mean())}
 
 
-def mesh_deviation(ground: Ground, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, BoolArray]:
+def mesh_deviation(
+    ground: Ground, vertices: FloatArray, faces: IntArray, *, planar: bool = False
+) -> tuple[FloatArray, BoolArray]:
     """Return d_p (N,) and covered (N,) for any mesh.
 
     Parameters
@@ -62,13 +64,17 @@ def mesh_deviation(ground: Ground, vertices: FloatArray, faces: IntArray) -> tup
         Vertices in the frame of the model's points [model units].
     faces : (M, 3) int array
         Triangles. Where several of them cover a point, the smallest of the differences counts.
+    planar : bool
+        Whether no two of them overlap in the plane: then what is nearest to an uncovered point is sought on the outline
+        alone, and of several places as near that of the first edge of the outline counts, as for subsets; else that of
+        the first edge of all, which any mesh has.
 
     Raises
     ------
     ValueError
         If there is no face with an area in the plane, or the arrays do not fit together.
     """
-    deviation, covered, _ = _look_at_mesh(ground, vertices, faces, n_recorded=0)
+    deviation, covered, _ = _look_at_mesh(ground, vertices, faces, n_recorded=0, planar=planar)
     return deviation, covered
 
 
@@ -103,7 +109,7 @@ def mesh_samples(ground: Ground, vertices: FloatArray, faces: IntArray) -> MeshS
 
 
 def _look_at_mesh(
-    ground: Ground, vertices: FloatArray, faces: IntArray, n_recorded: int
+    ground: Ground, vertices: FloatArray, faces: IntArray, n_recorded: int, planar: bool = False
 ) -> tuple[FloatArray, BoolArray, tuple[IntArray, FloatArray, FloatArray]]:
     """Check a mesh and return d_p, covered, and as many rows of sites, shares and gaps as are to be recorded."""
     vertices = np.asarray(vertices, float)
@@ -135,9 +141,15 @@ def _look_at_mesh(
         raise ValueError(f"none of the {len(faces)} faces has an area in the plane")
     bare = np.flatnonzero(~covered)
     if len(bare) and ground.nearest:
+        ends, key = ends[:m], key[:m]
+        if planar:
+            low, high = np.sort(ends, axis=1).T
+            _, first, times = np.unique(low * len(vertices) + high, return_index=True, return_counts=True)
+            alone = np.sort(first[times == 1])
+            ends, key = ends[alone], key[alone]
         # along the curve, so that the tree's boxes are small whatever the order of the faces
         place = xy.reshape(-1, 2)
-        order = np.argsort(hilbert_keys((place[ends[:m, 0]] + place[ends[:m, 1]]) / 2.0), kind="stable")
+        order = np.argsort(hilbert_keys((place[ends[:, 0]] + place[ends[:, 1]]) / 2.0), kind="stable")
         _measure_outside(bare, samples, z, xy, height, ends[order], key[order], unit, deviation, *recorded)
     else:
         deviation[bare] = 0.0
