@@ -98,6 +98,20 @@ def test_every_file_that_the_page_points_to_is_there():
     assert [name for name in sorted(pointed) if not (ROOT / name).exists()] == []
 
 
+@pytest.mark.parametrize("path", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.stem)
+def test_the_other_pages_name_commands_that_the_parser_takes_and_files_that_are_there(path):
+    page = path.read_text(encoding="utf-8")
+    for command in re.findall(r"^(meshsimp .*)$", page, re.MULTILINE):
+        make_parser().parse_args(shlex.split(command, comments=True)[1:])
+    for block in re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL):
+        compile(block, path.name, "exec")
+    pointed = {path.parent / name for name in re.findall(r"\]\((?!http)([^)#]+)[^)]*\)", page)}
+    pointed |= {
+        ROOT / name for name in re.findall(r"(?<![\w/])((?:configs|docs|tests|meshsimp_pymoo)/[\w./]+\w)", page)
+    }
+    assert [str(name) for name in sorted(pointed) if not name.exists()] == []
+
+
 def test_the_commented_configuration_names_every_preset_and_operator():
     text = (ROOT / "configs" / "quick.yaml").read_text(encoding="utf-8")
     names = {*PRESETS, *OPERATORS, *(name for table in OPERATORS.values() for name in table)}
