@@ -690,7 +690,9 @@ def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, I
         packed, source_index = _of_type(path, "kept", arrays, "u", 2), _of_type(path, "source_index", arrays, "i", 1)
         faces, start = _of_type(path, "faces", arrays, "i", 2), _of_type(path, "face_start", arrays, "i", 1)
     except KeyError as problem:
-        raise ResultError(f"{path}: holds no array {problem}; the file is not ours") from None
+        raise ResultError(
+            f"{path}: holds no array {problem}; the file is of an earlier version or not ours: simplify again"
+        ) from None
     except (OSError, ModelError, MemoryError) as problem:
         raise ResultError(f"{path}: cannot be read ({reason_of(problem)})") from None
     if packed.dtype != np.uint8:

@@ -40,7 +40,7 @@ from meshsimp_pymoo.surface.model import OpenModel
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 EXPERIMENT_FILE = "experiment.json"
-# Of the records; another number wherever what they hold is spelled otherwise. 4: how each run converged.
+# Of the records; another number wherever what they hold is spelled otherwise. 5: what meshes are between the vertices.
 FORMAT = 5
 WAY_OUT = "mend that, and the same command does what is missing"
 

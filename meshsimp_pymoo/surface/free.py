@@ -789,7 +789,13 @@ class FreeGround:
         self._sites = sites
         self._freedom = Freedom(
             ground=ground._replace(
-                xy=xy.ravel(), exact_area=exact_ranges(xy)[0], weight=weights, weighed=True, by_peak=False
+                xy=xy.ravel(),
+                exact_area=exact_ranges(xy)[0],
+                weight=weights,
+                weighed=True,
+                by_peak=False,
+                own=1.0,
+                bound=np.inf,
             ),
             points=points,
             n_vertices=n,

@@ -112,13 +112,15 @@ def shape_faults(vertices, faces) -> list[str]:
 
 
 def opened_faults(path, n_faces) -> list[str]:
-    """Return whether pymeshlab finds other faces in a file."""
+    """Return whether pymeshlab finds other faces in a file, or edges of more than two."""
     if pymeshlab is None:
         return []
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.load_new_mesh(str(path))
     opened = meshes.current_mesh().face_number()
-    return [] if opened == n_faces else [f"pymeshlab opens {opened} of {n_faces} faces"]
+    faults = [] if opened == n_faces else [f"pymeshlab opens {opened} of {n_faces} faces"]
+    crowded = meshes.get_topological_measures()["non_two_manifold_edges"]
+    return faults + [f"pymeshlab finds {crowded} edges of more than two faces"] * (crowded > 0)
 
 
 def _twice_area(corners):
