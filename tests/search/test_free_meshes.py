@@ -248,7 +248,7 @@ def test_a_search_of_subsets_alone_has_no_free_meshes_and_is_what_it_was(problem
 
 def test_the_same_seed_and_moves_give_the_same_bytes_on_any_number_of_threads(monkeypatch, searched):
     for n_threads in (1, 3):
-        monkeypatch.setattr(module.os, "cpu_count", lambda n=n_threads: n)
+        monkeypatch.setattr(workers.os, "cpu_count", lambda n=n_threads: n)
         with ThreadPoolExecutor(n_threads) as pool:
             monkeypatch.setattr(workers, "thread_pool", lambda _, pool=pool: pool)
             result = minimize(MeshProblem("face:200"), memetic(20, triangulation="free"), Moves(60_000), seed=3)
@@ -299,7 +299,7 @@ def test_what_is_finished_when_the_search_is_interrupted_is_kept(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         algorithm.run()
     assert 5 <= len(algorithm.free.fronts) < len(algorithm.free.sizes)
-    algorithm.take_free()
+    algorithm.take_free(algorithm.opt)
     front = Front.from_population(problem, algorithm.opt)
     assert 0 < front.n_free < len(front)
 
@@ -386,7 +386,7 @@ def test_a_front_of_nsga2_is_freed_and_nowhere_worse(plain_front, tmp_path):
     assert freed.n_free > len(freed) / 2
     not_worse(plain_front, freed, ("error", "surface_error"))
     assert np.mean([freed.best(triangles=s.triangles).error / s.error for s in plain_front if s.error > 0]) < 0.9
-    assert freed.run["free"] == {"seed": 1, "moves": 60_000, "min_height": 0.1, "centroids": True}
+    assert freed.run["freeing"] == {"seed": 1, "moves": 60_000, "min_height": 0.1, "centroids": True}
     again = plain_front.free(moves=60_000)
     assert again.quality == freed.quality
     assert all(np.array_equal(a, b) for a, b in zip(again.faces, freed.faces, strict=True))
