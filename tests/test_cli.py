@@ -8,6 +8,7 @@ import io
 import json
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -881,6 +882,25 @@ def test_interrupted_while_meshes_are_freed_the_front_has_those_finished(tmp_pat
     assert options != QUICK or re.search(r"\d+ of \d+ sizes are not annealed freely", said)
     front = Front.load(tmp_path / "out")
     assert 0 < front.n_free < len(front)
+    assert front.run["interrupted"] is True
+
+
+@pytest.mark.parametrize("place", ["Front.from_population", "Freeing.__init__"])
+def test_interrupted_between_the_search_and_freeing_nothing_is_freed(tmp_path, monkeypatch, capsys, place):
+    of, name = place.split(".")
+    owner = getattr(searching, of)
+    real = getattr(owner, name)
+
+    def interrupted(*given, **how):
+        signal.raise_signal(signal.SIGINT)
+        return real(*given, **how)
+
+    monkeypatch.setattr(owner, name, interrupted)
+    monkeypatch.setattr(searching.FreeLadder, "go_on", None)  # is not called
+    assert run("simplify", "face:200", "-o", tmp_path / "out", "--free", *QUICK, "--no-page") == 130
+    assert "interrupted before any size was annealed freely: all meshes are Delaunay" in capsys.readouterr().err
+    front = Front.load(tmp_path / "out")
+    assert front.n_free == 0
     assert front.run["interrupted"] is True
 
 

@@ -317,7 +317,7 @@ class FreeLadder:
                     self.took += took
 
         if not self.fronts and now:  # compiling is not their time
-            on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1])
+            on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1], n_threads=n_threads)
         limit = None if seconds is None else time.perf_counter() + seconds
         # a rung that is a little late is not thrown away
         with stopping(stop[:1], None if seconds is None else seconds + LATE):
