@@ -17,7 +17,7 @@ import io
 import operator
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
@@ -1126,8 +1126,11 @@ class Freeing:
         generator = np.random.default_rng(seed)
         ladder.begin(surface, sizes, offered, generator, shares=shares, moves=moves, timed=timed)
 
-    def go_on(self, seconds: float | None = None) -> bool:
-        """Anneal the next sizes, with so many seconds for all that are left; return whether any are left then."""
+    def go_on(self, seconds: float | None = None, finished: Callable[[], None] | None = None) -> bool:
+        """Anneal the next sizes, with so many seconds for all that are left; return whether any are left then.
+
+        ``finished`` is called for each of them, by the thread that finishes it.
+        """
         front, ladder = self.before, self.ladder
         n_left, F = len(ladder.todo), front.F
 
@@ -1137,7 +1140,7 @@ class Freeing:
             return kept
 
         if n_left and (seconds is None or seconds > 0.0):
-            ladder.go_on(front.surface, subset_of, seconds=seconds, n_threads=self._threads)
+            ladder.go_on(front.surface, subset_of, seconds=seconds, n_threads=self._threads, finished=finished)
         return 0 < len(ladder.todo) < n_left
 
     @property

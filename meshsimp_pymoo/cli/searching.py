@@ -338,12 +338,15 @@ def _free(found: _Found, request: Request, shown: Stages, seconds: float) -> Non
                 seed=search.seed,
                 wish=request.wish.limits,
             )
+
+            def tell() -> None:
+                share = 0.0 if until is not None else len(ladder.fronts) / len(ladder.sizes)  # the clock knows better
+                show(share, _freed_in_words(ladder)[2:])
+
             more = True
             while more:
                 stop_if_interrupted()
-                more = freeing.go_on(None if until is None else until - time.perf_counter())
-                n = len(ladder.sizes)
-                show(0.0 if until is not None else len(ladder.fronts) / max(n, 1), _freed_in_words(ladder)[2:])
+                more = freeing.go_on(None if until is None else until - time.perf_counter(), tell)
             stop_if_interrupted()
     except KeyboardInterrupt:
         found.until = time.perf_counter() + WAIT_SECONDS

@@ -271,6 +271,7 @@ class FreeLadder:
         seconds: float | None = None,
         most: int = ABREAST,
         n_threads: int | None = None,
+        finished: Callable[[], None] | None = None,
     ) -> None:
         """Anneal and thin the next rungs, each on a thread.
 
@@ -286,6 +287,8 @@ class FreeLadder:
             How many at most.
         n_threads : int, optional
             Threads to share them among; as many as there are cores by default.
+        finished : callable, optional
+            Called when a rung is finished, by its thread.
         """
         ground = freedom_of(surface, "free meshes", centroids=self.centroids)
         todo = self.todo
@@ -315,6 +318,8 @@ class FreeLadder:
                 if limit is not None:
                     self.thought += thought
                     self.took += took
+            if finished is not None:
+                finished()
 
         if not self.fronts and now:  # compiling is not their time
             on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1], n_threads=n_threads)

@@ -321,7 +321,7 @@ def test_the_same_seed_and_moves_give_the_same_bytes_on_any_number_of_threads(mo
 @pytest.mark.parametrize("done", [1, 2])
 def test_a_search_that_was_stopped_goes_on_with_the_rungs_that_are_left(monkeypatch, tmp_path, done):
     monkeypatch.setattr(module, "ABREAST", 8)
-    monkeypatch.setattr(FreeLadder.go_on, "__kwdefaults__", {"seconds": None, "most": 8})
+    monkeypatch.setattr(FreeLadder.go_on, "__kwdefaults__", FreeLadder.go_on.__kwdefaults__ | {"most": 8})
 
     def begun():
         return memetic(20, triangulation="free").setup(MeshProblem("face:90"), termination=Moves(20_000), seed=2)
@@ -390,8 +390,10 @@ def test_of_a_front_too_free_meshes_are_taken_without_time_to_compare_them(monke
     unknown = [dataclasses.replace(q, **dict.fromkeys(OF_MESH, np.nan)) for q in plain_front.quality]
     front = Front(unknown, np.asarray(plain_front.kept), problem=plain_front.problem)
     freeing = Freeing(front, FreeLadder(), moves=20_000)
-    while freeing.go_on():
+    told = []
+    while freeing.go_on(finished=lambda: told.append(len(freeing.ladder.fronts))):
         pass
+    assert len(told) == max(told) == len(freeing.ladder.sizes)
     with pytest.warns(SearchWarning, match=r"\d+ of \d+ free meshes are taken without a comparison"):
         assert freeing.front(until=0.0).n_free > len(front) / 4
 
