@@ -885,6 +885,23 @@ def test_interrupted_while_meshes_are_freed_the_front_has_those_finished(tmp_pat
     assert front.run["interrupted"] is True
 
 
+def test_interrupted_at_the_end_of_a_generation_free_meshes_are_those_of_the_front(tmp_path, monkeypatch):
+    kind, done, taken = searching.MemeticSearch, [], []
+    step, take = kind.next, kind.take_free
+
+    def next_or_stop(self):
+        step(self)
+        done.append(self.opt)
+        if self.free.fronts:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(kind, "next", next_or_stop)
+    monkeypatch.setattr(kind, "take_free", lambda self, *given, **how: taken.extend(given) or take(self, *given, **how))
+    assert run("simplify", "face:200", "-o", tmp_path / "out", *FREE, "--no-page") == 130
+    assert taken[0] is done[-2] is not done[-1]
+    assert Front.load(tmp_path / "out").n_free > 0
+
+
 @pytest.mark.parametrize("place", ["Front.from_population", "Freeing.__init__"])
 def test_interrupted_between_the_search_and_freeing_nothing_is_freed(tmp_path, monkeypatch, capsys, place):
     of, name = place.split(".")

@@ -620,7 +620,8 @@ def memetic(
         Least height of the triangles that free meshes come to have, as a share of their longest edge; 0: any.
     centroids : bool
         Whether free meshes are searched by the error at the centroids of the original's faces, too, and taken only
-        where the surface error is not higher. Otherwise they fit the vertices and may be wrong between them.
+        where the surface error is not higher, or was not compared for want of time, of which a warning says how often.
+        Otherwise they fit the vertices and may be wrong between them.
     **kwargs
         Further arguments of pymoo's ``GeneticAlgorithm``; they replace those set here.
 
