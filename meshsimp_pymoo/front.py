@@ -17,7 +17,7 @@ import io
 import operator
 import os
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
@@ -38,7 +38,7 @@ from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
 from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
-from meshsimp_pymoo.search.free import MEASURED_SHARE, FreeLadder, rungs_of
+from meshsimp_pymoo.search.free import MEASURED_SHARE, FreeLadder, guarding, in_turn, rungs_of
 from meshsimp_pymoo.search.operators.nested_subsets import NestedSubsets
 from meshsimp_pymoo.search.starting import at_hand, begun
 from meshsimp_pymoo.search.targeted import TargetedSearch, require_for_a_wish, targeted
@@ -661,8 +661,10 @@ class Front(Sequence[FrontSolution]):
         Forty of the solutions at most are annealed freely at their number of triangles, each from its vertices, and
         thinned down to the next smaller one; see :mod:`~meshsimp_pymoo.search.free`. A solution is replaced by a free
         mesh that is no larger if what was minimised first is lower and nothing else that was minimised is higher, nor
-        the surface error where ``centroids`` count. The smallest of them all, or the most accurate, that holds what the
-        front was searched for (:func:`~meshsimp_pymoo.targeted`) comes along.
+        the surface error where ``centroids`` count, nor the number of uncovered vertices where these cost nothing. The
+        smallest of them all, or the most accurate, that holds what the front was searched for
+        (:func:`~meshsimp_pymoo.targeted`) comes along; its surface error may be higher where an error was wished for,
+        or the wish was not met before.
 
         Parameters
         ----------
@@ -1110,21 +1112,25 @@ class Freeing:
         self.ladder = ladder
         self.wish = dict(wish or {})
         self.seed = seed
-        #: The solution that holds the wish, if any does.
+        #: The solution that holds the wish, if any does, and the one that holds it or comes nearest.
         self.held: int | None = None
-        surface, answer = front.surface, None
+        self.answer: int | None = None
+        surface = front.surface
         freedom_of(surface, "free meshes", centroids=ladder.centroids)
         if self.wish:
             try:
-                answer = self.held = front.best(**self.wish).solution
+                self.answer = self.held = front.best(**self.wish).solution
             except Missed as missed:
-                answer = missed.nearest.solution
-        sizes, shares, offered = rungs_of(front.F[:, [0, -1]], self.wish, answer)
+                self.answer = missed.nearest.solution
+        sizes, shares, offered = rungs_of(front.F[:, [0, -1]], self.wish, self.answer)
         generator = np.random.default_rng(seed)
         ladder.begin(surface, sizes, offered, generator, shares=shares, moves=moves, timed=timed)
 
-    def go_on(self, seconds: float | None = None) -> bool:
-        """Anneal the next sizes, with so many seconds for all that are left; return whether any are left then."""
+    def go_on(self, seconds: float | None = None, finished: Callable[[], None] | None = None) -> bool:
+        """Anneal the next sizes, with so many seconds for all that are left; return whether any are left then.
+
+        ``finished`` is called for each of them, by the thread that finishes it.
+        """
         front, ladder = self.before, self.ladder
         n_left, F = len(ladder.todo), front.F
 
@@ -1134,29 +1140,47 @@ class Freeing:
             return kept
 
         if n_left and (seconds is None or seconds > 0.0):
-            ladder.go_on(front.surface, subset_of, seconds=seconds)
+            ladder.go_on(front.surface, subset_of, seconds=seconds, n_threads=self._threads, finished=finished)
         return 0 < len(ladder.todo) < n_left
+
+    @property
+    def _threads(self) -> int | None:
+        """The threads of the problem that was searched, if it is known."""
+        return getattr(getattr(self.before._problem, "elementwise_runner", None), "n_threads", None)
 
     def front(self, *, until: float | None = None) -> Front:
         """Return the front with what was found so far.
 
-        Solutions that are not measured whole by ``perf_counter() = until`` stay as they are.
+        Of meshes that are not measured whole by ``perf_counter() = until``, but for a few, the surface error is not
+        compared, and a warning says how many they are.
         """
         before, ladder, surface = self.before, self.ladder, self.before.surface
-        names, kept = before.objectives[:-1], np.asarray(before.kept)
-        quality = measured_meshes(surface, kept, before.quality, faces=before.faces, until=until)
-        F, others = _objectives(quality, before.objectives), beside(self.wish, names[0])
+        objectives, kept, quality = before.objectives[:-1], np.asarray(before.kept), list(before.quality)
+        F, others = _objectives(quality, before.objectives), beside(self.wish, objectives[0])
         # what was wished for beside that may rise as far as its limit
         within = [np.maximum([getattr(q, name) for q in quality], most) for name, most in others.items()]
-        errors, triangles = np.column_stack([F[:, :-1], *within]), F[:, -1].astype(np.int64)
+        guarded = guarding(surface)
+        names = (*objectives, *others, *guarded)
+        errors = np.column_stack([F[:, :-1], *within, _objectives(quality, guarded)])
+        triangles = F[:, -1].astype(np.int64)
         rows = list(range(len(before)))
         if self.held is not None and "triangles" in self.wish:  # one more is looked for that may have as many
             rows.append(self.held)
             triangles = np.append(triangles, int(self.wish["triangles"]))
-        between = np.array([quality[row].surface_error for row in rows]) if ladder.centroids else None
-        meshes = ladder.best_of(surface, (*names, *others), triangles, errors[rows], between)
-        if self.wish and len(rows) == len(before):
-            meshes.append(ladder.wished(surface, names[0], self.wish))
+
+        def measure(place: int) -> None:
+            row = rows[place]
+            own = slice(row, row + 1)
+            (quality[row],) = measured_meshes(surface, kept[own], quality[own], faces=before.faces[own])
+
+        between = None
+        if ladder.centroids:
+            in_turn(ladder.by_gain(surface, names, triangles, errors[rows]), measure, until, self._threads)
+            between = np.array([quality[row].surface_error for row in rows])
+        meshes = ladder.best_of(surface, names, triangles, errors[rows], between, n_threads=self._threads)
+        if self.answer is not None and len(rows) == len(before):
+            most = before.quality[self.answer].uncovered if guarded else np.inf
+            meshes.append(ladder.wished(surface, objectives[0], self.wish, uncovered=most))
         found: list[tuple[Quality, BoolArray, IntArray | None]] = []
         found += [(mesh.quality, mesh.kept, mesh.faces) for mesh in meshes if mesh is not None]
         found += [(quality[row], kept[row], before.faces[row]) for row in range(len(before)) if meshes[row] is None]
@@ -1166,12 +1190,12 @@ class Freeing:
         qualities, subsets, faces = zip(*(found[row] for row in best), strict=True)
         facts = {"seed": self.seed, "moves": ladder.moves, "min_height": ladder.min_height}
         return Front(
-            measured_meshes(surface, np.array(subsets), qualities, faces=faces, until=until),
+            measured_meshes(surface, np.array(subsets), qualities, faces=faces, n_threads=self._threads, until=until),
             np.array(subsets),
             faces=faces,
             problem=before._problem,
             surface=surface,
-            run=before.run | {"free": facts | {"centroids": ladder.centroids}},
+            run=before.run | {"freeing": facts | {"centroids": ladder.centroids}},
             series=before.series,
         )
 

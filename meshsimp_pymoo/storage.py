@@ -16,8 +16,8 @@
                        part of moved. No pickles
     OUT/run.json       the model with its hash, how it was read (options), what counted (rules), what was minimised
                        (objectives), how it was searched and written (settings, seed), package versions, the machine
-                       (environment), when the search was begun, evaluations,
-                       moves, seconds
+                       (environment), when the search was begun, evaluations, moves, seconds; of a front that was
+                       freed afterwards how (freeing)
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
     OUT/tiles/         alone, likewise: finished tiles (see `meshsimp_pymoo.tiles.front`)

@@ -37,6 +37,7 @@ __all__ = [
     "on_threads",
     "open_engine",
     "thread_pool",
+    "threads_for",
 ]
 
 # How often a task is tried whose worker dies.
@@ -163,6 +164,13 @@ def on_threads(
             future.cancel()
         wait(futures)
         raise
+
+
+def threads_for(n_items: int, n_threads: int | None = None) -> int:
+    """Return how many of so many items :func:`on_threads` does side by side, called here with ``n_threads``."""
+    if getattr(_own, "is_worker", False):
+        return 1
+    return max(min(n_threads or os.cpu_count() or 1, n_items), 1)
 
 
 def _forget_threads() -> None:

@@ -8,6 +8,7 @@ import io
 import json
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -851,10 +852,10 @@ def test_free_meshes_are_written_as_they_are_measured_and_judged_by_what_is_wish
         for name in MEASURES:
             assert getattr(found, name) == pytest.approx(getattr(solution, name), rel=1e-9, abs=1e-9)
     finished = kind not in ("memetic", "memetic for the vertices alone")
-    assert ("free" in record) == finished
+    assert ("freeing" in record) == finished
     if finished and "--moves" in options:
-        assert record["moves"] + record["free"]["moves"] <= 20_000
-        assert record["free"]["moves"] > 10_000
+        assert record["moves"] + record["freeing"]["moves"] <= 20_000
+        assert record["freeing"]["moves"] > 10_000
     if "wish" in kind:
         limits = record["wish"]
         chosen = front[record["chosen"]]
@@ -881,6 +882,42 @@ def test_interrupted_while_meshes_are_freed_the_front_has_those_finished(tmp_pat
     assert options != QUICK or re.search(r"\d+ of \d+ sizes are not annealed freely", said)
     front = Front.load(tmp_path / "out")
     assert 0 < front.n_free < len(front)
+    assert front.run["interrupted"] is True
+
+
+def test_interrupted_at_the_end_of_a_generation_free_meshes_are_those_of_the_front(tmp_path, monkeypatch):
+    kind, done, taken = searching.MemeticSearch, [], []
+    step, take = kind.next, kind.take_free
+
+    def next_or_stop(self):
+        step(self)
+        done.append(self.opt)
+        if self.free.fronts:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(kind, "next", next_or_stop)
+    monkeypatch.setattr(kind, "take_free", lambda self, *given, **how: taken.extend(given) or take(self, *given, **how))
+    assert run("simplify", "face:200", "-o", tmp_path / "out", *FREE, "--no-page") == 130
+    assert taken[0] is done[-2] is not done[-1]
+    assert Front.load(tmp_path / "out").n_free > 0
+
+
+@pytest.mark.parametrize("place", ["Front.from_population", "Freeing.__init__"])
+def test_interrupted_between_the_search_and_freeing_nothing_is_freed(tmp_path, monkeypatch, capsys, place):
+    of, name = place.split(".")
+    owner = getattr(searching, of)
+    real = getattr(owner, name)
+
+    def interrupted(*given, **how):
+        signal.raise_signal(signal.SIGINT)
+        return real(*given, **how)
+
+    monkeypatch.setattr(owner, name, interrupted)
+    monkeypatch.setattr(searching.FreeLadder, "go_on", None)  # is not called
+    assert run("simplify", "face:200", "-o", tmp_path / "out", "--free", *QUICK, "--no-page") == 130
+    assert "interrupted before any size was annealed freely: all meshes are Delaunay" in capsys.readouterr().err
+    front = Front.load(tmp_path / "out")
+    assert front.n_free == 0
     assert front.run["interrupted"] is True
 
 

@@ -289,8 +289,8 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
         if found is None and (starts := _begun(problem, algorithm)):
             say(f"the search had not begun yet; the front is of {' and '.join(map(str, starts))}, of its start")
     measured_until = None if until is None else until - (1.0 - WHOLE_SHARE) * WAIT_SECONDS
-    if interrupted and isinstance(algorithm, MemeticSearch):  # what is finished of its free meshes
-        algorithm.take_free(until=time.perf_counter() + FREE_SHARE * WAIT_SECONDS)
+    if interrupted and found is not None and isinstance(algorithm, MemeticSearch):  # what is finished of free meshes
+        algorithm.take_free(found, until=time.perf_counter() + FREE_SHARE * WAIT_SECONDS)
     if found is None:
         X = _subsets_begun(problem, algorithm)
         if X is None:
@@ -322,30 +322,38 @@ def _free(found: _Found, request: Request, shown: Stages, seconds: float) -> Non
     """Free the front that a search came back with, in the time that is left of it; ``seconds`` are gone."""
     search, moves = request.search, request.search.moves
     whole = None if search.time is None else _search_seconds(request, search.time)
-    ladder = FreeLadder(**request.free.how)
-    freeing = Freeing(
-        found.front,
-        ladder,
-        moves=None if moves is None else _free_moves(moves),
-        timed=whole is not None,
-        seed=search.seed,
-        wish=request.wish.limits,
-    )
+    ladder, freeing = FreeLadder(**request.free.how), None
     begun = time.perf_counter()
     until = None if whole is None else begun + (whole - seconds) * (1.0 - MEASURED_SHARE_OF_FREE)
     if until is None:
         shown.expect("freeing", FREEING_SECONDS)
     try:
+        stop_if_interrupted()  # while the front was measured
         with answering("stopping: the front so far is written next"), shown.stage("freeing", "freeing") as show:
+            freeing = Freeing(
+                found.front,
+                ladder,
+                moves=None if moves is None else _free_moves(moves),
+                timed=whole is not None,
+                seed=search.seed,
+                wish=request.wish.limits,
+            )
+
+            def tell() -> None:
+                share = 0.0 if until is not None else len(ladder.fronts) / len(ladder.sizes)  # the clock knows better
+                show(share, _freed_in_words(ladder)[2:])
+
             more = True
             while more:
                 stop_if_interrupted()
-                more = freeing.go_on(None if until is None else until - time.perf_counter())
-                n = len(ladder.sizes)
-                show(0.0 if until is not None else len(ladder.fronts) / max(n, 1), _freed_in_words(ladder)[2:])
+                more = freeing.go_on(None if until is None else until - time.perf_counter(), tell)
             stop_if_interrupted()
     except KeyboardInterrupt:
         found.until = time.perf_counter() + WAIT_SECONDS
+    found.seconds = seconds + time.perf_counter() - begun
+    if freeing is None:
+        say("interrupted before any size was annealed freely: all meshes are Delaunay")
+        return
     if ladder.todo:
         say(
             f"{len(ladder.todo)} of {len(ladder.sizes)} sizes are not annealed freely in the time; the meshes there "

@@ -11,8 +11,9 @@ A free mesh is no function of a subset, so no objective is ever that of one: it 
 
 from __future__ import annotations
 
-import os
+import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +22,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
 from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.faces import canonical_faces, used_rows
 from meshsimp_pymoo.search.budgets import stopping
@@ -31,7 +33,7 @@ from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_qua
 from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
-from meshsimp_pymoo.workers import on_threads
+from meshsimp_pymoo.workers import on_threads, threads_for
 
 # Rungs of a ladder, and how many of them are annealed in one generation. They are geometric, but closer to arithmetic
 # below this share of the largest: moves of the smallest meshes of large models take long, and few people want those.
@@ -55,9 +57,10 @@ TOTAL_MOVES = 3e7
 LEAST_MOVES, MOST_MOVES = 40, 20_000
 # Samples in a triangle from which on looking at them takes most of a move's time.
 CROWD = 20.0
-# With a deadline: the share of a rung's time after which it looks at the clock and cools, moves before any is timed.
+# With a deadline: the share of a rung's time after which it looks at the clock and cools, and the fewest moves that are
+# made between; those of few triangles of a large model take half a millisecond each.
 PAUSE = 1 / 64
-FIRST_MOVES = 1000
+FEW_MOVES = 64
 # How late a rung may be with a deadline [s].
 LATE = 0.05
 # Sizes between the rungs that are measured differ by this share, or by one triangle.
@@ -69,6 +72,8 @@ TIME_POWER = 0.3
 AROUND_A_SIZE = ((0.85, 0.5), (1.0, 2.0), (1.0, 2.0), (1.18, 0.5))
 AROUND_AN_ERROR = ((0.65, 1.0), (0.72, 1.0), (0.8, 1.0), (0.89, 1.0), (1.0, 1.0))
 N_OTHERS, OTHERS_SHARE = 8, 0.15
+# So many meshes are compared with the free ones for them by the surface error, however little time is left.
+LEAST_COMPARED = 8
 # What thinning a rung takes for each of its triangles and for each sample, and measuring it for each sample [s].
 SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 2.5e-6, 1.2e-7, 1.5e-8
 
@@ -203,7 +208,7 @@ class FreeLadder:
         self.planned: IntArray = np.empty(0, np.int64)
         self.seeds: IntArray = np.empty(0, np.int64)
         self.fronts: dict[int, FreeFront] = {}
-        # what all but the annealing was thought to take, and took [s]
+        # what all but the annealing of rungs with a deadline was thought to take, and took [s]
         self.thought, self.took = 0.0, 0.0
 
     @property
@@ -265,8 +270,10 @@ class FreeLadder:
         *,
         seconds: float | None = None,
         most: int = ABREAST,
+        n_threads: int | None = None,
+        finished: Callable[[], None] | None = None,
     ) -> None:
-        """Anneal and thin the next rungs on all threads.
+        """Anneal and thin the next rungs, each on a thread.
 
         Parameters
         ----------
@@ -278,32 +285,48 @@ class FreeLadder:
             All that are left, for all rungs that are left; the result then depends on the machine.
         most : int
             How many at most.
+        n_threads : int, optional
+            Threads to share them among; as many as there are cores by default.
+        finished : callable, optional
+            Called when a rung is finished, by its thread.
         """
         ground = freedom_of(surface, "free meshes", centroids=self.centroids)
         todo = self.todo
         now = todo[:most]
-        n_threads = os.cpu_count() or 1
+        abreast = threads_for(len(now), n_threads)
         waiting = float(self.shares[todo].sum())
+        books = threading.Lock()
         # the second entry is set by Ctrl-C alone
         stop = np.zeros(2, np.bool_)
 
         def work(rung: int) -> None:
             nonlocal waiting
-            own = None
-            if limit is not None:
-                # threads work side by side, but no rung on more than one
-                own = (limit - time.perf_counter()) * min(n_threads * self.shares[rung] / waiting, 1.0)
-            waiting -= self.shares[rung]
-            front = self._found(ground, surface, subset_of(rung), rung, own, stop)
-            if front is not None:
+            own, slower = None, 1.0
+            with books:
+                if limit is not None:
+                    # threads work side by side, but no rung on more than one
+                    own = (limit - time.perf_counter()) * min(abreast * self.shares[rung] / waiting, 1.0)
+                    if self.thought > 0.0:  # more on a machine that is slow or busy
+                        slower = max(self.took / self.thought, 1.0)
+                waiting -= self.shares[rung]
+            found = self._found(ground, surface, subset_of(rung), rung, own, slower, stop)
+            if found is None:
+                return
+            front, thought, took = found
+            with books:
                 self.fronts[rung] = front
+                if limit is not None:
+                    self.thought += thought
+                    self.took += took
+            if finished is not None:
+                finished()
 
         if not self.fronts and now:  # compiling is not their time
-            on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1])
+            on_threads(lambda rung: self.compile_for(surface, subset_of(rung)), now[:1], n_threads=n_threads)
         limit = None if seconds is None else time.perf_counter() + seconds
         # a rung that is a little late is not thrown away
         with stopping(stop[:1], None if seconds is None else seconds + LATE):
-            on_threads(work, now, stop=stop)
+            on_threads(work, now, stop=stop, n_threads=n_threads)
 
     def compile_for(self, surface: Surface, kept: BoolArray) -> None:
         """Call what is compiled, so that it is, on a subset (N,) that stays as it is."""
@@ -313,15 +336,25 @@ class FreeLadder:
             _thinned(mesh, surface, ground.share, np.zeros(2, np.int64), np.ones(1, np.bool_))
 
     def _found(
-        self, ground: Any, surface: Surface, kept: BoolArray, rung: int, seconds: float | None, stop: BoolArray
-    ) -> FreeFront | None:
-        """Return what is found on a rung; None where it was stopped before it was annealed."""
+        self,
+        ground: Any,
+        surface: Surface,
+        kept: BoolArray,
+        rung: int,
+        seconds: float | None,
+        slower: float,
+        stop: BoolArray,
+    ) -> tuple[FreeFront, float, float] | None:
+        """Return what is found on a rung, and what all but the annealing was thought to take, and took [s].
+
+        It takes ``slower`` times as long as on a machine of its own. None: it was stopped before it was annealed.
+        """
         begun = time.perf_counter()
         sizes = self._wanted(rung)
         n_samples = surface.n_vertices + len(ground.share)
         thought = SECONDS_A_TRIANGLE * int(sizes[0]) + (SECONDS_A_SAMPLE + MEASURING * len(sizes)) * n_samples
-        if seconds is not None:  # more on a machine that is slow or busy
-            seconds -= thought * (max(self.took / self.thought, 1.0) if self.thought > 0.0 else 1.0)
+        if seconds is not None:
+            seconds -= thought * slower
         if stop[0]:
             return None
         with ground.triangulation(kept, min_height=self.min_height) as mesh:
@@ -334,9 +367,8 @@ class FreeLadder:
             annealed = time.perf_counter()
             faces = mesh.faces.astype(np.int32)
             removed, onto, collapses, table = _thinned(mesh, surface, ground.share, sizes, stop)
-        self.thought += thought
-        self.took += time.perf_counter() - annealed + ready - begun
-        return None if stop[1:].any() else FreeFront(faces, removed, onto, collapses, table, moves)
+        took = time.perf_counter() - annealed + ready - begun
+        return None if stop[1:].any() else (FreeFront(faces, removed, onto, collapses, table, moves), thought, took)
 
     def _wanted(self, rung: int) -> IntArray:
         """Return the sizes that a rung is measured at, its own first, down to the next smaller one.
@@ -358,6 +390,8 @@ class FreeLadder:
         triangles: IntArray,
         errors: FloatArray,
         surface_error: FloatArray | None = None,
+        *,
+        n_threads: int | None = None,
     ) -> list[FreeMesh | None]:
         """Return for each of some meshes the best free one that is no larger, and better; None where there is none.
 
@@ -370,34 +404,61 @@ class FreeLadder:
         triangles, errors : (P,) and (P, k) arrays
             Of the meshes.
         surface_error : (P,) float array, optional
-            Of the meshes, if it must not be higher.
+            Of the meshes, if it must not be higher; NaN where it is not known, and not compared.
+        n_threads : int, optional
+            Threads that make them; as many as there are cores by default.
         """
         table = self._table()
-        if not len(table):
-            return [None] * len(triangles)
+        chosen = self._chosen(surface, table, measures, triangles, errors, surface_error)
+        found = self._meshes(surface, table, chosen[chosen >= 0], n_threads)
+        return [found.get(int(place)) for place in chosen]
+
+    def by_gain(self, surface: Surface, measures: Sequence[str], triangles: IntArray, errors: FloatArray) -> IntArray:
+        """Return the places of the meshes for which :meth:`best_of` has one, those first whose error it lowers most.
+
+        The surface error, which is not known of all of them yet, is not compared.
+        """
+        table = self._table()
+        chosen = self._chosen(surface, table, measures, triangles, errors)
+        places = np.flatnonzero(chosen >= 0)
+        left = _values(table, measures[0], surface)[chosen[places]] / errors[places, 0]
+        return places[np.argsort(left, kind="stable")]
+
+    def _chosen(
+        self,
+        surface: Surface,
+        table: FloatArray,
+        measures: Sequence[str],
+        triangles: IntArray,
+        errors: FloatArray,
+        surface_error: FloatArray | None = None,
+    ) -> IntArray:
+        """Return the row of the table that :meth:`best_of` takes for each mesh, -1 where it takes none."""
+        chosen = np.full(len(triangles), -1)
         own = np.column_stack([_values(table, name, surface) for name in measures])
         order = np.lexsort((table[:, TRIANGLES], own[:, 0]))
         own, sizes, between = own[order], table[order, TRIANGLES], table[order, BETWEEN]
-        chosen = np.full(len(triangles), -1)
         for k in range(len(triangles)):
             fits = (sizes <= triangles[k]) & (own[:, 0] < errors[k, 0]) & (own <= errors[k]).all(axis=1)
-            if surface_error is not None:
+            if surface_error is not None and not np.isnan(surface_error[k]):
                 fits &= between <= surface_error[k]
             if fits.any():
                 chosen[k] = order[np.argmax(fits)]
-        found = self._meshes(surface, table, chosen[chosen >= 0])
-        return [found.get(int(place)) for place in chosen]
+        return chosen
 
-    def wished(self, surface: Surface, measure: str, limits: Mapping[str, float]) -> FreeMesh | None:
+    def wished(
+        self, surface: Surface, measure: str, limits: Mapping[str, float], *, uncovered: float = np.inf
+    ) -> FreeMesh | None:
         """Return the free mesh that limits ask for, by measure; None where none holds them all.
 
-        With a number of triangles that of the least error (``measure``), else the smallest.
+        With a number of triangles that of the least error (``measure``), else the smallest. It leaves no more than
+        ``uncovered`` vertices uncovered; its surface error may be any, as what is wished for need not say it.
         """
         table = self._table()
         if not len(table):
             return None
         values = {name: _values(table, name, surface) for name in {*limits, measure}}
-        fitting = np.flatnonzero(np.broadcast_to(shortfall(values, limits), len(table)) == 0.0)
+        fitting = np.flatnonzero((shortfall(values, limits) == 0.0) & (table[:, UNCOVERED] <= uncovered))
         if not len(fitting):
             return None
         by_size, by_error = table[fitting, TRIANGLES], values[measure][fitting]
@@ -410,7 +471,9 @@ class FreeLadder:
         tables = [self.fronts[rung].table for rung in sorted(self.fronts)]
         return np.concatenate(tables) if tables else np.empty((0, REGIONS + 1))
 
-    def _meshes(self, surface: Surface, table: FloatArray, places: IntArray) -> dict[int, FreeMesh]:
+    def _meshes(
+        self, surface: Surface, table: FloatArray, places: IntArray, n_threads: int | None = None
+    ) -> dict[int, FreeMesh]:
         """Return the meshes of some rows of the table."""
         rungs = sorted(self.fronts)
         first = np.cumsum([0, *(len(self.fronts[rung].table) for rung in rungs)])
@@ -421,7 +484,7 @@ class FreeLadder:
             faces = self.fronts[rungs[k]].faces_of([place - int(first[k]) for place in own], surface.n_vertices)
             found.update({place: _mesh(surface, mesh, table[place]) for place, mesh in zip(own, faces, strict=True)})
 
-        on_threads(add, range(len(rungs)))
+        on_threads(add, range(len(rungs)), n_threads=n_threads)
         return found
 
 
@@ -496,24 +559,33 @@ def _some(numbers: IntArray, n: int) -> IntArray:
     return numbers[np.unique(np.round(np.linspace(0, len(numbers) - 1, min(n, len(numbers)))).astype(int))]
 
 
-def surface_errors(surface: Surface, X: BoolArray, triangles: IntArray, *, until: float | None = None) -> FloatArray:
-    """Return the surface error of subsets (P, N) with these numbers of triangles (P,).
+def guarding(surface: Surface) -> tuple[str, ...]:
+    """Return what else must not rise, whatever is minimised: uncovered vertices where they cost nothing."""
+    return ("uncovered",) if surface.rules.outside == "ignore" else ()
 
-    Those that are not begun by ``perf_counter() = until`` count as the next larger one that was; they are spread over
-    all.
+
+def in_turn(order: IntArray, measure: Callable[[int], Any], until: float | None, n_threads: int | None = None) -> None:
+    """Measure places in their order, the first `LEAST_COMPARED` always, others that begin by ``until``; warn of others.
+
+    They are what free meshes are compared with: where nothing is known of one, the free mesh is taken all the same, as
+    the error between the vertices was lowered, too.
     """
-    order = np.argsort(-np.asarray(triangles), kind="stable")
-    found = np.full(len(X), np.nan)
+    left_out = []
 
-    def measure(place: int) -> None:
-        if until is None or time.perf_counter() < until:
-            found[place] = surface.simplify(X[order[place]] | surface.pinned).quality.surface_error
+    def do(turn: int) -> None:
+        if turn < LEAST_COMPARED or until is None or time.perf_counter() < until:
+            measure(int(order[turn]))
+        else:
+            left_out.append(turn)
 
-    on_threads(measure, spread(len(X)))
-    known = np.maximum.accumulate(np.where(np.isnan(found), -1, np.arange(len(X))))
-    errors = np.empty(len(X))
-    errors[order] = np.where(known < 0, 0.0, found[known])
-    return errors
+    on_threads(do, range(len(order)), n_threads=n_threads)
+    if left_out:
+        warnings.warn(
+            f"{len(left_out)} of {len(order)} free meshes are taken without a comparison of their surface error, for "
+            "which there was no time; search longer to have all compared",
+            SearchWarning,
+            stacklevel=3,
+        )
 
 
 def _divided(moves: int, pace: FloatArray, most: IntArray) -> IntArray:
@@ -548,7 +620,7 @@ def _anneal(
     made, share = 0, 0.0
     while share < 1.0:
         now = 0.0 if share > 1.0 - TAIL else hot * COOLING ** (share / (1.0 - TAIL))
-        n = FIRST_MOVES if made == 0 else int(np.clip(PAUSE * made / share, 64, most - made))
+        n = min(FEW_MOVES if made == 0 else max(int(PAUSE * made / share), FEW_MOVES), most - made)
         made += mesh.anneal(n, state, hot=now, cold=now, triangles=size, stop=stop)
         if stop[0]:
             return None

@@ -40,9 +40,10 @@ from meshsimp_pymoo.search.free import (
     RUNGS,
     SUBSETS_SHARE,
     FreeLadder,
+    guarding,
+    in_turn,
     ladder_of,
     steps_between,
-    surface_errors,
 )
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
@@ -396,28 +397,43 @@ class MemeticSearch(GeneticAlgorithm):
                 surface,
                 lambda rung: self.pop[rows[rung]].X | surface.pinned,
                 seconds=None if limit is None else limit[1],
+                n_threads=_threads(self.problem),
             )
         if not 0 < len(free.todo) < n_left:
             self.termination.force_termination = True
         return Population.create()
 
-    def take_free(self, *, until: float | None = None) -> None:
-        """Keep beside each individual of the optimum the best free mesh that is no larger and better; none, where none.
+    def take_free(self, population: Population, *, until: float | None = None) -> None:
+        """Keep beside each individual the best free mesh that is no larger and better; none, where there is none.
 
-        It has a lower error, and no higher one between the vertices if it was searched by that too.
+        It has a lower error, and no higher one between the vertices if it was searched by that too; nor does it leave
+        more vertices uncovered where these cost nothing.
 
         Parameters
         ----------
+        population : Population
+            Such as ``algorithm.opt``.
         until : float, optional
-            After ``perf_counter() = until`` no more of the individuals' meshes are measured between the vertices.
+            After ``perf_counter() = until`` no more of the individuals' meshes are measured between the vertices, but
+            for a few; free meshes for the others are not compared by that, and a warning says how many they are.
         """
         free = self.free
-        if free is None or self.opt is None or not len(self.opt):
+        if free is None or not len(population):
             return
-        surface, F, X = self.problem.surface, self.opt.get("F"), self.opt.get("X")
-        between = surface_errors(surface, X, F[:, 1], until=until) if free.centroids and free.fronts else None
-        meshes = free.best_of(surface, self.problem.objectives[:1], F[:, 1], F[:, :1], between)
-        for one, mesh in zip(self.opt, meshes, strict=True):
+        surface, n_threads = self.problem.surface, _threads(self.problem)
+        F, X = population.get("F"), population.get("X")
+        others = guarding(surface)
+        names = (self.problem.objectives[0], *others)
+        triangles, errors = F[:, 1], np.column_stack([F[:, 0], *(population.get(name) for name in others)])
+        between = np.full(len(X), np.nan)
+
+        def measure(place: int) -> None:
+            between[place] = surface.simplify(X[place] | surface.pinned).quality.surface_error
+
+        if free.centroids:
+            in_turn(free.by_gain(surface, names, triangles, errors), measure, until, n_threads)
+        meshes = free.best_of(surface, names, triangles, errors, between, n_threads=n_threads)
+        for one, mesh in zip(population, meshes, strict=True):
             one.set("free", mesh)
 
     def _advance(self, infills: Any = None, **kwargs: Any) -> None:
@@ -442,7 +458,7 @@ class MemeticSearch(GeneticAlgorithm):
             return
         limit = time_limit(self)
         left = None if limit is None else MEASURED_LAST * (limit[1] + limit[2])
-        self.take_free(until=None if left is None else time.perf_counter() + left)
+        self.take_free(self.opt, until=None if left is None else time.perf_counter() + left)
         if (self.pop.get("F")[:, 0] > 0.0).any() and not self.free.fronts:
             said = "any size was annealed freely: all meshes are Delaunay"
         elif self.free.todo:
@@ -489,8 +505,12 @@ class MemeticSearch(GeneticAlgorithm):
 
 def measurable(problem: Any, seconds: float) -> int:
     """Return about how many subsets can be measured in this time."""
-    threads = getattr(problem.elementwise_runner, "n_threads", 1)
-    return int(threads * seconds / (SECONDS_A_VERTEX * problem.n_var))
+    return int((_threads(problem) or 1) * seconds / (SECONDS_A_VERTEX * problem.n_var))
+
+
+def _threads(problem: Any) -> int | None:
+    """Return the threads that the problem is evaluated on, if its runner has any."""
+    return getattr(problem.elementwise_runner, "n_threads", None)
 
 
 def between_the_rungs(
@@ -600,7 +620,8 @@ def memetic(
         Least height of the triangles that free meshes come to have, as a share of their longest edge; 0: any.
     centroids : bool
         Whether free meshes are searched by the error at the centroids of the original's faces, too, and taken only
-        where the surface error is not higher. Otherwise they fit the vertices and may be wrong between them.
+        where the surface error is not higher, or was not compared for want of time, of which a warning says how often.
+        Otherwise they fit the vertices and may be wrong between them.
     **kwargs
         Further arguments of pymoo's ``GeneticAlgorithm``; they replace those set here.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import itertools
 import time
@@ -29,11 +30,12 @@ from meshsimp_pymoo import (
 )
 from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.front import Freeing
 from meshsimp_pymoo.plane.faces import canonical_faces, is_canonical, used_rows
 from meshsimp_pymoo.search import free as module
 from meshsimp_pymoo.search.checkpoint import Checkpoints, read_checkpoint, restore
 from meshsimp_pymoo.search.free import BETWEEN, FreeLadder, ladder_of, steps_between
-from meshsimp_pymoo.surface.measures import OF_MESH, TRIANGLES
+from meshsimp_pymoo.surface.measures import OF_MESH, TRIANGLES, UNCOVERED
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
 
@@ -207,6 +209,66 @@ def test_the_best_one_is_no_larger_and_nothing_that_counts_is_higher():
     assert ladder.wished(own, "error", {"max_error": 3.0}).quality.triangles == 8
     assert ladder.wished(own, "error", {"max_error": 3.0, "triangles": 11}).quality.error == 6
     assert ladder.wished(own, "error", {"max_error": 0.5}) is None
+    # what is not known is not compared; what counts beside may be what is uncovered
+    assert chosen(["error"], 9, [9], np.nan) == 7
+    ladder.fronts[0].table[2, UNCOVERED] = 2
+    assert chosen(["error", "uncovered"], 9, [9, 2]) is not None
+    assert chosen(["error", "uncovered"], 9, [9, 1]) is None
+    assert ladder.wished(own, "error", {"max_error": 3.0}, uncovered=1).quality.triangles == 10
+    # by what is left of the error: 4 of 40, 5 of 5.5; of the last one nothing is lower
+    order = ladder.by_gain(own, ["error"], np.array([11, 12, 8]), np.array([[5.5], [40.0], [7.0]]))
+    assert order.tolist() == [1, 0]
+
+
+class Fake:
+    """A mesh of which each move takes some time."""
+
+    cost, movable = 1.0, 1
+
+    def __init__(self, seconds):
+        self.seconds, self.asked = seconds, []
+
+    def anneal(self, n, state, **how):
+        self.asked.append(n)
+        time.sleep(n * self.seconds)
+        return n
+
+
+def test_with_a_deadline_few_moves_are_made_before_it_looks_at_the_clock():
+    stop = np.zeros(2, bool)
+    slow = Fake(1e-4)
+    module._anneal(slow, 10, 1, 10**6, time.perf_counter() + 0.01, False, stop)
+    assert slow.asked[0] == 64
+    few = Fake(0.0)
+    assert module._anneal(few, 10, 1, 10, time.perf_counter() + 60.0, False, stop) == 10
+    assert few.asked == [10]
+
+
+def test_rungs_share_the_time_of_the_threads_that_run(monkeypatch):
+    own = surface("face:90")
+    ladder, given = FreeLadder(), []
+    ladder.begin(own, np.array([20, 30, 40]), np.array([20]), np.random.default_rng(1), shares=np.ones(3), timed=True)
+    monkeypatch.setattr(FreeLadder, "compile_for", lambda *given: None)
+    monkeypatch.setattr(FreeLadder, "_found", lambda self, *all_: given.append(all_[4]))
+
+    def times(n_threads):
+        given.clear()
+        ladder.go_on(own, lambda rung: own.pinned, seconds=60.0, n_threads=n_threads)
+        return sorted(given)
+
+    assert times(1) == pytest.approx([20.0, 30.0, 60.0], rel=0.05)
+    assert times(2) == pytest.approx([40.0, 60.0, 60.0], rel=0.05)
+    (inside,) = workers.on_threads(times, [2])  # one after the other
+    assert inside == pytest.approx([20.0, 30.0, 60.0], rel=0.05)
+
+
+def test_the_search_has_the_threads_of_its_problem(monkeypatch):
+    asked, real = set(), module.on_threads
+    monkeypatch.setattr(module, "on_threads", lambda *given, **how: asked.add(how["n_threads"]) or real(*given, **how))
+    monkeypatch.setattr(FreeLadder, "compile_for", lambda *given: None)
+    result = minimize(MeshProblem("face:90", n_threads=1), memetic(8, triangulation="free"), Moves(2_000), seed=1)
+    Front.from_result(result).free(moves=1_000)
+    assert asked == {1}
 
 
 # ------------------------------------------------------------------------------------------------------- in the search
@@ -248,7 +310,7 @@ def test_a_search_of_subsets_alone_has_no_free_meshes_and_is_what_it_was(problem
 
 def test_the_same_seed_and_moves_give_the_same_bytes_on_any_number_of_threads(monkeypatch, searched):
     for n_threads in (1, 3):
-        monkeypatch.setattr(module.os, "cpu_count", lambda n=n_threads: n)
+        monkeypatch.setattr(workers.os, "cpu_count", lambda n=n_threads: n)
         with ThreadPoolExecutor(n_threads) as pool:
             monkeypatch.setattr(workers, "thread_pool", lambda _, pool=pool: pool)
             result = minimize(MeshProblem("face:200"), memetic(20, triangulation="free"), Moves(60_000), seed=3)
@@ -259,7 +321,7 @@ def test_the_same_seed_and_moves_give_the_same_bytes_on_any_number_of_threads(mo
 @pytest.mark.parametrize("done", [1, 2])
 def test_a_search_that_was_stopped_goes_on_with_the_rungs_that_are_left(monkeypatch, tmp_path, done):
     monkeypatch.setattr(module, "ABREAST", 8)
-    monkeypatch.setattr(FreeLadder.go_on, "__kwdefaults__", {"seconds": None, "most": 8})
+    monkeypatch.setattr(FreeLadder.go_on, "__kwdefaults__", FreeLadder.go_on.__kwdefaults__ | {"most": 8})
 
     def begun():
         return memetic(20, triangulation="free").setup(MeshProblem("face:90"), termination=Moves(20_000), seed=2)
@@ -299,9 +361,60 @@ def test_what_is_finished_when_the_search_is_interrupted_is_kept(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         algorithm.run()
     assert 5 <= len(algorithm.free.fronts) < len(algorithm.free.sizes)
-    algorithm.take_free()
+    algorithm.take_free(algorithm.opt)
     front = Front.from_population(problem, algorithm.opt)
     assert 0 < front.n_free < len(front)
+
+
+def test_without_time_to_compare_them_free_meshes_are_taken_and_how_many_is_said(monkeypatch, searched):
+    """The few that are compared all the same are those that gain most; the others are taken for their error alone."""
+    monkeypatch.setattr(module, "LEAST_COMPARED", 3)
+    algorithm, population = searched.algorithm, copy.deepcopy(searched.opt)
+    own, F = algorithm.problem.surface, population.get("F")
+    order = algorithm.free.by_gain(own, ["error"], F[:, 1], F[:, :1])
+    n = len(order)
+    with pytest.warns(SearchWarning, match=f"{n - 3} of {n} free meshes are taken without a comparison"):
+        algorithm.take_free(population, until=0.0)
+    alone = algorithm.free.best_of(own, ["error"], F[:, 1], F[:, :1])
+    compared = bytes_of(searched.opt)
+    found = bytes_of(population)
+    for place, mesh in enumerate(alone):
+        mesh = None if mesh is None else (mesh.kept.tobytes(), mesh.faces.tobytes(), mesh.quality)
+        assert found[place] == (compared[place] if place in order[:3] else mesh)
+    assert sum(mesh is not None for mesh in found) >= n - 3 > 10
+    assert found != compared
+
+
+def test_of_a_front_too_free_meshes_are_taken_without_time_to_compare_them(monkeypatch, plain_front):
+    monkeypatch.setattr(module, "LEAST_COMPARED", 3)
+    unknown = [dataclasses.replace(q, **dict.fromkeys(OF_MESH, np.nan)) for q in plain_front.quality]
+    front = Front(unknown, np.asarray(plain_front.kept), problem=plain_front.problem)
+    freeing = Freeing(front, FreeLadder(), moves=20_000)
+    told = []
+    while freeing.go_on(finished=lambda: told.append(len(freeing.ladder.fronts))):
+        pass
+    assert len(told) == max(told) == len(freeing.ladder.sizes)
+    with pytest.warns(SearchWarning, match=r"\d+ of \d+ free meshes are taken without a comparison"):
+        assert freeing.front(until=0.0).n_free > len(front) / 4
+
+
+def test_where_uncovered_vertices_cost_nothing_no_more_are_uncovered():
+    own = surface(holey_grid(), outside="ignore")
+    problem = MeshProblem(own)
+    result = minimize(problem, memetic(20, triangulation="free"), Moves(20_000), seed=1)
+    table = problem.evaluate_subsets(result.opt.get("X"))
+    meshes = result.opt.get("free", to_numpy=False)
+    pairs = [(mesh.quality.uncovered, row[UNCOVERED]) for mesh, row in zip(meshes, table, strict=True) if mesh]
+    assert len(pairs) > 3
+    assert all(after <= before for after, before in pairs)
+    front = Front.from_subsets(problem, result.X)
+    freed = front.free(moves=20_000)
+    assert freed.n_free > 3
+    not_worse(front, freed, ("error", "uncovered"))
+
+
+def test_seconds_are_learnt_with_a_deadline_only(searched):
+    assert searched.algorithm.free.thought == searched.algorithm.free.took == 0.0
 
 
 @pytest.mark.filterwarnings("ignore::meshsimp_pymoo.errors.SearchWarning")  # on a busy machine there is less
@@ -386,7 +499,7 @@ def test_a_front_of_nsga2_is_freed_and_nowhere_worse(plain_front, tmp_path):
     assert freed.n_free > len(freed) / 2
     not_worse(plain_front, freed, ("error", "surface_error"))
     assert np.mean([freed.best(triangles=s.triangles).error / s.error for s in plain_front if s.error > 0]) < 0.9
-    assert freed.run["free"] == {"seed": 1, "moves": 60_000, "min_height": 0.1, "centroids": True}
+    assert freed.run["freeing"] == {"seed": 1, "moves": 60_000, "min_height": 0.1, "centroids": True}
     again = plain_front.free(moves=60_000)
     assert again.quality == freed.quality
     assert all(np.array_equal(a, b) for a, b in zip(again.faces, freed.faces, strict=True))
