@@ -29,7 +29,7 @@ from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
 from meshsimp_pymoo.surface.free import take_numbers
-from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, as_quality
+from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, UNCOVERED, as_quality
 from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
