@@ -66,7 +66,7 @@ LATE = 0.05
 # Sizes between the rungs that are measured differ by this share, or by one triangle.
 STEP = 0.015
 # The time of a rung grows with this power of its size, and ebbs away towards all triangles, where little can be gained.
-TIME_POWER = 0.3
+TIME_POWER = 0.4
 # Where one mesh is wished for: sizes as shares of the number of triangles, or of those of the mesh that holds the wish
 # so far, which free ones of fewer may hold, with their shares of the time; and those of some others of the front.
 AROUND_A_SIZE = ((0.85, 0.5), (1.0, 2.0), (1.0, 2.0), (1.18, 0.5))
@@ -515,7 +515,7 @@ def usual_shares(sizes: IntArray, n_vertices: int) -> FloatArray:
     Examples
     --------
     >>> usual_shares(np.array([20, 200, 2000]), 1000).round(2).tolist()
-    [0.26, 0.48, 0.05]
+    [0.16, 0.38, 0.05]
     """
     of_all = np.minimum(sizes / (2.0 * n_vertices), 1.0)
     shares: FloatArray = of_all**TIME_POWER * (1.05 - of_all)
