@@ -63,12 +63,12 @@ def between_vertices(model: OpenModel) -> Between:
     return Between(np.ascontiguousarray(place).ravel(), z, area, exact_area)
 
 
-def with_centroids(ground: Ground, model: OpenModel) -> tuple[Ground, FloatArray]:
-    """Return the ground of a model with its centroids behind the vertices, as samples, and the share of each in area.
+def with_centroids(ground: Ground, model: OpenModel) -> tuple[Ground, FloatArray, IntArray]:
+    """Return the ground of a model with its K centroids behind the vertices, as samples, shares (K,) and faces (K,).
 
     Sites are vertices: what is exact of circles is so of these.
     """
-    place, z, area, _ = centroids_of(model)
+    place, z, area, rows = centroids_of(model)
     xy = np.vstack([model.xy, place])
     both = ground._replace(
         xy=np.ascontiguousarray(xy).ravel(),
@@ -76,4 +76,4 @@ def with_centroids(ground: Ground, model: OpenModel) -> tuple[Ground, FloatArray
         exact_area=exact_ranges(xy)[0],
         boxes=boxes_of_runs(xy, RUN),
     )
-    return both, area
+    return both, area, rows

@@ -45,7 +45,7 @@ from meshsimp_pymoo.surface.books import (
     Live,
     make_live,
 )
-from meshsimp_pymoo.surface.centroids import centroids_of, with_centroids
+from meshsimp_pymoo.surface.centroids import with_centroids
 from meshsimp_pymoo.surface.costs import bare_deviation, deviation_in, is_hardly_bare
 from meshsimp_pymoo.surface.fans import (
     N_CAVITY,
@@ -767,9 +767,8 @@ class FreeGround:
         weights = np.ones(n) if model.weights is None else model.weights
         share = np.empty(0)
         if centroids:
-            ground, share = with_centroids(ground, model)
-            corners = model.faces[centroids_of(model)[3]]
-            weights = np.concatenate([weights, CENTROIDS * n * share * weights[corners].mean(axis=1)])
+            ground, share, rows = with_centroids(ground, model)
+            weights = np.concatenate([weights, CENTROIDS * n * share * weights[model.faces[rows]].mean(axis=1)])
         n_samples = len(ground.z)
         low, high = -FAR, 1.0 + FAR
         xy = np.vstack([ground.xy.reshape(-1, 2), [[high, high], [low, high], [low, low], [high, low]]])

@@ -172,7 +172,7 @@ def test_a_subset_and_its_mesh_from_a_file_say_the_same_on_nasty_models(name, su
 def test_centroids_as_further_samples_are_measured_the_same(model):
     for (footprint, outside), share in itertools.product(RULES, (0.1, 0.5)):
         rated, kept = surface(model, footprint=footprint, outside=outside), subset(model, share)
-        both, area = with_centroids(rated.ground(), model)
+        both, area, _ = with_centroids(rated.ground(), model)
         n = len(both.z)
         beside = np.r_[kept, np.zeros(n - model.n_vertices, bool)]
         both = both._replace(weight=np.empty(0))
