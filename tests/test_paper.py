@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 HEAD = ["clause", "where", "verdict", "tests"]
 ROWS = [
     [cell.strip() for cell in line.strip().strip("|").split("|")]
-    for line in (ROOT / "docs" / "paper.md").read_text(encoding="utf-8").splitlines()
+    for line in (ROOT / "docs" / "explanation" / "paper.md").read_text(encoding="utf-8").splitlines()
     if line.startswith("| ")
 ]
 CLAUSES = [row for row in ROWS if row != HEAD]

@@ -1,6 +1,6 @@
 """Every algorithm class that pymoo ships, on our problems and with our operators: what runs, and why the others do not.
 
-``python tests/test_pymoo_conformance.py`` prints the table of docs/pymoo.md from what it measures.
+``python tests/test_pymoo_conformance.py`` prints the table of docs/reference/pymoo.md from what it measures.
 A class that pymoo adds fails `test_every_class_of_pymoo_is_in_the_table` until it has a line here.
 """
 
@@ -44,7 +44,7 @@ from meshsimp_pymoo.search.weighted import WeightedSum
 # what pymoo divides by 0 within
 pytestmark = pytest.mark.filterwarnings(r"ignore::RuntimeWarning:pymoo\..*")
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "pymoo.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference" / "pymoo.md"
 MODEL, SIZE, GENERATIONS, WEIGHT = "pyramid:5", 12, 3, 0.02
 POINTS = [[10.0, 20.0], [40.0, 4.0]]  # (error, triangles), as all points in the space of objectives
 
@@ -320,7 +320,7 @@ def test_every_class_of_pymoo_is_in_the_table() -> None:
 def test_the_page_says_what_is_so(path: str) -> None:
     line = row(path)
     assert line in PAGE.read_text("utf-8").splitlines(), (
-        f"docs/pymoo.md does not have {line!r}; if that is right, take what this prints: python {Path(__file__).name}"
+        f"docs/reference/pymoo.md does not have {line!r}; if that is right, take what this prints: python {Path(__file__).name}"
     )
 
 

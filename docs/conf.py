@@ -1,0 +1,81 @@
+"""How the pages are built: ``pip install -e '.[docs]'``, then ``sphinx-build -W --keep-going docs docs/_build/html``.
+
+Sphinx, since the API of pymoo, NumPy, SciPy and PyVista is read in it: numpydoc's docstrings, links between projects,
+galleries made of scripts; MyST, since all other text here is Markdown.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import metadata
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+
+PACKAGE = metadata("meshsimp-pymoo")
+URLS = dict(line.split(", ", 1) for line in PACKAGE.get_all("Project-URL"))
+
+project = "meshsimp_pymoo"
+author = "the meshsimp_pymoo contributors"
+project_copyright = author
+release = version = PACKAGE["Version"]
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.extlinks",
+    "sphinx_argparse_cli",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+    "elsewhere",
+    "tables",
+]
+exclude_patterns = ["_build", "_ext", "examples", "gallery/*.ipynb"]
+nitpicky = False
+default_role = "py:obj"
+
+# {repo}`tests/record/record.py` is a link to a file of the repository; a test looks whether it is there.
+extlinks = {"repo": (f"{URLS['Source']}/blob/main/%s", "%s")}
+extlinks_detect_hardcoded_links = True
+
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+
+autosummary_generate = True
+numpydoc_show_class_members = False
+autodoc_member_order = "bysource"
+
+copybutton_prompt_text = "$ "
+copybutton_exclude = ".linenos, .gp, .go"
+
+sphinx_gallery_conf = {
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "min_reported_time": 3600,
+    "remove_config_comments": True,
+    "show_signature": False,
+    "write_computation_times": False,
+}
+
+html_theme = "pydata_sphinx_theme"
+html_title = project
+html_static_path = ["_static"]
+html_show_sourcelink = False
+html_theme_options = {
+    "logo": {"text": project},
+    "github_url": URLS["Source"],
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "header_links_before_dropdown": 6,
+    "footer_start": ["copyright"],
+    "footer_end": ["sphinx-version"],
+}
