@@ -320,7 +320,7 @@ def test_every_class_of_pymoo_is_in_the_table() -> None:
 def test_the_page_says_what_is_so(path: str) -> None:
     line = row(path)
     assert line in PAGE.read_text("utf-8").splitlines(), (
-        f"docs/reference/pymoo.md does not have {line!r}; if that is right, take what this prints: python {Path(__file__).name}"
+        f"{PAGE.name} does not have {line!r}; if that is right, take what this prints: python {Path(__file__).name}"
     )
 
 
