@@ -1,4 +1,4 @@
-"""What the README says is so: its Python and YAML run, its commands parse, its files are there."""
+"""What the README says is so: its Python runs, its commands parse, its files are there."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 from meshsimp_pymoo import MeshProblem
@@ -38,54 +39,22 @@ def session(tmp_path_factory):
     return folder, names, printed
 
 
-def test_the_python_of_the_page_runs_and_prints_what_the_page_says(session):
-    folder, _, printed = session
-    assert (folder / "small.ply").stat().st_size > 0
-    *roof, gained = printed
-    assert len(roof) == 3
-    for line in roof:
-        assert f"# {line}" in README
-    assert gained == "True"
+def test_the_page_is_short():
+    assert len(README.splitlines()) <= 130
 
 
-def test_the_operator_of_the_page_keeps_the_promises_of_an_operator(session):
-    _, names, _ = session
-    problem = MeshProblem("peaks:12")
-    X = np.ones((40, problem.n_var), dtype=bool)
-    X.flags.writeable = False
-    children = [names["ClearDisc"]()._do(problem, X, random_state=np.random.default_rng(5)) for _ in range(2)]
-    assert (children[0] == children[1]).all()
-    assert children[0].dtype == bool
-    dropped = (~children[0]).sum(axis=1)
-    assert 0 < dropped.mean() < problem.n_var / 4
-
-
-def test_the_indicator_of_the_page_is_the_least_error_at_a_size(session):
-    _, names, _ = session
-    assert names["ErrorAt"](4)(np.array([[9.0, 2], [3.0, 4], [1.0, 5]])) == 3.0
-
-
-def test_what_is_added_takes_ten_lines(session):
-    operator, indicator = blocks("python")[-2:]
-    for block in (operator, indicator):
-        (written,) = re.findall(r"^class .*?(?=^\S)", block + "end", re.MULTILINE | re.DOTALL)
-        assert len([line for line in written.splitlines() if line.strip()]) <= 10
-
-
-def test_the_yaml_of_the_page_is_an_experiment(tmp_path):
-    (block,) = blocks("yaml")
-    path = tmp_path / "mine.yaml"
-    path.write_text(block, encoding="utf-8")
-    experiment = read_experiment_file(path)
-    assert [problem.name for problem in experiment.problems] == ["face:300", "Terrain"]
-    assert [algorithm.name for algorithm in experiment.algorithms] == ["nsga2_v1", "memetic", "Large"]
+def test_the_python_of_the_page_runs_and_writes_its_mesh(session):
+    folder, names, printed = session
+    assert trimesh.load(folder / "small.ply").faces.shape[1] == 3
+    assert names["best"].triangles <= 500
+    assert printed == [f"{names['best'].triangles} {names['best'].error}"]
 
 
 def test_every_command_of_the_page_is_one_that_the_parser_takes():
     in_prose = re.findall(r"`(meshsimp \w+ [^`]*)`", README)  # `meshsimp run` alone is a name
     in_blocks = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("meshsimp ")]
     assert len(in_blocks) > 4
-    assert len(in_prose) > 4
+    assert len(in_prose) > 2
     for command in in_blocks + in_prose:
         make_parser().parse_args(shlex.split(command, comments=True)[1:])
 
@@ -96,20 +65,6 @@ def test_every_file_that_the_page_points_to_is_there():
     )
     assert len(pointed) > 6
     assert [name for name in sorted(pointed) if not (ROOT / name).exists()] == []
-
-
-@pytest.mark.parametrize("path", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.stem)
-def test_the_other_pages_name_commands_that_the_parser_takes_and_files_that_are_there(path):
-    page = path.read_text(encoding="utf-8")
-    for command in re.findall(r"^(meshsimp .*)$", page, re.MULTILINE):
-        make_parser().parse_args(shlex.split(command, comments=True)[1:])
-    for block in re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL):
-        compile(block, path.name, "exec")
-    pointed = {path.parent / name for name in re.findall(r"\]\((?!http)([^)#]+)[^)]*\)", page)}
-    pointed |= {
-        ROOT / name for name in re.findall(r"(?<![\w/])((?:configs|docs|tests|meshsimp_pymoo)/[\w./]+\w)", page)
-    }
-    assert [str(name) for name in sorted(pointed) if not name.exists()] == []
 
 
 def test_the_commented_configuration_names_every_preset_and_operator():
