@@ -45,6 +45,9 @@ LARGE = 50_000
 # Temperature in the beginning, in units of the cost per vertex that may move, for others and for large ones; the share
 # of it that is left in the end; and the share of the moves, or of the time, that accept improvements only, after that.
 HOT, HOT_LARGE = 0.12, 0.05
+# Where triangles may have any shape, meshes of more than this share of all triangles are heated more, by the root of
+# how much more: 3 to 8 % less error at 20 % of the vertices.
+SPARSE_SHARE = 0.03
 COOLING = 0.05
 TAIL = 0.1
 # The share of a budget for subsets, before the rungs.
@@ -359,9 +362,9 @@ class FreeLadder:
             return None
         with ground.triangulation(kept, min_height=self.min_height) as mesh:
             until = None if seconds is None else begun + seconds
-            is_large = surface.n_vertices > LARGE
+            heat = self._heat(int(sizes[0]), surface.n_vertices)
             ready = time.perf_counter()
-            moves = _anneal(mesh, sizes[0], self.seeds[rung], self.planned[rung], until, is_large, stop)
+            moves = _anneal(mesh, sizes[0], self.seeds[rung], self.planned[rung], until, heat, stop)
             if moves is None:
                 return None
             annealed = time.perf_counter()
@@ -369,6 +372,12 @@ class FreeLadder:
             removed, onto, collapses, table = _thinned(mesh, surface, ground.share, sizes, stop)
         took = time.perf_counter() - annealed + ready - begun
         return None if stop[1:].any() else (FreeFront(faces, removed, onto, collapses, table, moves), thought, took)
+
+    def _heat(self, size: int, n_vertices: int) -> float:
+        """Return the temperature in the beginning, in units of the cost per vertex that may move."""
+        if n_vertices > LARGE:
+            return HOT_LARGE
+        return HOT if self.min_height > 0.0 else HOT * max(size / (2.0 * n_vertices * SPARSE_SHARE), 1.0) ** 0.5
 
     def _wanted(self, rung: int) -> IntArray:
         """Return the sizes that a rung is measured at, its own first, down to the next smaller one.
@@ -604,12 +613,12 @@ def _divided(moves: int, pace: FloatArray, most: IntArray) -> IntArray:
 
 
 def _anneal(
-    mesh: Any, size: int, seed: int, most: int, until: float | None, is_large: bool, stop: BoolArray
+    mesh: Any, size: int, seed: int, most: int, until: float | None, heat: float, stop: BoolArray
 ) -> int | None:
     """Anneal a mesh at a number of triangles; return the moves that were made, None where it was stopped on its way."""
     state = np.array([seed], np.uint64)
     size, most = int(size), int(most)
-    hot = (HOT_LARGE if is_large else HOT) * mesh.cost / max(mesh.movable, 1)
+    hot = heat * mesh.cost / max(mesh.movable, 1)
     if until is None:
         last = round(TAIL * most)
         made = mesh.anneal(most - last, state, hot=hot, cold=COOLING * hot, triangles=size, stop=stop)

@@ -237,10 +237,10 @@ class Fake:
 def test_with_a_deadline_few_moves_are_made_before_it_looks_at_the_clock():
     stop = np.zeros(2, bool)
     slow = Fake(1e-4)
-    module._anneal(slow, 10, 1, 10**6, time.perf_counter() + 0.01, False, stop)
+    module._anneal(slow, 10, 1, 10**6, time.perf_counter() + 0.01, 0.1, stop)
     assert slow.asked[0] == 64
     few = Fake(0.0)
-    assert module._anneal(few, 10, 1, 10, time.perf_counter() + 60.0, False, stop) == 10
+    assert module._anneal(few, 10, 1, 10, time.perf_counter() + 60.0, 0.1, stop) == 10
     assert few.asked == [10]
 
 
