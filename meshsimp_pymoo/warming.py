@@ -222,6 +222,8 @@ WISH = (*SEARCH, "insertion")
 
 def missing(names: Iterable[str] | None = None) -> list[Part]:
     """Return those parts, of all, that have functions without machine code on this machine."""
+    # all answers of all surfaces are part of what an entry is made from, so they have to be there before it is known
+    import_module(f"{PACKAGE}.surface.height")
     wanted = {part.name for part in PARTS} if names is None else set(names)
     return [part for part in PARTS if part.name in wanted and not all(map(_has_code, part.entries))]
 

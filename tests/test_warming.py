@@ -34,6 +34,11 @@ def test_what_python_calls_is_in_one_part_each():
     assert set(SEARCH) < set(WISH) <= {part.name for part in PARTS}
 
 
+def test_a_process_that_begins_by_looking_for_it_finds_what_others_have_compiled():
+    code = f"from meshsimp_pymoo.warming import missing\nprint([part.name for part in missing({SEARCH})])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
 FIRST_CALL = """
 import json, os, sys
 if hasattr(os, "sched_setaffinity"):
