@@ -16,10 +16,11 @@ from samples import surface
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.heights import grid_source
-from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.search.free import _thin
 from meshsimp_pymoo.surface.books import EMITTED, END, N_EMITTED
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE, REACH
 from meshsimp_pymoo.surface.free import LEAST_HEIGHT, FreeShares
+from meshsimp_pymoo.surface.measures import REGIONS
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
 
@@ -258,16 +259,26 @@ def test_each_kind_of_move_can_be_left_out(what):
         assert free.accepted.sum() > 0
 
 
+def thinned(ground, free, rated, least):
+    """Thin a free triangulation; return the vertices that collapsed, and the error and the triangles after each."""
+    n = rated.n_vertices
+    removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
+    sizes, table = np.array([free.triangles, least]), np.full((2, REGIONS + 1), np.nan)
+    look = sizes, ground.share, np.zeros(1, np.bool_), removed, error, triangles, np.zeros(2, np.int64), table
+    made, _ = _thin(free.freedom, free.books, n, rated.pinned, *look)
+    return removed[:made], error[: made + 1], triangles[: made + 1]
+
+
 @pytest.mark.parametrize("name", ["face:300", "horseshoe:200"])
 def test_thinning_collapses_the_cheapest_vertex_and_says_onto_which(name):
     rated = surface(build_model(load(name)))
     n, model = rated.n_vertices, rated.model
-    with rated.free_ground(centroids=False).triangulation(rated.selection(90)) as free:
+    ground = rated.free_ground(centroids=False)
+    with ground.triangulation(rated.selection(90)) as free:
         free.anneal(3000, np.array([7], np.uint64), hot=0.1, cold=0.01, triangles=free.triangles)
         first = free.faces
-        removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-        stop = np.zeros(1, np.bool_)
-        made = thin(free.freedom, free.books, n, rated.pinned, 12, np.inf, np.inf, stop, removed, error, triangles)
+        removed, error, triangles = thinned(ground, free, rated, 12)
+        made = len(removed)
         last, onto = free.faces, free.freedom.onto.copy()
         assert free.cost == pytest.approx(cost_from_scratch(free))
     assert made > 20
@@ -285,12 +296,10 @@ def test_thinning_collapses_the_cheapest_vertex_and_says_onto_which(name):
 
 def test_the_cheapest_collapse_is_the_cheapest_of_all():
     rated = surface(build_model(load("face:200")))
-    n = rated.n_vertices
-    with rated.free_ground(centroids=False).triangulation(rated.selection(40)) as free:
+    ground = rated.free_ground(centroids=False)
+    with ground.triangulation(rated.selection(40)) as free:
         cost, first = free.cost, free.faces
-        arrays = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-        most = free.triangles - 1
-        thin(free.freedom, free.books, n, rated.pinned, most, np.inf, np.inf, np.zeros(1, np.bool_), *arrays)
+        thinned(ground, free, rated, free.triangles - 1)
         found = free.cost - cost
     best = np.inf
     sides = {(int(f[k]), int(f[(k + 1) % 3])) for f in first for k in range(3)}
