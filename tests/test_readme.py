@@ -6,12 +6,10 @@ import re
 import shlex
 from pathlib import Path
 
-import numpy as np
 import pytest
 import trimesh
 import yaml
 
-from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.search.operators import OPERATORS
@@ -79,19 +77,6 @@ def test_the_configurations_that_come_with_it_can_be_read(path, tmp_path, reques
     experiment = read_experiment_file(path, folder=folder)
     assert len(experiment.problems) >= 3
     assert yaml.safe_load(path.read_text(encoding="utf-8"))["title"] == experiment.title
-
-
-def test_the_constraint_of_the_contributors_page_is_one():
-    (block,) = re.findall(r"^```python\n(.*?)^```$", (ROOT / "CONTRIBUTING.md").read_text("utf-8"), re.M | re.S)
-    names = {"MeshProblem": MeshProblem}
-    exec(compile(block, "CONTRIBUTING.md", "exec"), names)
-    for limits, first in (({}, 0), ({"max_triangles": 3}, 1)):
-        problem = names["Covering"]("horseshoe:60", **limits)
-        got = problem.evaluate(np.stack([problem.pinned, np.ones(problem.n_var, bool)]), return_as_dictionary=True)
-        assert got["G"].shape == (2, 1 + first)
-        assert got["G"][:, -1].tolist() == got["uncovered"].tolist()
-        if limits:
-            assert got["G"][:, 0].tolist() == (got["F"][:, 1] - 3).tolist()
 
 
 def test_each_recipe_names_places_that_are_there():

@@ -28,6 +28,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import copy
+import hashlib
 import importlib
 import inspect
 import math
@@ -655,6 +656,8 @@ def settings(part: Any) -> dict[str, Any]:
     # a class of this package is known by its name, wherever it lives
     home = "meshsimp_pymoo" if kind.__module__.startswith("meshsimp_pymoo.") else kind.__module__
     found: dict[str, Any] = {"class": f"{home}.{kind.__qualname__}"}
+    if not f"{home}.".startswith(("meshsimp_pymoo.", "pymoo.")) and (code := _code_of(kind.__module__)):
+        found["code"] = code  # whoever changes a class of theirs wants its runs done again
     for name in sorted((_parameters(kind) or set()) - WITHOUT_EFFECT):
         value: Any = getattr(part, name, None)
         if type(value).__module__ == "pymoo.core.variable":
@@ -680,6 +683,14 @@ def settings(part: Any) -> dict[str, Any]:
     if callable(comparison):
         found["func_comp"] = getattr(comparison, "__qualname__", str(comparison))
     return found
+
+
+def _code_of(module: str) -> str:
+    """Return a checksum of a module's source; empty if it has none."""
+    try:
+        return hashlib.sha256(inspect.getsource(sys.modules[module]).encode()).hexdigest()[:16]
+    except (KeyError, OSError, TypeError):
+        return ""
 
 
 # ----------------------------------------------------------------------------------- whether what it says can be done
@@ -827,7 +838,10 @@ def _imported(path: str) -> Any:
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, ValueError) as problem:
-        raise ValueError(f"{path!r} cannot be imported ({problem})") from None
+        way_out = ""
+        if isinstance(problem, ModuleNotFoundError) and problem.name == module.partition(".")[0]:
+            way_out = "; install the package that it is in, or name the folder of the module in PYTHONPATH"
+        raise ValueError(f"{path!r} cannot be imported ({problem}){way_out}") from None
     except AttributeError:
         near = meant(name, dir(importlib.import_module(module)))
         raise ValueError(f"the module {module} has no {name!r}{near}") from None

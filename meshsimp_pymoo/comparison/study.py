@@ -550,12 +550,16 @@ class Study:
         return [Start(name, roles) for name, roles in found.items()]
 
     def kind(self, method: str) -> str:
-        """Return what a method is: "own" and "pymoo" (by import path), "preset", "paper" (a preset too), "baseline"."""
+        """Return what a method is: "own" (or a part of it), "pymoo" (by import path), "preset", "paper", "baseline"."""
         item = next((item for item in self.content["algorithms"] if item["name"] == method), None)
         if item is None:
             return "baseline"
+        parts = [operator["name"] for operator in item["description"].get("operators", {}).values()]
+        paths = [path for path in (item["class"], *parts) if path and "." in path]
+        if any(not path.startswith(("pymoo.", "meshsimp_pymoo.")) for path in paths):
+            return "own"
         if not item["preset"]:
-            return "pymoo" if item["class"].startswith("pymoo.") else "own"
+            return "pymoo"
         return "paper" if PRESETS[item["preset"]].is_the_papers else "preset"
 
     @cached_property

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
+import sys
 import time
 from pathlib import Path
 
@@ -241,6 +243,29 @@ def test_the_description_of_an_algorithm_tells_settings_apart():
     assert settings(SubsetUniformCrossover(0.7)) != settings(SubsetUniformCrossover())
 
 
+def test_an_operator_of_the_readers_is_another_one_once_its_module_is_changed(tmp_path, monkeypatch):
+    def described() -> dict[str, object]:
+        (algorithm,) = read_experiment_file(config).algorithms
+        found = algorithm.description()["settings"]
+        assert "code" not in found  # the algorithm is pymoo's
+        assert "code" not in found["crossover"]
+        return found["mutation"]
+
+    config = changed(tmp_path, algorithms="[{preset: nsga2_v1, operators: {mutation: readers_own.Same}}]")
+    module = tmp_path / "readers_own.py"
+    text = "from pymoo.core.mutation import Mutation\nclass Same(Mutation):\n    def _do(self, problem, X, **kwargs):\n"
+    module.write_text(f"{text}        return X\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    first = described()
+    assert first == described()
+    module.write_text(f"{text}        return X.copy()\n")
+    monkeypatch.delitem(sys.modules, "readers_own")
+    importlib.invalidate_caches()
+    second = described()
+    assert first.pop("code") != second.pop("code")
+    assert first == second
+
+
 def test_the_name_of_a_model_file_does_not_change_what_the_problem_is(tmp_path):
     source = load("pyramid:9")
     for name in ("one.ply", "other.ply"):
@@ -396,6 +421,10 @@ MISTAKES = {
         ["algorithms[0].class", "no 'SPEA3'", "'SPEA2'"],
     ),
     "import of nothing": ({"algorithms": "[{class: pymoo.nowhere.X}]"}, ["class", "cannot be imported"]),
+    "import of what is not installed": (
+        {"algorithms": "[{class: nowhere.X}]"},
+        ["class", "cannot be imported", "install the package", "PYTHONPATH"],
+    ),
     "import of no algorithm": (
         {"algorithms": "[{class: pathlib.Path}]"},
         ["algorithms[0].class", "'pathlib.Path'", "no pymoo algorithm"],

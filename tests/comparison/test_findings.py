@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -264,6 +265,19 @@ def test_an_experiment_without_the_papers_methods_is_compared_and_has_no_finding
 
 def test_own_algorithms_come_first(tmp_path):
     assert study(tmp_path, {"N1": 1.0, "Mine": 3.0, "MD": 1.0}).methods == ["Mine", "N1", "MD"]
+
+
+def test_a_preset_with_an_operator_of_the_readers_is_theirs_and_stands_for_no_preset_of_the_paper(tmp_path):
+    fronts = {"M1": {name: {seed: front(1.0, seed) for seed in SEEDS} for name in ("N1", "MD")}}
+    out = store(tmp_path / "out", fronts)
+    content = json.loads((out / "experiment.json").read_text())
+    for operator, kind in (("mine.Shift", "own"), ("oax", "paper"), ("pymoo.operators.crossover.ux.UX", "paper")):
+        (item,) = [item for item in content["algorithms"] if item["name"] == "N1"]
+        item["description"]["operators"] = {"crossover": {"name": operator}}
+        (out / "experiment.json").write_text(json.dumps(content))
+        s = Study(out)
+        assert s.kind("N1") == kind
+        assert s.starts[0].roles == {"moead": "MD"} | ({"nsga2_v1": "N1"} if kind == "paper" else {})
 
 
 def test_the_page_begins_with_what_to_know(tmp_path):
