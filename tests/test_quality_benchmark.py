@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import functools
+import importlib
 import importlib.util
 import itertools
 import sys
@@ -296,3 +297,18 @@ def test_a_mesh_that_is_not_what_its_front_says_is_an_error(quality):
     curve.error[10] *= 1.01
     with pytest.raises(RuntimeError, match="a front says"):
         curve.scored(10)
+
+
+def test_the_summary_is_made_of_the_tables_and_agrees_with_their_own_means(monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parent / "benchmarks")
+    summary = importlib.import_module("summary")
+    assert summary.SUMMARY.read_text(encoding="utf-8") == summary.summary(), "python tests/benchmarks/summary.py"
+    for name in summary.CLASSES:
+        text = (summary.QUALITY / f"{name}.md").read_text(encoding="utf-8")
+        rows = summary.rows_of(text)
+        models = list(dict.fromkeys(row.model for row in rows))
+        means = summary.means_of(text, "error", models)
+        assert len(means) > 8
+        for method, mean in means.items():
+            ours, _ = summary.mean_of(rows, "error", method, models)
+            assert ours == pytest.approx(mean, abs=1.5e-3)

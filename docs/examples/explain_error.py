@@ -20,7 +20,9 @@ ax.plot(x[kept], height[kept], color="#2166ac", linewidth=2.2, label="simplified
 mesh = np.interp(x, x[kept], height[kept])
 for k in np.flatnonzero(covered & (height != mesh)):
     ax.plot([x[k]] * 2, [height[k], mesh[k]], color="#b2182b", linewidth=2.5, solid_capstyle="butt")
-    ax.annotate(f"{abs(height[k] - mesh[k]):.2f}", (x[k] + 0.07, (height[k] + mesh[k]) / 2), color="#b2182b", va="center")
+    ax.annotate(
+        f"{abs(height[k] - mesh[k]):.2f}", (x[k] + 0.07, (height[k] + mesh[k]) / 2), color="#b2182b", va="center"
+    )
 last = kept[-1]
 ax.plot(x[last:], height[last:], ":", color="#e08214", linewidth=2.5, label="not covered: to the nearest point")
 ax.annotate(f"{np.hypot(x[8] - x[7], height[8] - height[7]):.2f}", (7.6, 1.02), color="#e08214")

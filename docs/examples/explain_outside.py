@@ -19,7 +19,9 @@ points, faces = problem.model.points, mesh.faces
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.7), layout="constrained")
 plot_error(problem.surface, mesh.deviation, left, covered=mesh.covered)
-left.set_title(f"{mesh.quality.triangles} triangles, error {mesh.quality.error:.3g}, {mesh.quality.uncovered} uncovered")
+left.set_title(
+    f"{mesh.quality.triangles} triangles, error {mesh.quality.error:.3g}, {mesh.quality.uncovered} uncovered"
+)
 
 edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
 edges, times = np.unique(edges, axis=0, return_counts=True)
