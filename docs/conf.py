@@ -12,6 +12,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
+from elsewhere import TYPES  # of the folder _ext
+
 PACKAGE = metadata("meshsimp-pymoo")
 URLS = dict(line.split(", ", 1) for line in PACKAGE.get_all("Project-URL"))
 
@@ -26,7 +28,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.extlinks",
-    "sphinx_argparse_cli",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
@@ -47,9 +48,15 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 
+templates_path = ["_templates"]
 autosummary_generate = True
-numpydoc_show_class_members = False
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_typehints = "none"  # numpydoc says them in words, as parameters
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"
+numpydoc_xref_aliases = TYPES
 
 copybutton_prompt_text = "$ "
 copybutton_exclude = ".linenos, .gp, .go"

@@ -1,47 +1,119 @@
-"""Links to what other projects document: their pages by the beginnings of names, without asking the network."""
+"""Where names lead: of this package to their pages, of other projects to theirs, without asking the network."""
 
 from __future__ import annotations
 
+import inspect
+from functools import cache
 from typing import Any
 
 from docutils import nodes
 
+import meshsimp_pymoo
+
+NUMPY = "https://numpy.org/doc/stable/reference"
+PYTHON = "https://docs.python.org/3/library"
+PYMOO = "https://pymoo.org"
 # The longest beginning that fits is taken.
 PAGES = {
-    "pymoo.core.problem": "https://pymoo.org/problems/definition.html",
-    "pymoo.core.algorithm": "https://pymoo.org/algorithms/index.html",
-    "pymoo.core.callback": "https://pymoo.org/interface/callback.html",
-    "pymoo.core.result": "https://pymoo.org/interface/result.html",
-    "pymoo.core.indicator": "https://pymoo.org/misc/indicators.html",
-    "pymoo.core.sampling": "https://pymoo.org/operators/sampling.html",
-    "pymoo.core.crossover": "https://pymoo.org/operators/crossover.html",
-    "pymoo.core.mutation": "https://pymoo.org/operators/mutation.html",
-    "pymoo.core.repair": "https://pymoo.org/operators/repair.html",
-    "pymoo.core.termination": "https://pymoo.org/interface/termination.html",
-    "pymoo.optimize.minimize": "https://pymoo.org/interface/minimize.html",
-    "pymoo.algorithms.moo.nsga2": "https://pymoo.org/algorithms/moo/nsga2.html",
-    "pymoo.algorithms.moo.nsga3": "https://pymoo.org/algorithms/moo/nsga3.html",
-    "pymoo.algorithms.moo.moead": "https://pymoo.org/algorithms/moo/moead.html",
-    "pymoo": "https://pymoo.org/index.html",
+    "pymoo.core.problem": f"{PYMOO}/problems/definition.html",
+    "pymoo.core.algorithm": f"{PYMOO}/algorithms/index.html",
+    "pymoo.core.callback": f"{PYMOO}/interface/callback.html",
+    "pymoo.core.result": f"{PYMOO}/interface/result.html",
+    "pymoo.core.indicator": f"{PYMOO}/misc/indicators.html",
+    "pymoo.core.sampling": f"{PYMOO}/operators/sampling.html",
+    "pymoo.core.crossover": f"{PYMOO}/operators/crossover.html",
+    "pymoo.core.mutation": f"{PYMOO}/operators/mutation.html",
+    "pymoo.core.repair": f"{PYMOO}/operators/repair.html",
+    "pymoo.core.termination": f"{PYMOO}/interface/termination.html",
+    "pymoo.parallelization": f"{PYMOO}/parallelization/index.html",
+    "pymoo.util.display": f"{PYMOO}/interface/display.html",
+    "pymoo.optimize.minimize": f"{PYMOO}/interface/minimize.html",
+    "pymoo.algorithms.moo.nsga2": f"{PYMOO}/algorithms/moo/nsga2.html",
+    "pymoo.algorithms.moo.nsga3": f"{PYMOO}/algorithms/moo/nsga3.html",
+    "pymoo.algorithms.moo.moead": f"{PYMOO}/algorithms/moo/moead.html",
+    "pymoo.algorithms.moo.spea2": f"{PYMOO}/algorithms/moo/spea2.html",
+    "pymoo.algorithms.soo.nonconvex.ga": f"{PYMOO}/algorithms/soo/ga.html",
+    "pymoo": f"{PYMOO}/index.html",
     "trimesh.Trimesh": "https://trimesh.org/trimesh.base.html#trimesh.base.Trimesh",
     "trimesh": "https://trimesh.org",
-    "numpy.ndarray": "https://numpy.org/doc/stable/reference/generated/numpy.ndarray.html",
-    "numpy": "https://numpy.org/doc/stable/reference/index.html",
+    "numpy.ndarray": f"{NUMPY}/generated/numpy.ndarray.html",
+    "numpy.random": f"{NUMPY}/random/index.html",
+    "numpy": f"{NUMPY}/index.html",
     "pandas.DataFrame": "https://pandas.pydata.org/docs/reference/api/pandas.DataFrame.html",
+    "matplotlib.axes": "https://matplotlib.org/stable/api/_as_gen/matplotlib.axes.Axes.html",
     "matplotlib": "https://matplotlib.org/stable/api/index.html",
+    "collections.abc": f"{PYTHON}/collections.abc.html",
+    "pathlib.Path": f"{PYTHON}/pathlib.html#pathlib.Path",
+    "os.PathLike": f"{PYTHON}/os.html#os.PathLike",
+}
+# Names that are met in the package but not public, by where they are at home.
+FURTHER = (
+    "surface.surface.Surface",
+    "surface.surface.Simplified",
+    "surface.surface.FreeMesh",
+    "surface.surface.Scored",
+    "surface.grid_surface.GridSurface",
+    "surface.grid.HeightGrid",
+    "surface.nested.Nested",
+    "formats.source.SourceMesh",
+    "search.greedy.NestedFront",
+    "tiles.front.Folder",
+    "errors.InputError",
+    "errors.SearchWarning",
+)
+# What a word means as the type of a parameter; itself: no link.
+TYPES = {
+    **{name.rpartition(".")[2]: f"meshsimp_pymoo.{name}" for name in (*meshsimp_pymoo.__all__, *FURTHER)},
+    "trimesh.Trimesh": "trimesh.Trimesh",
+    "axes": "matplotlib.axes.Axes",
+    "pandas.DataFrame": "pandas.DataFrame",
+    "Path": "pathlib.Path",
+    **{word: "os.PathLike" for word in ("path", "path-like")},
+    **{word: f"collections.abc.{word.capitalize()}" for word in ("sequence", "mapping", "iterable", "callable")},
+    **{word: "numpy.ndarray" for word in ("array", "array-like")},
+    **{word: word for word in ("int", "float", "bool", "str", "string", "list", "tuple", "dict", "None", "True", "False")},
 }
 
 
+@cache
+def homes() -> dict[str, str]:
+    """Return what is public by where it is at home, as docstrings inside the package spell it, and by its bare name."""
+    found = {}
+    for name in meshsimp_pymoo.__all__:
+        thing = getattr(meshsimp_pymoo, name)
+        found[f"{thing.__module__}.{thing.__name__}"] = f"meshsimp_pymoo.{name}"
+    return found
+
+
 def find(app: Any, env: Any, node: Any, inside: Any) -> nodes.reference | None:
-    """Return a link for a name that none of our pages has."""
+    """Return a link for a name that no page of ours has as it is spelled."""
     target = node.get("reftarget", "")
-    fitting = [name for name in PAGES if target == name or target.startswith(f"{name}.")]
-    if not fitting:
-        return None
-    return nodes.reference("", "", inside, internal=False, refuri=PAGES[max(fitting, key=len)])
+    for start in _beginnings(target):
+        known = homes().get(start) or TYPES.get(start, "") if "." not in start else homes().get(start)
+        if known and known.startswith("meshsimp_pymoo."):
+            spelled = known + target[len(start) :]
+            domain = env.get_domain("py")
+            return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", spelled, node, inside)
+        if start in PAGES:
+            return nodes.reference("", "", inside, internal=False, refuri=PAGES[start])
+    return None
+
+
+def _beginnings(name: str) -> list[str]:
+    """Return a dotted name and all that it begins with, the longest first."""
+    parts = name.split(".")
+    return [".".join(parts[:count]) for count in range(len(parts), 0, -1)]
+
+
+def name_bases(app: Any, name: str, thing: Any, options: Any, bases: list[Any]) -> None:
+    """Show a public parent in place of one that is private, and none of a tuple's or an object's."""
+    for place, base in enumerate(bases):
+        if inspect.isclass(base):
+            bases[place] = next(kind for kind in base.__mro__ if not kind.__name__.startswith("_"))
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Tell Sphinx."""
     app.connect("missing-reference", find)
+    app.connect("autodoc-process-bases", name_bases)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
