@@ -35,7 +35,9 @@ extensions = [
     "tables",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery/*.ipynb"]
-nitpicky = False
+# A name of ours that is spelled out leads somewhere; other words between backticks may be anything.
+nitpicky = True
+nitpick_ignore_regex = [(r"py:.*", r"(?!meshsimp_pymoo\.).*")]
 default_role = "py:obj"
 
 # {repo}`tests/record/record.py` is a link to a file of the repository; a test looks whether it is there.

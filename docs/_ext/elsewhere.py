@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
+import re
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -46,21 +51,9 @@ PAGES = {
     "pathlib.Path": f"{PYTHON}/pathlib.html#pathlib.Path",
     "os.PathLike": f"{PYTHON}/os.html#os.PathLike",
 }
-# Names that are met in the package but not public, by where they are at home.
-FURTHER = (
-    "surface.surface.Surface",
-    "surface.surface.Simplified",
-    "surface.surface.FreeMesh",
-    "surface.surface.Scored",
-    "surface.grid_surface.GridSurface",
-    "surface.grid.HeightGrid",
-    "surface.nested.Nested",
-    "formats.source.SourceMesh",
-    "search.greedy.NestedFront",
-    "tiles.front.Folder",
-    "errors.InputError",
-    "errors.SearchWarning",
-)
+# Names that are met in the package but not public, by where they are at home: those that the page of Python lists.
+API = Path(__file__).parent.parent / "reference" / "api.md"
+FURTHER = re.findall(r"^   ((?:\w+\.)+\w+)$", API.read_text(encoding="utf-8"), re.MULTILINE)
 # What a word means as the type of a parameter; itself: no link.
 TYPES = {
     **{name.rpartition(".")[2]: f"meshsimp_pymoo.{name}" for name in (*meshsimp_pymoo.__all__, *FURTHER)},
@@ -96,6 +89,25 @@ def find(app: Any, env: Any, node: Any, inside: Any) -> nodes.reference | None:
             return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", spelled, node, inside)
         if start in PAGES:
             return nodes.reference("", "", inside, internal=False, refuri=PAGES[start])
+    file = _source_of(target)
+    if file is None:
+        return None
+    return nodes.reference("", "", inside, internal=False, refuri=app.config.extlinks["repo"][0] % file)
+
+
+def _source_of(name: str) -> str | None:
+    """Return the file of the repository in which a name of ours is; None if it is nowhere."""
+    if not name.startswith("meshsimp_pymoo."):
+        return None
+    for module in _beginnings(name):
+        with contextlib.suppress(ModuleNotFoundError):  # a part of it is no package
+            if (found := find_spec(module)) and found.origin:
+                thing: Any = import_module(module)
+                for part in name[len(module) + 1 :].split(".") if name != module else ():
+                    if not hasattr(thing, part):
+                        return None
+                    thing = getattr(thing, part)
+                return str(Path(found.origin).relative_to(Path(meshsimp_pymoo.__file__).parent.parent))
     return None
 
 

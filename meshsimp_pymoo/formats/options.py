@@ -55,8 +55,8 @@ class Options:
         accepts='"mend" or "none"',
         doc="Whether small defects of a mesh are mended: faces listed twice, wound the other way, or at edges of more "
         "than two (of these at most 1 %).",
-        help="none: take a mesh with faces listed twice, wound the other way or at edges of more than two as it is "
-        "(default: mend, and say how many)",
+        help="mend small defects of a mesh, and say how many: faces listed twice, wound the other way or at edges of "
+        "more than two; none: take it as it is",
     )
     spacing: float | tuple[float, float] | None = setting(
         None,

@@ -32,7 +32,7 @@ FREE_RULES = ("footprint", "outside")
 
 
 class GridSurface:
-    """A height grid and the rules for it; see `surface.Surface` for what its attributes are.
+    """A height grid and the rules for it; see `Surface` for what its attributes are.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ LARGE = 300_000
 
 
 class HeightSurface:
-    """An open model and the rules for it; see `surface.Surface` for what its attributes are.
+    """An open model and the rules for it; see `Surface` for what its attributes are.
 
     Parameters
     ----------

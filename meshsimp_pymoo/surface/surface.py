@@ -282,7 +282,10 @@ class Surface(Protocol):
         ...
 
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
-        """Return the table (P, 6 + regions) of numbers of subsets (P, N); see `surface.measures` for its columns."""
+        """Return the table (P, 6 + regions) of numbers of subsets (P, N).
+
+        Its columns are those of `meshsimp_pymoo.surface.measures`.
+        """
         ...
 
     def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
@@ -308,11 +311,14 @@ class Surface(Protocol):
         ...
 
     def ground(self) -> Any | None:
-        """Return the record on which `surface.moves` is answered; None where meshes can be evaluated, but not moved."""
+        """Return the record on which `meshsimp_pymoo.surface.moves` is answered.
+
+        None where meshes can be evaluated, but not moved.
+        """
         ...
 
     def free_ground(self, *, centroids: bool) -> Any | None:
-        """Return what free meshes have in common (see `surface.free`); None where there are none."""
+        """Return what free meshes have in common (see `meshsimp_pymoo.surface.free`); None where there are none."""
         ...
 
     def measuring(self, measure: str) -> Surface:
