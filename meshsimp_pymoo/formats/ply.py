@@ -390,7 +390,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
 
 def _georeference(header: bytes) -> dict[str, Any]:
     """Return the coordinate reference system that a comment of a header names: an EPSG number, or WKT."""
-    found = re.search(rb"^comment crs (.+?)\s*$", header, re.MULTILINE | re.IGNORECASE)
+    found = re.search(rb"^comment crs:?[ \t]+(.+?)\s*$", header, re.MULTILINE | re.IGNORECASE)
     text = found[1].decode("utf-8", errors="replace") if found else ""
     if number := re.fullmatch(r"(?:urn:ogc:def:crs:)?EPSG:[\w.]*?:?(\d{4,5})", text, re.IGNORECASE):
         return {"epsg": int(number[1])}
@@ -405,11 +405,11 @@ def _image_comments(folder: Path, mesh: OutMesh) -> list[str]:
 
 
 def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
-    """Return the line of a PLY header that says the coordinate reference system, if it is known."""
+    """Return the line of a PLY header that says the coordinate reference system, as QGIS reads it, if it is known."""
     if georeference.get("epsg"):
-        return [f"comment crs EPSG:{georeference['epsg']}"]
+        return [f"comment crs: EPSG:{georeference['epsg']}"]
     wkt = " ".join(str(georeference.get("crs") or "").split())
-    return [f"comment crs {wkt}"] if wkt else []
+    return [f"comment crs: {wkt}"] if wkt else []
 
 
 # What connects vertices, and the triangles that it means.

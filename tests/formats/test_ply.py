@@ -260,12 +260,18 @@ def test_the_reference_system_stands_in_the_record_and_in_the_ply(tmp_path, solu
     model = build_model(dataclasses.replace(source, georeference=facts))
     folder = write_solutions(tmp_path / "a", model, solutions, chosen=1)
     assert read_front(folder).run["model"]["georeference"] == facts
-    assert b"\ncomment crs EPSG:25832\n" in (folder / "chosen.ply").read_bytes()
+    assert b"\ncomment crs: EPSG:25832\n" in (folder / "chosen.ply").read_bytes()
     wkt = {"crs": 'LOCAL_CS["Höhe\n\n2",  UNIT["metre",1]]'}
     model = build_model(dataclasses.replace(source, georeference=wkt))
     folder = write_solutions(tmp_path / "b", model, solutions, chosen=1)
-    assert '\ncomment crs LOCAL_CS["Höhe 2", UNIT["metre",1]]\n'.encode() in (folder / "chosen.ply").read_bytes()
+    assert '\ncomment crs: LOCAL_CS["Höhe 2", UNIT["metre",1]]\n'.encode() in (folder / "chosen.ply").read_bytes()
     assert len(read_source(folder / "chosen.ply").faces) == solutions[1][1].quality.triangles
+
+
+@pytest.mark.parametrize("words", ["crs: EPSG:25832", "crs EPSG:25832", "CRS:\turn:ogc:def:crs:EPSG::25832"])
+def test_the_reference_system_is_read_with_and_without_the_colon(tmp_path, words):
+    text = ascii_ply().replace("comment made by hand", f"comment {words}")
+    assert read_source(write(tmp_path, "a.ply", text)).georeference["epsg"] == 25832
 
 
 # ------------------------------------------------------------------------------------------------------------ texture

@@ -140,7 +140,7 @@ def test_a_raster_becomes_a_front_in_its_own_coordinates_and_any_mesh_is_picked(
     assert record["model"]["georeference"]["epsg"] == 25832
     assert record["options"]["window"] == list(WINDOW)
     chosen = read_source(out / "chosen.ply")
-    assert b"comment crs EPSG:25832" in (out / "chosen.ply").read_bytes()[:400]
+    assert b"comment crs: EPSG:25832" in (out / "chosen.ply").read_bytes()[:400]
     assert find_cracks(chosen.points, chosen.faces) == 0
     problem = MeshProblem(path, window=WINDOW)
     front, row = Front.load(out), record["chosen"]
