@@ -14,7 +14,7 @@ height = np.array([0.0, 1.2, 1.9, 3.6, 3.1, 2.4, 2.9, 1.2, 0.6])
 kept = np.array([0, 3, 5, 7])
 covered = x <= x[kept[-1]]
 
-figure, ax = plt.subplots(figsize=(9, 3.6), layout="constrained")
+figure, ax = plt.subplots(figsize=(8.6, 3.5), layout="constrained")
 ax.plot(x, height, color="0.6", linewidth=1, label="original")
 ax.plot(x[kept], height[kept], color="#2166ac", linewidth=2.2, label="simplified mesh")
 mesh = np.interp(x, x[kept], height[kept])

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 
 from meshsimp_pymoo import MeshProblem, plot_mesh, thinning
 
-figure, panels = plt.subplots(2, 3, figsize=(9.6, 6.6), layout="constrained")
+figure, panels = plt.subplots(2, 3, figsize=(8.6, 6), layout="constrained")
 for name, row in zip(("horseshoe:900", "ring:900"), panels, strict=True):
     original = MeshProblem(name)
     kept = thinning(original.surface).kept(60)

@@ -56,11 +56,11 @@ moved[[old, new]] = False, True
 moves = {
     "a vertex is removed": without(cheapest),
     "a vertex is inserted": surface.triangles(with_new),
-    "a vertex moves to a neighbour": surface.triangles(moved),
+    "a vertex moves nearby": surface.triangles(moved),
     "an edge flips (free meshes)": flipped(),
 }
 
-figure, rows = plt.subplots(2, 4, figsize=(12, 6.8), layout="constrained")
+figure, rows = plt.subplots(2, 4, figsize=(8.6, 5.2), layout="constrained")
 for (name, after), above, below in zip(moves.items(), *rows, strict=True):
     triangles = [set(map(tuple, np.sort(faces, axis=1).tolist())) for faces in (before, after)]
     for k, (ax, faces) in enumerate(((above, before), (below, after))):
@@ -71,6 +71,8 @@ for (name, after), above, below in zip(moves.items(), *rows, strict=True):
         ax.plot(*points[np.unique(faces), :2].T, "o", color="#2166ac", markersize=4)
         ax.set_aspect("equal")
         ax.set_axis_off()
-    above.set_title(name, fontsize=10)
+    above.set_title(name, fontsize=9)
     change = surface.of_faces(after).quality.error / error - 1
-    below.set_title(f"{len(after) - len(before):+d} triangles, error {change:+.1%}", fontsize=10)
+    more = len(after) - len(before)
+    count = f"{more:+d} triangle{'s' * (abs(more) > 1)}" if more else "as many triangles"
+    below.set_title(f"{count}, error {change:+.1%}", fontsize=9)

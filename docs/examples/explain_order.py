@@ -11,7 +11,7 @@ import numpy as np
 
 from meshsimp_pymoo import MeshProblem
 
-figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.6), layout="constrained")
+figure, panels = plt.subplots(1, 2, figsize=(8.6, 4.3), layout="constrained")
 for name, ax in zip(("saddle:17", "face:1000"), panels, strict=True):
     x, y = MeshProblem(name).model.points[:, :2].T
     ax.plot(x, y, color="0.75", linewidth=0.8)

@@ -17,7 +17,7 @@ kept = thinning(problem.surface).kept(26)
 mesh = problem.simplify(kept)
 points, faces = problem.model.points, mesh.faces
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.7), layout="constrained")
+figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 4.1), layout="constrained")
 plot_error(problem.surface, mesh.deviation, left, covered=mesh.covered)
 left.set_title(
     f"{mesh.quality.triangles} triangles, error {mesh.quality.error:.3g}, {mesh.quality.uncovered} uncovered"
@@ -37,4 +37,4 @@ right.plot(*bare.T, ".", color="#2166ac", markersize=4)
 right.set_aspect("equal")
 right.set_axis_off()
 ignored = MeshProblem("ring:900", outside="ignore").quality(kept).error
-right.set_title(f'nearest points; with outside="ignore" the error is {ignored:.3g}')
+right.set_title(f'nearest points; outside="ignore": error {ignored:.3g}', fontsize=9)

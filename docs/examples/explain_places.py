@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 BLUE, RED, GREY = "#2166ac", "#b2182b", "0.6"
-figure, panels = plt.subplots(1, 3, figsize=(12, 3.2), layout="constrained", sharey=True)
+figure, panels = plt.subplots(1, 3, figsize=(8.6, 2.6), layout="constrained", sharey=True)
 
 step, skirt, cloud = panels
 step.plot([0, 1, 1, 2], [0, 0, 1, 1], color=GREY)
@@ -36,4 +36,4 @@ for ax in panels:
     ax.set(xlim=(-0.15, 2.15), ylim=(-0.2, 1.6), xticks=[], yticks=[])
     ax.spines[["top", "right", "left", "bottom"]].set_visible(False)
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(frameon=False, loc="upper left", ncols=2, fontsize=9)
+        ax.legend(frameon=False, loc="upper left", ncols=2, fontsize=8)

@@ -35,7 +35,7 @@ for _ in range(2):
     mesh = problem.mesh(np.ones(problem.n_var, dtype=bool))
     by_us.append(edges_of(mesh.vertices, mesh.faces))
 
-figure, panels = plt.subplots(1, 4, figsize=(12, 3.3), layout="constrained")
+figure, panels = plt.subplots(1, 4, figsize=(8.6, 2.5), layout="constrained")
 for name, colour, pair, axes in (
     ("Qhull", "#b2182b", by_qhull, panels[:2]),
     ("meshsimp_pymoo", "#2166ac", by_us, panels[2:]),
@@ -43,7 +43,7 @@ for name, colour, pair, axes in (
     for k, ax in enumerate(axes):
         ax.add_collection(LineCollection(sorted(pair[k]), color=colour, linewidth=0.9))
         ax.add_collection(LineCollection(sorted(pair[k] - pair[1 - k]), color=colour, linewidth=3))
-        ax.set_title(f"{name}, order {k + 1}", fontsize=10)
+        ax.set_title(f"{name}, order {k + 1}", fontsize=9)
         ax.set(xlim=(-0.2, 6.2), ylim=(-0.2, 6.2))
         ax.set_aspect("equal")
         ax.set_axis_off()

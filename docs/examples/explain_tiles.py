@@ -24,8 +24,8 @@ bb, cc = (b**2).sum(axis=1), (c**2).sum(axis=1)
 offset = np.column_stack([c[:, 1] * bb - b[:, 1] * cc, b[:, 0] * cc - c[:, 0] * bb]) / area[:, None]
 centre, radius = corners[:, 0] + offset, np.linalg.norm(offset, axis=1)
 
-figure, panels = plt.subplots(1, 2, figsize=(10.5, 5.4), layout="constrained")
-for ax, shift, name in zip(panels, (0.0, 0.5), ("first phase", "next phase: tiles shifted"), strict=True):
+figure, panels = plt.subplots(1, 2, figsize=(8.6, 4.6), layout="constrained")
+for ax, shift, name in zip(panels, (0.0, 0.5), ("first phase", "then shifted"), strict=True):
     cuts = [low + (high - low) * (k + shift) / 3 for k in range(-1, 4)]
     cut_x, cut_y = np.array(cuts).T
     tile = [np.searchsorted(cut, value) for cut, value in ((cut_x, centre[:, 0]), (cut_y, centre[:, 1]))]
@@ -51,4 +51,4 @@ for ax, shift, name in zip(panels, (0.0, 0.5), ("first phase", "next phase: tile
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set_aspect("equal")
     ax.set_axis_off()
-    ax.set_title(f"{name}: {(kept & ~bound).sum()} of {kept.sum()} vertices are free to go", fontsize=10)
+    ax.set_title(f"{name}: {(kept & ~bound).sum()} of {kept.sum()} vertices are free", fontsize=9)
