@@ -1,7 +1,8 @@
 """How fast an evaluation and a run are, as ratios: both sides in one process, warm, in alternation.
 
 Run ``python tests/benchmarks/evaluation.py`` (about three minutes), with ``--moves`` for the live triangulation and the
-greedy passes alone, or with ``--memory`` for the peak memory of a population of 100 at N = 1 000 000 alone.
+greedy passes alone, or with ``--memory`` for the peak memory of a population of 100 at N = 1 000 000 alone. ``-o FILE``
+writes the tables as Markdown, too: ``-o tests/benchmarks/evaluation.md``.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import sys
 import time
 import warnings
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -33,6 +35,26 @@ from meshsimp_pymoo.surface.rules import Rules
 ROUNDS = 15
 AS_IN_THE_PAPER = Rules(footprint="hull", outside="ignore")
 CONSOLE = Console(width=110)
+SHOWN: list[Table] = []
+
+
+def show(table):
+    """Print a table, and remember it."""
+    SHOWN.append(table)
+    CONSOLE.print(table)
+
+
+def markdown(table):
+    """Return a table as Markdown, its title above."""
+    rows = [[column.header for column in table.columns], ["---", *["---:"] * (len(table.columns) - 1)]]
+    rows += zip(*(column.cells for column in table.columns), strict=True)
+    return "\n".join([f"## {table.title}", "", *(f"| {' | '.join(row)} |" for row in rows), ""])
+
+
+def write(path):
+    """Write the tables that were shown."""
+    made = "Made by `python tests/benchmarks/evaluation.py`, warm, medians.\n"
+    path.write_text("\n".join(["# How fast evaluations are", "", made, *map(markdown, SHOWN)]), encoding="utf-8")
 
 
 def by_scipy(model, kept):
@@ -88,7 +110,7 @@ def evaluations():
                 f"{row[1] * 1e3:.2f}",
                 f"{row[2]:.0f}",
             )
-    CONSOLE.print(table)
+    show(table)
 
 
 def concave():
@@ -105,7 +127,7 @@ def concave():
             for _ in range(ROUNDS):
                 ratios.append(seconds(partial(usual.evaluate, X)) / seconds(partial(paper.evaluate, X)))
             table.add_row(name, f"{model.n_vertices}", f"{share:.0%}", f"{statistics.median(ratios):.2f}")
-    CONSOLE.print(table)
+    show(table)
 
 
 class TimedProblem(MeshProblem):
@@ -135,7 +157,7 @@ def runs():
         # The first run warms up.
         total, kernel = statistics.median(times[1:]), statistics.median(kernels[1:])
         table.add_row(preset.__name__, f"{total:.2f}", f"{kernel:.2f}", f"{total - kernel:.2f}", f"{count}")
-    CONSOLE.print(table)
+    show(table)
 
 
 @njit
@@ -176,7 +198,7 @@ def moves():
                 rounds = [seconds(call) / len(gone) for _ in range(5)]
                 cells.append(f"{1 / statistics.median(rounds):,.0f}")
         table.add_row(name, f"{surface.n_vertices}", "5%", *cells)
-    CONSOLE.print(table)
+    show(table)
 
 
 def passes():
@@ -192,7 +214,7 @@ def passes():
             f"{seconds(partial(thinning, surface)):.2f}",
             f"{seconds(partial(greedy_insertion, surface)):.2f}",
         )
-    CONSOLE.print(table)
+    show(table)
 
 
 def million():
@@ -225,20 +247,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--memory", action="store_true", help="only the peak memory")
     parser.add_argument("--moves", action="store_true", help="only the live triangulation and the greedy passes")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="write the tables as Markdown")
     options = parser.parse_args()
     if options.memory:
         memory()
         return
     warnings.simplefilter("ignore")
+    for part in (moves, passes) if options.moves else (evaluations, concave, runs, moves, passes):
+        part()
+    if options.output is not None:
+        write(options.output)
     if options.moves:
-        moves()
-        passes()
         return
-    evaluations()
-    concave()
-    runs()
-    moves()
-    passes()
     subprocess.run([sys.executable, __file__, "--memory"], check=True)
 
 
