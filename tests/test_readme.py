@@ -48,6 +48,13 @@ def test_the_python_of_the_page_runs_and_writes_its_mesh(session):
     assert printed == [f"{names['best'].triangles} {names['best'].error}"]
 
 
+def test_the_table_of_the_page_is_what_the_benchmark_wrote():
+    summary = (ROOT / "tests" / "benchmarks" / "quality" / "summary.md").read_text(encoding="utf-8").splitlines()
+    rows = [line for line in README.splitlines() if line.startswith("|")]
+    assert len(rows) > 6
+    assert [row for row in rows if row not in summary] == []
+
+
 def test_every_command_of_the_page_is_one_that_the_parser_takes():
     in_prose = re.findall(r"`(meshsimp \w+ [^`]*)`", README)  # `meshsimp run` alone is a name
     in_blocks = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("meshsimp ")]
