@@ -7,15 +7,11 @@ galleries made of scripts; MyST, since all other text here is Markdown.
 from __future__ import annotations
 
 import sys
-from importlib.metadata import metadata
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 
-from elsewhere import TYPES  # of the folder _ext
-
-PACKAGE = metadata("meshsimp-pymoo")
-URLS = dict(line.split(", ", 1) for line in PACKAGE.get_all("Project-URL"))
+from elsewhere import PACKAGE, SOURCE, TYPES, URLS, linkcode_resolve  # noqa: F401, since Sphinx calls the last
 
 project = "meshsimp_pymoo"
 author = "the meshsimp_pymoo contributors"
@@ -28,6 +24,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.extlinks",
+    "sphinx.ext.linkcode",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
@@ -41,7 +38,7 @@ nitpick_ignore_regex = [(r"py:.*", r"(?!meshsimp_pymoo\.).*")]
 default_role = "py:obj"
 
 # {repo}`tests/record/record.py` is a link to a file of the repository; a test looks whether it is there.
-extlinks = {"repo": (f"{URLS['Source']}/blob/main/%s", "%s")}
+extlinks = {"repo": (f"{SOURCE}/%s", "%s")}
 extlinks_detect_hardcoded_links = True
 
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"]
@@ -53,7 +50,6 @@ nb_execution_timeout = 120
 templates_path = ["_templates"]
 autosummary_generate = True
 autodoc_member_order = "bysource"
-autodoc_preserve_defaults = True
 autodoc_typehints = "none"  # numpydoc says them in words, as parameters
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = True
@@ -78,6 +74,7 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = project
 html_static_path = ["_static"]
+html_css_files = ["reference.css"]
 html_show_sourcelink = False
 html_theme_options = {
     "logo": {"text": project},

@@ -5,8 +5,10 @@ from __future__ import annotations
 import contextlib
 import inspect
 import re
+import sys
 from functools import cache
 from importlib import import_module
+from importlib.metadata import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,9 @@ from docutils import nodes
 
 import meshsimp_pymoo
 
+PACKAGE = metadata("meshsimp-pymoo")
+URLS = dict(line.split(", ", 1) for line in PACKAGE.get_all("Project-URL"))
+SOURCE = f"{URLS['Source']}/blob/main"
 NUMPY = "https://numpy.org/doc/stable/reference"
 PYTHON = "https://docs.python.org/3/library"
 PYMOO = "https://pymoo.org"
@@ -64,7 +69,10 @@ TYPES = {
     **{word: "os.PathLike" for word in ("path", "path-like")},
     **{word: f"collections.abc.{word.capitalize()}" for word in ("sequence", "mapping", "iterable", "callable")},
     **{word: "numpy.ndarray" for word in ("array", "array-like")},
-    **{word: word for word in ("int", "float", "bool", "str", "string", "list", "tuple", "dict", "None", "True", "False")},
+    **{
+        word: word
+        for word in ("int", "float", "bool", "str", "string", "list", "tuple", "dict", "None", "True", "False")
+    },
 }
 
 
@@ -92,7 +100,7 @@ def find(app: Any, env: Any, node: Any, inside: Any) -> nodes.reference | None:
     file = _source_of(target)
     if file is None:
         return None
-    return nodes.reference("", "", inside, internal=False, refuri=app.config.extlinks["repo"][0] % file)
+    return nodes.reference("", "", inside, internal=False, refuri=f"{SOURCE}/{file}")
 
 
 def _source_of(name: str) -> str | None:
@@ -117,6 +125,20 @@ def _beginnings(name: str) -> list[str]:
     return [".".join(parts[:count]) for count in range(len(parts), 0, -1)]
 
 
+def linkcode_resolve(domain: str, info: dict[str, str]) -> str | None:
+    """Return where the repository has the source of what a page documents."""
+    thing: Any = sys.modules.get(info["module"])
+    try:
+        for part in info["fullname"].split("."):
+            thing = getattr(thing, part)
+        thing = inspect.unwrap(getattr(thing, "fget", None) or getattr(thing, "func", thing))
+        file, line = Path(inspect.getsourcefile(thing) or ""), inspect.getsourcelines(thing)[1]
+        inside = file.relative_to(Path(meshsimp_pymoo.__file__).parent.parent)
+    except (AttributeError, OSError, TypeError, ValueError):  # it has no source, or not ours
+        return None
+    return f"{SOURCE}/{inside.as_posix()}#L{line}"
+
+
 def name_bases(app: Any, name: str, thing: Any, options: Any, bases: list[Any]) -> None:
     """Show a public parent in place of one that is private, and none of a tuple's or an object's."""
     for place, base in enumerate(bases):
@@ -124,8 +146,14 @@ def name_bases(app: Any, name: str, thing: Any, options: Any, bases: list[Any]) 
             bases[place] = next(kind for kind in base.__mro__ if not kind.__name__.startswith("_"))
 
 
+def shorten(app: Any, kind: str, name: str, thing: Any, options: Any, signature: str, returned: str) -> Any:
+    """Leave out what settings are by default where they are the default of an argument."""
+    return signature and re.sub(r"\b(Rules|Options)\([^()]*\)", r"\1()", signature), returned
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Tell Sphinx."""
     app.connect("missing-reference", find)
     app.connect("autodoc-process-bases", name_bases)
+    app.connect("autodoc-process-signature", shorten)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

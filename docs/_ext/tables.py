@@ -10,6 +10,7 @@ import argparse
 import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib import import_module
 from typing import Any, ClassVar
 
 from docutils import nodes
@@ -63,27 +64,30 @@ def yes(value: object) -> str:
 # ---------------------------------------------------------------------------------------------------------- the tables
 
 
-@table("formats", "suffix", "what", "read as", "written (`--format`)", "keeps, when written", "needs")
+@table("formats", "suffix", "what", "read as", "`--format`", "keeps, when written", "needs")
 def formats() -> Rows:
-    """Return a row for each format of files."""
-    from meshsimp_pymoo.formats.table import all_formats
+    """Return a row for each format of files: meshes, grids, clouds."""
+    from meshsimp_pymoo.formats.table import SORTS, all_formats
 
-    for kind in all_formats():
-        read = f"{kind.sort}{', cloud where it has no faces' if kind.bare_points else ''}" if kind.read else ""
+    spelled = {"color": "colours", "uv": "texture"}
+    for kind in sorted(all_formats(), key=lambda kind: [*SORTS].index(kind.sort)):
+        read = f"{kind.sort}{', or cloud' * kind.bare_points}" if kind.read else ""
         kept = ""
         if kind.write:
-            kept = "all vertex attributes" if kind.keeps is None else ", ".join(kind.keeps).replace("uv", "texture")
+            kept = (
+                "all vertex attributes, texture" if kind.keeps is None else ", ".join(spelled[it] for it in kind.keeps)
+            )
             precision = "double precision"
             if kind.single_precision:
-                precision = f"single precision{', from a stated origin' if kind.states_origin else ''}"
-            kept = f"{precision}{kept and '; '}{kept}"
+                precision = f"single precision{', from a stated origin' * kind.states_origin}"
+            kept = ", ".join(filter(None, (precision, kept)))
         yield (
-            code(*kind.suffixes) or "others that trimesh reads",
-            kind.title,
+            code(*kind.suffixes) or "others",
+            about(kind),
             read,
             code(kind.name) if kind.write else "",
             kept,
-            f"`pip install 'meshsimp-pymoo[{kind.extra}]'`" if kind.extra else "",
+            code(f"[{kind.extra}]") if kind.extra else "",
         )
 
 
@@ -92,11 +96,22 @@ def windows() -> Rows:
     """Return a row for each format that tiles read by windows."""
     from meshsimp_pymoo.formats.table import all_formats
 
-    return [(code(*kind.suffixes), kind.title) for kind in all_formats() if kind.open_heights is not None]
+    return [(code(*kind.suffixes), about(kind)) for kind in all_formats() if kind.open_heights is not None]
 
 
-def settings(kind: type[Any]) -> Rows:
-    """Return a row for each setting of a class."""
+def about(kind: Any) -> str:
+    """Return what people call a format, or what its file says of it first."""
+    if not kind.title.startswith("."):
+        return str(kind.title)
+    documented = import_module(f"meshsimp_pymoo.formats.{kind.name}").__doc__ or ""
+    return from_docstring(re.split("[:,]", documented)[0])
+
+
+LISTS: dict[str, Callable[[], Iterable[str]]] = {}
+
+
+def settings(kind: type[Any]) -> Iterator[str]:
+    """Yield what there is to say of each setting of a class: a term and its definition."""
     from meshsimp_pymoo.cli.arguments import option
     from meshsimp_pymoo.formats.table import SORTS, all_formats
     from meshsimp_pymoo.settings import Choice, defaults_of, settings_of
@@ -105,29 +120,27 @@ def settings(kind: type[Any]) -> Rows:
     for name, known in settings_of(kind).items():
         metavar = "|".join(known.kind.names) if isinstance(known.kind, Choice) else known.metavar
         only = f" Only for {' and '.join(titles[sort] for sort in known.describes)}." if known.describes else ""
-        yield (
-            code(name),
-            code(f"{option(name)} {metavar}"),
-            from_docstring(known.accepts.removesuffix(", optional")),
-            code(repr(defaults_of(kind)[name])),
-            from_docstring(known.doc) + only,
-        )
+        in_shell = "not in the shell" if known.derived else f"`{option(name)} {metavar}`"
+        takes = from_docstring(known.accepts.removesuffix(", optional"))
+        default = code(repr(defaults_of(kind)[name]))
+        yield f"`{name}`, {in_shell}\n: {from_docstring(known.doc)}{only}\n\n  Takes {takes}; default {default}."
 
 
-@table("options", "Python, YAML", "shell", "takes in Python", "default", "meaning")
-def options() -> Rows:
-    """Return a row for each setting of how a model is read."""
+def listed_options() -> Iterable[str]:
+    """Return the settings of how a model is read."""
     from meshsimp_pymoo import Options
 
     return settings(Options)
 
 
-@table("rules", "Python, YAML", "shell", "takes in Python", "default", "meaning")
-def rules() -> Rows:
-    """Return a row for each setting of what counts."""
+def listed_rules() -> Iterable[str]:
+    """Return the settings of what counts."""
     from meshsimp_pymoo import Rules
 
     return settings(Rules)
+
+
+LISTS |= {"options": listed_options, "rules": listed_rules}
 
 
 @table("models", "name", "parameters and defaults", "what it is")
@@ -140,17 +153,17 @@ def models() -> Rows:
         yield code(name), code(*spelled.partition(":")[2].split(",")), from_help(about)
 
 
-@table("operators", "kind", "name in YAML", "class", "what it does")
+@table("operators", "kind", "in YAML", "class", "what it does")
 def operators() -> Rows:
     """Return a row for each operator."""
     from meshsimp_pymoo.search.operators import OPERATORS
 
     for kind, known in OPERATORS.items():
         for name, operator in known.items():
-            yield kind, code(name), f"{{py:obj}}`meshsimp_pymoo.{operator.__name__}`", first_line(operator)
+            yield kind, code(name), f"{{py:obj}}`~meshsimp_pymoo.{operator.__name__}`", first_line(operator)
 
 
-@table("presets", "name", "what it is", "the paper's", "in the shell", "budgets, beside seconds")
+@table("presets", "name", "what it is", "paper", "shell", "measured by")
 def presets() -> Rows:
     """Return a row for each preset."""
     from meshsimp_pymoo.search.presets import PRESETS
@@ -165,7 +178,7 @@ def presets() -> Rows:
         )
 
 
-@table("measures", "name", "unit", "what it is", "wish in the shell", "`--measure`")
+@table("measures", "name", "what it is", "wish", "minimised by")
 def measures() -> Rows:
     """Return a row for each number of a mesh."""
     from meshsimp_pymoo.cli.arguments import option
@@ -173,8 +186,9 @@ def measures() -> Rows:
 
     meanings = attributes(quality())
     for name, measure in MEASURES.items():
+        meaning = meanings[name].removesuffix(".") + f" [{measure.unit}]." * bool(measure.unit)
         wish = code(option(name)) if measure.wish else ""
-        yield code(name), measure.unit, meanings[name], wish, code(measure.minimised) if measure.minimised else ""
+        yield code(name), meaning, wish, code(f"--measure {measure.minimised}") if measure.minimised else ""
 
 
 @table("front-columns", "column", "type", "unit", "what it is")
@@ -222,23 +236,24 @@ def attributes(docstring: str) -> dict[str, str]:
 @table("indicators", "class", "what it is")
 def indicators() -> Rows:
     """Return a row for each indicator."""
-    import meshsimp_pymoo
     from pymoo.core.indicator import Indicator
+
+    import meshsimp_pymoo
 
     for name in meshsimp_pymoo.__all__:
         thing = getattr(meshsimp_pymoo, name)
         if inspect.isclass(thing) and issubclass(thing, Indicator):
-            yield f"{{py:obj}}`meshsimp_pymoo.{name}`", first_line(thing)
+            yield f"{{py:obj}}`~meshsimp_pymoo.{name}`", first_line(thing)
 
 
-@table("baselines", "group in YAML", "single variant", "what tables call it", "a whole front", "needs")
+@table("baselines", "group", "method", "what it is", "needs")
 def baselines() -> Rows:
     """Return a row for each method that fronts are compared with."""
     from meshsimp_pymoo.comparison.baselines import BASELINES
 
     for name, baseline in BASELINES.items():
-        needs = f"`pip install 'meshsimp-pymoo[{baseline.extra}]'`" if baseline.extra else code(baseline.package)
-        yield code(baseline.group), code(name), baseline.label, yes(baseline.front), needs if baseline.package else ""
+        needs = code(f"[{baseline.extra}]") if baseline.extra else code(*filter(None, [baseline.package]))
+        yield code(baseline.group), code(name), baseline.label + "; a whole front" * bool(baseline.front), needs
 
 
 @table("exit-codes", "code", "meaning")
@@ -259,15 +274,18 @@ def exit_codes() -> Rows:
 
 
 class TableOf(SphinxDirective):
-    """A table out of TABLES."""
+    """A table out of TABLES, or a list out of LISTS."""
 
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         """Return the table."""
-        if self.arguments[0] not in TABLES:
-            raise self.error(f"no table {self.arguments[0]!r}; there are {', '.join(TABLES)}")
-        header, rows = TABLES[self.arguments[0]]
+        (name,) = self.arguments
+        if name in LISTS:
+            return parsed(self, "\n\n".join(LISTS[name]()))
+        if name not in TABLES:
+            raise self.error(f"no table {name!r}; there are {', '.join((*TABLES, *LISTS))}")
+        header, rows = TABLES[name]
         lines = [header, ["---"] * len(header), *rows()]
         return parsed(self, "\n".join(f"| {' | '.join(map(cell, line))} |" for line in lines))
 
@@ -323,7 +341,7 @@ def described(parser: Any) -> Iterator[str]:
         if not known:
             continue
         if group.title not in ("options", "positional arguments", "commands"):
-            yield f"```{{rubric}} {from_help(group.title[0].upper() + group.title[1:])}\n:heading-level: 3\n```"
+            yield f"```{{rubric}} {from_help(group.title[0].upper() + group.title[1:])}\n```"
         if group.description:
             yield from_help(group.description)
         for either in parser._mutually_exclusive_groups:
@@ -335,7 +353,7 @@ def described(parser: Any) -> Iterator[str]:
             spelled = formatter._format_action_invocation(action) if action.option_strings else _plain_name(action)
             yield f"````{{option}} {spelled}\n{help_text[:1].upper()}{help_text[1:]}\n````"
     if examples := parser.epilog.partition("examples:\n")[2].partition("\n\n")[0]:
-        yield "```{rubric} Examples\n:heading-level: 3\n```"
+        yield "```{rubric} Examples\n```"
         yield f"```text\n{inspect.cleandoc(examples)}\n```"
 
 
