@@ -13,6 +13,7 @@ what was stored can be read back.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 import re
 import reprlib
@@ -372,12 +373,18 @@ def read_back(kind: type[Settings], stored: Any) -> Settings:
     return kind(**stored)
 
 
-def documentation(*kinds: type[Any]) -> str:
-    """Return the settings of classes as the parameters of a docstring."""
+def documented(kind: type[Settings]) -> type[Settings]:
+    """Put the settings of a class into its docstring, in place of the word SETTINGS."""
+    kind.__doc__ = (inspect.getdoc(kind) or "").replace("SETTINGS", documentation(kind, derived=True))
+    return kind
+
+
+def documentation(*kinds: type[Any], derived: bool = False) -> str:
+    """Return the settings of classes as the parameters of a docstring; ``derived``: those that follow, too."""
     lines = []
     for kind in kinds:
         for name, known in settings_of(kind).items():
-            if known.derived:
+            if known.derived and not derived:
                 continue
             lines.append(f"{name} : {known.accepts}")
             lines += _wrapped(known.doc, "    ")

@@ -338,3 +338,11 @@ def test_help_names_every_setting_of_a_problem_with_its_default_and_meaning():
             assert f" {name} : {known.accepts}" in said
             assert " ".join(known.doc.split()) in " ".join(said.replace("|", " ").split())
     assert "SETTINGS" not in said
+
+
+@pytest.mark.parametrize("kind", [Options, Rules])
+def test_the_help_of_a_class_of_settings_says_them_all(kind: type) -> None:
+    said = (kind.__doc__ or "").partition("Parameters\n----------\n")[2].partition("\n\nRaises\n")[0]
+    assert [line.partition(" : ")[0] for line in said.splitlines() if not line.startswith(" ")] == list(
+        settings_of(kind)
+    )

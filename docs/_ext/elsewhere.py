@@ -62,9 +62,8 @@ FURTHER = re.findall(r"^   ((?:\w+\.)+\w+)$", API.read_text(encoding="utf-8"), r
 # What a word means as the type of a parameter; itself: no link.
 TYPES = {
     **{name.rpartition(".")[2]: f"meshsimp_pymoo.{name}" for name in (*meshsimp_pymoo.__all__, *FURTHER)},
-    "trimesh.Trimesh": "trimesh.Trimesh",
+    **{name: f":py:obj:`{name}`" for name in ("trimesh.Trimesh", "pandas.DataFrame")},
     "axes": "matplotlib.axes.Axes",
-    "pandas.DataFrame": "pandas.DataFrame",
     "Path": "pathlib.Path",
     **{word: "os.PathLike" for word in ("path", "path-like")},
     **{word: f"collections.abc.{word.capitalize()}" for word in ("sequence", "mapping", "iterable", "callable")},
@@ -140,10 +139,17 @@ def linkcode_resolve(domain: str, info: dict[str, str]) -> str | None:
 
 
 def name_bases(app: Any, name: str, thing: Any, options: Any, bases: list[Any]) -> None:
-    """Show a public parent in place of one that is private, and none of a tuple's or an object's."""
+    """Show a public parent in place of one that is private."""
     for place, base in enumerate(bases):
         if inspect.isclass(base):
             bases[place] = next(kind for kind in base.__mro__ if not kind.__name__.startswith("_"))
+
+
+def drop_object(app: Any, doctree: nodes.document) -> None:
+    """Leave out that a class is an object."""
+    for paragraph in [*doctree.findall(nodes.paragraph)]:
+        if paragraph.astext() in ("Bases: object", "Bases: tuple"):
+            paragraph.parent.remove(paragraph)
 
 
 def shorten(app: Any, kind: str, name: str, thing: Any, options: Any, signature: str, returned: str) -> Any:
@@ -156,4 +162,5 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("missing-reference", find)
     app.connect("autodoc-process-bases", name_bases)
     app.connect("autodoc-process-signature", shorten)
+    app.connect("doctree-read", drop_object)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

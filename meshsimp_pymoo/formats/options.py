@@ -16,6 +16,7 @@ from meshsimp_pymoo.settings import (
     Several,
     Steps,
     Whole,
+    documented,
     setting,
     settle,
 )
@@ -24,9 +25,14 @@ from meshsimp_pymoo.settings import (
 Window = tuple[int, int, int, int]
 
 
+@documented
 @dataclass(frozen=True)
 class Options:
     """How a model is read. The fields are arguments of ``MeshProblem``, options of the shell and keys of YAML files.
+
+    Parameters
+    ----------
+    SETTINGS
 
     Raises
     ------

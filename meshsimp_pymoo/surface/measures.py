@@ -95,13 +95,16 @@ class Quality:
     Attributes
     ----------
     error : float
-        Sum of w_p d_p over all N original vertices; all w_p are 1 unless the model has weights [model units].
+        Sum of w_p d_p over all N original vertices p: weight times deviation. All w_p are 1 unless the model has
+        weights [model units].
     triangles : int
         Number of triangles of the mesh.
     vertices : int
         Number of vertices its triangles use.
-    mean_error, rms_error : float
-        Mean and root mean square of d_p over all N original vertices, weighted by w [model units].
+    mean_error : float
+        Mean of d_p over all N original vertices, weighted by w [model units].
+    rms_error : float
+        Root mean square of d_p over all N original vertices, weighted by w [model units].
     max_error : float
         Maximum of d_p over the original vertices whose weight is not 0 [model units].
     uncovered : int

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from meshsimp_pymoo.settings import Choice, Pins, Weights, setting, settle
+from meshsimp_pymoo.settings import Choice, Pins, Weights, documented, setting, settle
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 
 FOOTPRINTS = ("model", "hull")
@@ -16,10 +16,15 @@ PINS = ("corners", "hull", "border")
 USUAL_RATIO, MOST_RATIO = 0.1, 0.5
 
 
+@documented
 @dataclass(frozen=True)
 class Rules:
     """What counts. Made once, passed whole, stored whole; the fields are arguments of ``MeshProblem``, options of the
     shell and keys of YAML files (``measure`` is the first of the ``objectives`` there).
+
+    Parameters
+    ----------
+    SETTINGS
 
     Raises
     ------
