@@ -28,6 +28,7 @@ PAGES = {
     "pymoo.core.problem": f"{PYMOO}/problems/definition.html",
     "pymoo.core.algorithm": f"{PYMOO}/algorithms/index.html",
     "pymoo.core.callback": f"{PYMOO}/interface/callback.html",
+    "pymoo.core.population": f"{PYMOO}/customization/initialization.html",
     "pymoo.core.result": f"{PYMOO}/interface/result.html",
     "pymoo.core.indicator": f"{PYMOO}/misc/indicators.html",
     "pymoo.core.sampling": f"{PYMOO}/operators/sampling.html",
@@ -47,6 +48,7 @@ PAGES = {
     "trimesh.Trimesh": "https://trimesh.org/trimesh.base.html#trimesh.base.Trimesh",
     "trimesh": "https://trimesh.org",
     "numpy.ndarray": f"{NUMPY}/generated/numpy.ndarray.html",
+    "numpy.random.Generator": f"{NUMPY}/random/generator.html",
     "numpy.random": f"{NUMPY}/random/index.html",
     "numpy": f"{NUMPY}/index.html",
     "pandas.DataFrame": "https://pandas.pydata.org/docs/reference/api/pandas.DataFrame.html",
@@ -59,10 +61,14 @@ PAGES = {
 # Names that are met in the package but not public, by where they are at home: those that the page of Python lists.
 API = Path(__file__).parent.parent / "reference" / "api.md"
 FURTHER = re.findall(r"^   ((?:\w+\.)+\w+)$", API.read_text(encoding="utf-8"), re.MULTILINE)
+# Names of others that docstrings spell out.
+WHOLE = ("trimesh.Trimesh", "pandas.DataFrame", "numpy.random.Generator", "pymoo.core.evaluator.Evaluator")
 # What a word means as the type of a parameter; itself: no link.
 TYPES = {
     **{name.rpartition(".")[2]: f"meshsimp_pymoo.{name}" for name in (*meshsimp_pymoo.__all__, *FURTHER)},
-    **{name: f":py:obj:`{name}`" for name in ("trimesh.Trimesh", "pandas.DataFrame")},
+    **{name: f":py:obj:`{name}`" for name in WHOLE},
+    "Population": "pymoo.core.population.Population",
+    "Result": "pymoo.core.result.Result",
     "axes": "matplotlib.axes.Axes",
     "Path": "pathlib.Path",
     **{word: "os.PathLike" for word in ("path", "path-like")},

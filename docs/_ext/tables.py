@@ -187,7 +187,7 @@ def measures() -> Rows:
     meanings = attributes(quality())
     for name, measure in MEASURES.items():
         meaning = meanings[name].removesuffix(".") + f" [{measure.unit}]." * bool(measure.unit)
-        wish = code(option(name)) if measure.wish else ""
+        wish = f"{{option}}`{option(name)} <meshsimp simplify {option(name)}>`" if measure.wish else ""
         yield code(name), meaning, wish, code(f"--measure {measure.minimised}") if measure.minimised else ""
 
 

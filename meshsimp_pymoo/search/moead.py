@@ -32,7 +32,7 @@ def moead(
     prob_neighbor_mating: float = 1.0,
     **kwargs: Any,
 ) -> TchebycheffMOEAD:
-    """MOEA/D (Zhang and Li 2007) with the Tchebycheff decomposition of Eq. 7 and uniform crossover.
+    """MOEA/D (Zhang and Li 2007) with the Tchebycheff decomposition (equation 7) and uniform crossover.
 
     Parameters
     ----------

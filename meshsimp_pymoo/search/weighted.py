@@ -164,7 +164,7 @@ EFFECTS: dict[str, Score | None] = {"weighted_sum": None, "error": error_alone}
 
 
 class WeightedSum(Problem):
-    """The weighted sum of a mesh problem's two objectives (Eq. 8) as a problem of its own.
+    """The weighted sum of a mesh problem's two objectives (equation 8) as a problem of its own.
 
     For single-objective algorithms other than `WeightedGA` (which does not need it). F is w * error + (1 - w)
     * triangles, raw as in the paper: the error counts in file units, in the measure that the problem minimises.
@@ -240,7 +240,7 @@ class WeightedOutput(Output):
 
 
 class WeightedGA(GA):
-    """Generational, elitist genetic algorithm on the weighted sum of error and triangles (Eq. 8).
+    """Generational, elitist genetic algorithm on the weighted sum of error and triangles (equation 8).
 
     Takes the two-objective problem itself and weighs inside: every individual keeps both objectives, and the
     result is the best solution found, ``result.X`` (1, N) and ``result.F`` (1, 2), as from the
