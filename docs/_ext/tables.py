@@ -221,16 +221,27 @@ def quality() -> str:
     return inspect.getdoc(Quality) or ""
 
 
-def attributes(docstring: str) -> dict[str, str]:
-    """Return the sentences on each attribute of a docstring, without units."""
+def attributes(docstring: str, section: str = "Attributes") -> dict[str, str]:
+    """Return the sentences on each attribute of a docstring, or on each name of another section, without units."""
     found: dict[str, str] = {}
     names: list[str] = []
-    for line in docstring.partition("Attributes\n")[2].splitlines()[1:]:
+    for line in docstring.partition(f"{section}\n----------\n")[2].splitlines():
         if line and not line.startswith(" "):
             names = [name.strip() for name in line.partition(" : ")[0].split(",")]
         else:
             found |= {name: f"{found.get(name, '')} {line.strip()}" for name in names}
     return {name: from_docstring(re.sub(r" *\[[a-z ]+\]\.", ".", text)) for name, text in found.items()}
+
+
+@table("constraints", "name", "limits", "what it is")
+def constraints() -> Rows:
+    """Return a row for each constraint of a problem."""
+    from meshsimp_pymoo import MeshProblem
+    from meshsimp_pymoo.problem import CONSTRAINTS
+
+    meanings = attributes(inspect.getdoc(MeshProblem) or "", "Parameters")
+    for name, objective in CONSTRAINTS.items():
+        yield code(name), {0: "the first objective", -1: "the last, triangles"}[objective], meanings[name]
 
 
 @table("indicators", "class", "what it is")
