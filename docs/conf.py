@@ -29,6 +29,7 @@ extensions = [
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
     "elsewhere",
+    "pictures",
     "tables",
 ]
 exclude_patterns = ["_build", "_ext", "examples", "gallery/*.ipynb"]
@@ -67,6 +68,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "min_reported_time": 3600,
     "remove_config_comments": True,
+    "within_subsection_order": "pictures.place",
     "show_signature": False,
     "write_computation_times": False,
 }
@@ -74,10 +76,11 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = project
 html_static_path = ["_static"]
-html_css_files = ["reference.css"]
+html_css_files = ["custom.css", "reference.css"]
+html_favicon = "_static/logo.svg"
 html_show_sourcelink = False
 html_theme_options = {
-    "logo": {"text": project},
+    "logo": {"text": project, "image_light": "_static/logo.svg", "image_dark": "_static/logo.svg", "alt_text": ""},
     "github_url": URLS["Source"],
     "show_toc_level": 2,
     "navigation_with_keys": False,
