@@ -58,6 +58,7 @@ numpydoc_xref_ignore = "all"
 numpydoc_xref_aliases = TYPES
 
 copybutton_prompt_text = "$ "
+copybutton_selector = "div:not(.highlight-output) > div.highlight pre"
 copybutton_exclude = ".linenos, .gp, .go"
 
 sphinx_gallery_conf = {
@@ -65,6 +66,8 @@ sphinx_gallery_conf = {
     "gallery_dirs": "gallery",
     "filename_pattern": r"\.py$",
     "abort_on_example_error": True,
+    "capture_repr": (),
+    "thumbnail_size": (600, 420),
     "download_all_examples": False,
     "min_reported_time": 3600,
     "remove_config_comments": True,
@@ -79,12 +82,15 @@ html_static_path = ["_static"]
 html_css_files = ["custom.css", "reference.css"]
 html_favicon = "_static/logo.svg"
 html_show_sourcelink = False
+html_sidebars = {"start": [], "contributing": []}  # no section is around them
 html_theme_options = {
-    "logo": {"text": project, "image_light": "_static/logo.svg", "image_dark": "_static/logo.svg", "alt_text": ""},
+    "logo": {"text": project, "image_light": "_static/logo.svg", "image_dark": "_static/logo.svg"},
     "github_url": URLS["Source"],
     "show_toc_level": 2,
     "navigation_with_keys": False,
-    "header_links_before_dropdown": 6,
+    "header_links_before_dropdown": 7,
+    "navbar_persistent": ["search-button"],
+    "secondary_sidebar_items": {"**": ["page-toc"], "gallery/index": []},
     "footer_start": ["copyright"],
     "footer_end": ["sphinx-version"],
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from sphinx.errors import ExtensionError
 from sphinx_gallery.backreferences import THUMBNAIL_PARENT_DIV, THUMBNAIL_PARENT_DIV_CLOSE
 
 FIRST = (
@@ -44,6 +45,8 @@ def divide(app: Any, docname: str, source: list[str]) -> None:
 
 
 def setup(app: Any) -> dict[str, bool]:
-    """Tell Sphinx."""
+    """Tell Sphinx, if all that are named are there."""
+    if lost := [name for name in FIRST if not Path(app.srcdir, "examples", f"{name}.py").is_file()]:
+        raise ExtensionError(f"docs/_ext/pictures.py names a script that docs/examples lacks: {lost[0]}.py")
     app.connect("source-read", divide)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
