@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -89,12 +90,21 @@ class CoarseGrid:
         return Coarse(self.points, (h, w), np.unique(near[0] * w + near[1]), triangles)
 
 
+@lru_cache(maxsize=1)
+def _surface(points: bytes, shape: tuple[int, int]) -> HeightSurface:
+    """Return the surface of the samples that are looked at: the same for all meshes of a grid."""
+    rows = np.frombuffer(points).reshape(-1, 3)
+    faces = grid_source(rows[:, 2].reshape(shape)).faces
+    model = build_model(SourceMesh(rows, faces, {}, "coarse grid", up="z"))
+    return HeightSurface(model, Rules(footprint="hull", outside="ignore"))
+
+
 def move(task: Coarse) -> IntArray:
     """Move the vertices of a mesh while that lowers its error; return its rows of ``task.points``, ascending."""
-    faces = grid_source(task.points[:, 2].reshape(task.shape)).faces
-    model = build_model(SourceMesh(task.points, faces, {}, "coarse grid", up="z"))
+    surface = _surface(task.points.tobytes(), task.shape)
+    model = surface.model
     moved = relocate(
-        HeightSurface(model, Rules(footprint="hull", outside="ignore")),
+        surface,
         np.isin(model.source_index, task.kept),
         moves=MOVES * len(task.kept),
         seed=task.triangles,

@@ -29,17 +29,31 @@ from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_grid
+from meshsimp_pymoo.search import coarse
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import memory
 from meshsimp_pymoo.tiles.front import Folder, identity, tiled_front
 from meshsimp_pymoo.tiles.thin import thin_tile
 from meshsimp_pymoo.workers import Processes
 
+pytestmark = pytest.mark.usefixtures("sketched", "few_moves")
+
 # What depends on nothing but the model and the settings: all files but run.json, which has the seconds.
 SAME = ("front.csv", "front.npz", "chosen.ply", "front.png")
 
 
 HEIGHTS = open_grid(build_model(load("jacksboro:2"))).heights[:16, :150].astype(np.float32)  # two tiles
+
+
+MOVES = coarse.MOVES
+
+
+@pytest.fixture(scope="module")
+def few_moves():
+    """Let the smallest meshes be moved little: how good they are is shown in test_tiles.py."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(coarse, "MOVES", 4)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +69,7 @@ def command(path, out):
 
 
 @pytest.fixture(scope="module")
-def whole(path, tmp_path_factory):
+def whole(path, few_moves, sketched, tmp_path_factory):
     """Return the bytes of a run that nothing happened to."""
     out = tmp_path_factory.mktemp("whole") / "out"
     assert main(command(path, out)) == 0
@@ -103,7 +117,8 @@ def at_call(number, action):
 # ---------------------------------------------------------------------------------------------------- what is killed
 
 
-def test_a_worker_killed_in_the_middle_of_a_tile_changes_no_byte():
+def test_a_worker_killed_in_the_middle_of_a_tile_changes_no_byte(monkeypatch):
+    monkeypatch.setattr(coarse, "MOVES", MOVES)  # as in the other processes
     grid = open_grid(HEIGHTS)
     expected = tiled_front(grid, tile=64)
     killed = []
@@ -161,8 +176,10 @@ while killed < moments:
 
 
 @pytest.mark.slow
-def test_killed_at_random_moments_the_same_command_ends_with_the_same_bytes(path, whole, tmp_path):
+def test_killed_at_random_moments_the_same_command_ends_with_the_same_bytes(path, tmp_path):
     kills = 100
+    subprocess.run([sys.executable, "-m", "meshsimp_pymoo", *command(path, tmp_path / "whole")], check=True)
+    whole = contents(tmp_path / "whole")
     call = [sys.executable, "-c", KILLER, str(tmp_path), "1", str(kills), *command(path, "OUT")]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -185,7 +202,7 @@ def in_fork(call):
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-@pytest.mark.parametrize("moment", ["files.shutil.rmtree", "report.figures.plot_front"])
+@pytest.mark.parametrize("moment", ["files.shutil.rmtree", "report.figures.front_figure"])
 def test_killed_when_the_new_folder_is_there_the_next_call_clears_up_and_draws(
     path, whole, tmp_path, monkeypatch, moment
 ):
