@@ -29,7 +29,6 @@ from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_grid
-from meshsimp_pymoo.search import coarse
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.tiles import memory
 from meshsimp_pymoo.tiles.front import Folder, identity, tiled_front
@@ -43,17 +42,6 @@ SAME = ("front.csv", "front.npz", "chosen.ply", "front.png")
 
 
 HEIGHTS = open_grid(build_model(load("jacksboro:2"))).heights[:16, :150].astype(np.float32)  # two tiles
-
-
-MOVES = coarse.MOVES
-
-
-@pytest.fixture(scope="module")
-def few_moves():
-    """Let the smallest meshes be moved little: how good they are is shown in test_tiles.py."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coarse, "MOVES", 4)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -117,12 +105,12 @@ def at_call(number, action):
 # ---------------------------------------------------------------------------------------------------- what is killed
 
 
-def test_a_worker_killed_in_the_middle_of_a_tile_changes_no_byte(monkeypatch):
-    monkeypatch.setattr(coarse, "MOVES", MOVES)  # as in the other processes
+@pytest.mark.usefixtures("all_moves")
+def test_a_worker_killed_in_the_middle_of_a_tile_changes_no_byte():
     grid = open_grid(HEIGHTS)
     expected = tiled_front(grid, tile=64)
     killed = []
-    with Processes(2) as engine:
+    with Processes(1) as engine:  # how several share what one left is shown in test_workers.py
 
         def kill(share, what):
             if what.startswith("tile 2 of") and not killed:

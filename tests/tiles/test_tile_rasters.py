@@ -25,7 +25,10 @@ rasterio = pytest.importorskip("rasterio")
 from rasterio.transform import Affine  # noqa: E402
 
 # rasterio multiplies transforms in a way that their own library will give up
-pytestmark = [pytest.mark.filterwarnings("ignore::PendingDeprecationWarning"), pytest.mark.usefixtures("sketched")]
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::PendingDeprecationWarning"),
+    pytest.mark.usefixtures("sketched", "few_moves"),
+]
 
 HEIGHTS = open_grid(build_model(load("jacksboro:3"))).heights.astype(np.float32)
 PLACE = Affine(10, 0, 500_000.25, 0, -12.5, 5_400_000.125)
