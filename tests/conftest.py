@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import gc
-import hashlib
 import os
-import pickle
 from pathlib import Path
-from typing import Any
 
 import pytest
 from browser import launched, playwright_engine
 from counts import SLOW
 from hypothesis import settings
+from sketching import sketch
 
 from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
@@ -64,16 +62,6 @@ def _compiled() -> None:
 
 
 FRONT_FIGURE = figures.front_figure
-
-
-def sketch(surface: Any, *told: Any, **marks: Any) -> Any:
-    """Return a figure without axes, of pixels that tell what the picture of a front would be drawn from."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(1, 1), dpi=32)
-    drawn = hashlib.sha256(pickle.dumps((surface.model.hash, surface.rules, told, marks)))
-    figure.figimage(list(map(list, 32 * [drawn.digest()])))
-    return figure
 
 
 @pytest.fixture(scope="module")

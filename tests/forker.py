@@ -18,6 +18,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sketching import sketch, sketch_into
+
+# What an experiment needs is loaded by one.
+TINY = """
+problems: ["roof:3"]
+algorithms: [{preset: nsga2_v1, parameters: {pop_size: 8}}, {preset: moead, parameters: {pop_size: 8}}]
+seeds: [1]
+budgets: [{generations: 2}]
+"""
+# What draws pictures, by module: its name there and itself.
+DRAWN: dict[Any, tuple[str, Any]] = {}
 # Seconds after which a command is killed that should have ended.
 LONGEST = 100.0
 
@@ -55,14 +66,17 @@ class Forker:
         signals: Sequence[tuple[float, int]] = (),
         memory: int | None = None,
         die_in: str | None = None,
+        drawn: bool = False,
     ) -> Ended:
         """Run ``meshsimp ARGS``, with what is to happen to it.
 
-        It is killed or gets other signals after some seconds, is allowed so much more memory, or dies in a call.
+        It is killed or gets other signals after some seconds, is allowed so much more memory, or dies in a call. Its
+        pictures are sketches unless they are to be ``drawn``.
         """
         if kill_after is not None:
             signals = [(kill_after, signal.SIGKILL)]
-        request = {"args": [str(arg) for arg in args], "signals": list(signals), "memory": memory, "die_in": die_in}
+        request = {"args": [str(arg) for arg in args], "signals": list(signals)}
+        request |= {"memory": memory, "die_in": die_in, "drawn": drawn}
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.process.stdin.write(json.dumps(request) + "\n")
@@ -78,7 +92,14 @@ class Forker:
 
 
 def serve() -> None:
+    import numpy as np
+
     from meshsimp_pymoo.cli import main
+    from meshsimp_pymoo.comparison import report
+    from meshsimp_pymoo.report import figures
+
+    DRAWN.update({figures: ("front_figure", figures.front_figure), report: ("_save", report._save)})
+    figures.front_figure, report._save = sketch, sketch_into
 
     replies = os.dup(1)
     os.dup2(2, 1)
@@ -87,8 +108,11 @@ def serve() -> None:
         for algorithm, budget in (("nsga2_v1", "40"), ("memetic", "20")):
             arguments = [*warm, "--algorithm", algorithm, "--evaluations", budget, "-o", f"{folder}/{algorithm}"]
             assert main(arguments) == 0
-        import meshsimp_pymoo.cli.reporting
-        import meshsimp_pymoo.comparison.runner  # noqa: F401
+        np.save(f"{folder}/grid.npy", np.add.outer(np.arange(5.0), np.arange(70.0) ** 2 % 7))
+        tiles = ("simplify", f"{folder}/grid.npy", "--tile", "64", "--jobs", "1", "--threads", "1", "--quiet")
+        assert main([*tiles, "-o", f"{folder}/tiles"]) == 0
+        Path(folder, "tiny.yaml").write_text(TINY, encoding="utf-8")
+        assert main(["run", f"{folder}/tiny.yaml", "--jobs", "1", "--quiet", "-o", f"{folder}/run"]) == 0
         from meshsimp_pymoo.workers import _executors
 
         # threads must not be there when a process forks
@@ -153,6 +177,9 @@ def become(request: dict[str, Any], said: Path, mask: set[Any]) -> None:
 
             used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
             resource.setrlimit(resource.RLIMIT_AS, (used + request["memory"],) * 2)
+        if request["drawn"]:
+            for module, (name, draw) in DRAWN.items():
+                setattr(module, name, draw)
         if request["die_in"] is not None:
             from unittest import mock
 
