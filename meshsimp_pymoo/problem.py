@@ -9,11 +9,10 @@ import os
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 from pymoo.core.problem import ElementwiseEvaluationFunction, ElementwiseProblem, Problem
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
@@ -42,6 +41,9 @@ from meshsimp_pymoo.surface.measures import (
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Simplified, Surface, mesh_arrays
+
+if TYPE_CHECKING:
+    import trimesh
 
 # Entries of subsets that are looked at together.
 ENTRIES_AT_ONCE = 1 << 24
@@ -370,6 +372,8 @@ class MeshProblem(ElementwiseProblem):
 
 def mesh_of(surface: Surface, faces: IntArray) -> trimesh.Trimesh:
     """Return triangles (M, 3) of a surface's vertices as a mesh in the frame of the file; see `MeshProblem.mesh`."""
+    import trimesh
+
     model = surface.model
     vertices, compact, attributes = mesh_arrays(model, faces)
     mesh = trimesh.Trimesh(vertices=vertices, faces=compact, process=False, validate=False)

@@ -40,10 +40,13 @@ def launched(engine: Any, *more: str) -> Iterator[Any]:
 
 
 class Visit:
-    """A page from the disk, opened in a browser, with all that it said and asked for."""
+    """A page from the disk, opened in a browser, with all that it said and asked for.
+
+    A program draws it, so it has a quarter of the pixels of a common screen unless it is said to have all.
+    """
 
     def __init__(self, browser: Any, path: Path, **look: Any) -> None:
-        self.context = browser.new_context(accept_downloads=True, **look)
+        self.context = browser.new_context(accept_downloads=True, **{"device_scale_factor": 0.5} | look)
         self.page = self.context.new_page()
         self.said: list[str] = []
         self.asked: list[str] = []

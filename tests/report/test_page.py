@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import io
 import json
+import math
 import re
 import shlex
 import time
@@ -18,6 +19,7 @@ import pytest
 from browser import Visit, launched
 from samples import freed
 from scipy.spatial import Delaunay
+from sketching import sketch
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli import main
@@ -88,12 +90,29 @@ def opened(browser, folder):
 
 
 @pytest.fixture
-def visit(opened):
-    """The page, as it was when it was opened; afterwards it must have kept quiet."""
-    opened.page.reload()
-    opened.page.wait_for_selector("html[data-ready]")
+def used(opened):
+    """The page, as other tests have left it; afterwards it must have kept quiet."""
+    opened.used = True
     yield opened
     opened.check()
+
+
+@pytest.fixture
+def seen(opened):
+    """The page, as it was when it was opened, for a test that only looks at it."""
+    if getattr(opened, "used", False):
+        opened.page.reload()
+        opened.page.wait_for_selector("html[data-ready]")
+        opened.used = False
+    yield opened
+    opened.check()
+
+
+@pytest.fixture
+def visit(seen):
+    """The page, as it was when it was opened."""
+    seen.used = True
+    return seen
 
 
 def shown(page):
@@ -107,13 +126,23 @@ def number(page, name):
     return float(page.locator(f"#number-{name}").get_attribute("value"))
 
 
-def pixels(page, window):
-    """Return what is drawn in one of the two windows, (height, width, 3)."""
+def pixels(page):
+    """Return what is drawn in the windows of the original and of the simplified mesh, (height, width, 3) each."""
     from PIL import Image
 
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    with Image.open(io.BytesIO(page.locator(f"#{window}-window").screenshot())) as image:
-        return np.asarray(image.convert("RGB")).astype(int)
+    with Image.open(io.BytesIO(page.locator(".views").screenshot())) as image:
+        drawn = np.asarray(image.convert("RGB")).astype(int)
+    whole, *windows = (
+        page.locator(place).bounding_box() for place in (".views", "#original-window", "#simplified-window")
+    )
+    scale = drawn.shape[1] / whole["width"]
+    parts = []
+    for box in windows:
+        left, top = scale * (box["x"] - whole["x"]), scale * (box["y"] - whole["y"])
+        rows = slice(math.ceil(top), math.floor(top + scale * box["height"]))
+        parts.append(drawn[rows, math.ceil(left) : math.floor(left + scale * box["width"])])
+    return parts
 
 
 def unlike(a, b):
@@ -125,28 +154,28 @@ def unlike(a, b):
 # ----------------------------------------------------------------------------------------------------------- choosing
 
 
-def test_the_page_opens_with_the_chosen_solution_and_says_all_its_numbers(visit, front):
-    assert shown(visit.page) == 2
+def test_the_page_opens_with_the_chosen_solution_and_says_all_its_numbers(seen, front):
+    assert shown(seen.page) == 2
     for name in MEASURES:
-        assert number(visit.page, name) == getattr(front[2], name)
-    text = visit.page.locator("#numbers").inner_text()
+        assert number(seen.page, name) == getattr(front[2], name)
+    text = seen.page.locator("#numbers").inner_text()
     assert f"of {len(front.model.faces):,}" in text
     assert f"{100 * front[2].vertices / front.model.n_vertices:.3g}" in text
     assert f"meshes/002_{front[2].triangles}.ply" in text
 
 
-def test_a_click_picks_a_solution(visit, front):
+def test_a_click_picks_a_solution(used, front):
     for row in (5, 1, len(front) - 1):
-        visit.page.locator("#chart circle.front-dot").nth(row).click(force=True)
-        assert shown(visit.page) == row
+        used.page.locator("#chart circle.front-dot").nth(row).click(force=True)
+        assert shown(used.page) == row
 
 
-def test_the_slider_picks_a_solution(visit, front):
-    slider = visit.page.locator("#slider")
+def test_the_slider_picks_a_solution(used, front):
+    slider = used.page.locator("#slider")
     slider.fill("6")
-    assert shown(visit.page) == 6
+    assert shown(used.page) == 6
     slider.press("ArrowRight")
-    assert shown(visit.page) == 7
+    assert shown(used.page) == 7
     assert f"{front[7].triangles:,} triangles" in slider.get_attribute("aria-valuetext")
 
 
@@ -179,39 +208,39 @@ def test_a_mesh_that_is_slow_to_unpack_does_not_replace_one_picked_later(visit, 
     visit.page.locator("#slider").fill("9")
     visit.page.wait_for_selector("html[data-shown='9']")
     assert visit.page.evaluate("waiting.length") == 1
-    later = pixels(visit.page, "simplified")
+    _, later = pixels(visit.page)
     visit.page.evaluate("waiting[0]()")
     visit.page.wait_for_timeout(300)
     assert shown(visit.page) == 9
     assert visit.page.evaluate("state.mesh.row") == 9
-    assert unlike(later, pixels(visit.page, "simplified")) == 0
+    assert unlike(later, pixels(visit.page)[1]) == 0
     visit.page.locator("#slider").fill("4")  # and the page goes on working
     assert shown(visit.page) == 4
 
 
-def test_a_search_by_triangles_finds_the_most_accurate(visit, front):
+def test_a_search_by_triangles_finds_the_most_accurate(used, front):
     for limit in (front[7].triangles - 1, front[7].triangles):
-        visit.page.fill("#most-triangles", str(limit))
-        visit.page.press("#most-triangles", "Enter")
-        assert shown(visit.page) == front.best(triangles=limit).solution
-    assert f"solution {front.best(triangles=limit).solution}:" in visit.page.inner_text("#answer")
-    visit.page.fill("#most-triangles", "1")
-    visit.page.click("#by-triangles button")
-    assert visit.page.inner_text("#answer") == (
+        used.page.fill("#most-triangles", str(limit))
+        used.page.press("#most-triangles", "Enter")
+        assert shown(used.page) == front.best(triangles=limit).solution
+    assert f"solution {front.best(triangles=limit).solution}:" in used.page.inner_text("#answer")
+    used.page.fill("#most-triangles", "1")
+    used.page.click("#by-triangles button")
+    assert used.page.inner_text("#answer") == (
         f"No solution has at most 1 triangles; the smallest has {front[0].triangles}."
     )
-    assert shown(visit.page) == front.best(triangles=limit).solution
+    assert shown(used.page) == front.best(triangles=limit).solution
 
 
-def test_every_error_can_be_searched_for_those_that_meshes_are_chosen_by_first(visit):
-    options = visit.page.locator("#measure option")
+def test_every_error_can_be_searched_for_those_that_meshes_are_chosen_by_first(seen):
+    options = seen.page.locator("#measure option")
     assert [option.get_attribute("value") for option in options.all()] == ERRORS
     assert options.all_inner_texts() == ["mean error", "RMS error", "max error", "surface error", "error (sum)"]
-    assert visit.page.locator("#measure").input_value() == "mean_error"
+    assert seen.page.locator("#measure").input_value() == "mean_error"
 
 
-def test_the_numbers_begin_with_the_sizes(visit):
-    names = visit.page.locator("#numbers th").all_inner_texts()
+def test_the_numbers_begin_with_the_sizes(seen):
+    names = seen.page.locator("#numbers th").all_inner_texts()
     assert names == [
         "triangles", "vertices", "error", "mean error", "RMS error", "max error", "uncovered",
         "surface error", "least angle", "thin triangles", "solution",
@@ -219,18 +248,18 @@ def test_the_numbers_begin_with_the_sizes(visit):
 
 
 @pytest.mark.parametrize("measure", ERRORS)
-def test_a_search_by_error_finds_the_smallest(visit, front, measure):
+def test_a_search_by_error_finds_the_smallest(used, front, measure):
     limit = getattr(front[5], measure) * 1.01
-    visit.page.select_option("#measure", measure)
-    visit.page.fill("#most-error", repr(limit))
-    visit.page.click("#by-error button")
-    assert shown(visit.page) == next(s.solution for s in front if getattr(s, measure) <= limit)
+    used.page.select_option("#measure", measure)
+    used.page.fill("#most-error", repr(limit))
+    used.page.click("#by-error button")
+    assert shown(used.page) == next(s.solution for s in front if getattr(s, measure) <= limit)
 
 
-def test_a_search_for_no_number_says_so(visit):
-    visit.page.fill("#most-error", "little")
-    visit.page.click("#by-error button")
-    assert "give a number" in visit.page.inner_text("#answer")
+def test_a_search_for_no_number_says_so(used):
+    used.page.fill("#most-error", "little")
+    used.page.click("#by-error button")
+    assert "give a number" in used.page.inner_text("#answer")
 
 
 def test_the_scales_of_the_chart_can_be_switched(visit):
@@ -244,8 +273,8 @@ def test_the_scales_of_the_chart_can_be_switched(visit):
     assert spread() < 0.5 * logarithmic
 
 
-def test_knee_and_chosen_solution_are_marked(visit, front):
-    chart = visit.page.locator("#chart > svg")
+def test_knee_and_chosen_solution_are_marked(seen, front):
+    chart = seen.page.locator("#chart > svg")
     for mark, row in (("diamond", front.knee().solution), ("star", 2)):
         dot = chart.locator("circle.front-dot").nth(row)
         place = f"translate({dot.get_attribute('cx')},{dot.get_attribute('cy')})"
@@ -259,35 +288,36 @@ def test_both_meshes_turn_together(visit, front):
     page = visit.page
     page.locator("#slider").fill(str(len(front) - 1))  # all vertices are kept: both windows show the same surface
     assert shown(page) == len(front) - 1
-    seen = [pixels(page, "original")]
-    assert len(np.unique(seen[0].reshape(-1, 3), axis=0)) > 50
-    assert unlike(seen[0], pixels(page, "simplified")) < 0.01
+    looks = [pixels(page)]
+    assert len(np.unique(looks[0][0].reshape(-1, 3), axis=0)) > 50
+    assert unlike(*looks[0]) < 0.01
     for window in ("original", "simplified"):
         box = page.locator(f"#{window}-window").bounding_box()
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         page.mouse.down()
         page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 - 40, steps=3)
         page.mouse.up()
-        seen.append(pixels(page, "original"))
-        assert unlike(seen[-1], seen[-2]) > 0.05
-        assert unlike(seen[-1], pixels(page, "simplified")) < 0.01
+        looks.append(pixels(page))
+        assert unlike(looks[-1][0], looks[-2][0]) > 0.05
+        assert unlike(*looks[-1]) < 0.01
     for key in ("ArrowLeft", "ArrowUp", "+"):
         for _ in range(3):
             page.locator("#canvas").press(key)
-        seen.append(pixels(page, "original"))
-        assert unlike(seen[-1], seen[-2]) > 0.02, key
-        assert unlike(seen[-1], pixels(page, "simplified")) < 0.01
+        looks.append(pixels(page))
+        assert unlike(looks[-1][0], looks[-2][0]) > 0.02, key
+        assert unlike(*looks[-1]) < 0.01
     assert shown(page) == len(front) - 1  # the arrow keys turned the meshes and picked nothing
     page.click("#reset")
-    assert unlike(pixels(page, "original"), seen[0]) < 0.01
+    assert unlike(pixels(page)[0], looks[0][0]) < 0.01
 
 
 def test_another_solution_changes_the_right_window_alone(visit):
-    before = [pixels(visit.page, window) for window in ("original", "simplified")]
+    before = pixels(visit.page)
     visit.page.locator("#slider").fill("0")
     assert shown(visit.page) == 0
-    assert unlike(pixels(visit.page, "original"), before[0]) < 0.001
-    assert unlike(pixels(visit.page, "simplified"), before[1]) > 0.05
+    after = pixels(visit.page)
+    assert unlike(after[0], before[0]) < 0.001
+    assert unlike(after[1], before[1]) > 0.05
 
 
 def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
@@ -295,14 +325,14 @@ def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
     looks = {}
     for look in ("shaded", "wireframe", "error"):
         page.check(f"input[value={look}]", force=True)
-        looks[look] = [pixels(page, window) for window in ("original", "simplified")]
+        looks[look] = pixels(page)
         assert page.locator("#error-key").is_visible() == (look == "error")
     for window in (0, 1):
         assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
         assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
     # seen from above, both windows show the same map of the error, on the original and on the simplified surface
     page.click("#from-above")
-    assert unlike(pixels(page, "original"), pixels(page, "simplified")) < 0.25
+    assert unlike(*pixels(page)) < 0.25
     end = page.inner_text("#scale-end")
     page.locator("#slider").fill("5")
     assert shown(page) == 5
@@ -316,8 +346,8 @@ def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
     page.locator("#slider").fill(str(len(front) - 1))
     page.select_option("#scale", "all")
     assert shown(page) == len(front) - 1
-    drawn = pixels(page, "simplified")
-    middle = drawn[drawn.shape[0] // 2 - 20 :, drawn.shape[1] // 2 - 20 :][:40, :40].reshape(-1, 3)
+    _, drawn = pixels(page)
+    middle = drawn[drawn.shape[0] // 2 - 10 :, drawn.shape[1] // 2 - 10 :][:20, :20].reshape(-1, 3)
     hue = middle / middle.max(axis=1, keepdims=True)
     palest = np.array([252, 253, 191]) / 253
     assert np.abs(hue - palest).max() < 0.05
@@ -325,9 +355,9 @@ def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
 
 def test_heights_can_be_exaggerated(visit):
     visit.page.click("#from-side")
-    before = pixels(visit.page, "original")
+    before, _ = pixels(visit.page)
     visit.page.locator("#heights").fill(visit.page.locator("#heights").get_attribute("max"))
-    assert unlike(pixels(visit.page, "original"), before) > 0.05
+    assert unlike(pixels(visit.page)[0], before) > 0.05
 
 
 # -------------------------------------------------------------------------------------------------------- taking home
@@ -351,19 +381,19 @@ def parsed(path):
 
 
 @pytest.mark.parametrize("suffix", ["ply", "obj", "stl"])
-def test_a_downloaded_mesh_has_the_triangles_and_the_error_that_the_page_says(visit, front, tmp_path, suffix):
-    visit.page.locator("#slider").fill("6")
-    assert shown(visit.page) == 6
-    with visit.page.expect_download() as download:
-        visit.page.click(f"#downloads button[value={suffix}]")
+def test_a_downloaded_mesh_has_the_triangles_and_the_error_that_the_page_says(used, front, tmp_path, suffix):
+    used.page.locator("#slider").fill("6")
+    assert shown(used.page) == 6
+    with used.page.expect_download() as download:
+        used.page.click(f"#downloads button[value={suffix}]")
     assert download.value.suggested_filename == f"hill-side_{front[6].triangles}.{suffix}"
     path = tmp_path / f"small.{suffix}"
     download.value.save_as(path)
     vertices, faces = parsed(path)
     found = front.problem.surface.score(vertices, faces).quality
-    assert found.triangles == number(visit.page, "triangles") == front[6].triangles
-    assert found.error == pytest.approx(number(visit.page, "error"), rel=1e-9)
-    assert found.max_error == pytest.approx(number(visit.page, "max_error"), rel=1e-9)
+    assert found.triangles == number(used.page, "triangles") == front[6].triangles
+    assert found.error == pytest.approx(number(used.page, "error"), rel=1e-9)
+    assert found.max_error == pytest.approx(number(used.page, "max_error"), rel=1e-9)
     source = read_source(path)  # and the package opens it
     assert len(source.faces) == front[6].triangles
     if suffix != "stl":
@@ -385,10 +415,10 @@ def test_a_downloaded_ply_is_the_file_that_the_package_writes(visit, front, tmp_
     assert sorted(triangles[0]) == sorted(triangles[1])
 
 
-def test_the_command_on_the_page_writes_the_mesh_again(visit, front, tmp_path, monkeypatch, capsys):
-    visit.page.locator("#slider").fill("4")
-    assert shown(visit.page) == 4
-    command = shlex.split(visit.page.inner_text("#command"))
+def test_the_command_on_the_page_writes_the_mesh_again(used, front, tmp_path, monkeypatch, capsys):
+    used.page.locator("#slider").fill("4")
+    assert shown(used.page) == 4
+    command = shlex.split(used.page.inner_text("#command"))
     assert command[:2] == ["meshsimp", "pick"]
     monkeypatch.chdir(tmp_path)
     assert main(command[1:]) == 0
@@ -398,11 +428,11 @@ def test_the_command_on_the_page_writes_the_mesh_again(visit, front, tmp_path, m
 # ----------------------------------------------------------------------------------------- everybody's, and harmless
 
 
-def test_everything_can_be_reached_with_the_keyboard_and_shows_its_focus(visit):
+def test_everything_can_be_reached_with_the_keyboard_and_shows_its_focus(used):
     reached = {}
     for _ in range(40):
-        visit.page.keyboard.press("Tab")
-        name, outlined, nothing = visit.page.evaluate(
+        used.page.keyboard.press("Tab")
+        name, outlined, nothing = used.page.evaluate(
             """() => { const at = document.activeElement;
             const seen = at.name === "look" ? at.nextElementSibling : at;
             return [at.id || at.value || at.textContent, getComputedStyle(seen).outlineStyle !== "none",
@@ -417,8 +447,8 @@ def test_everything_can_be_reached_with_the_keyboard_and_shows_its_focus(visit):
     assert all(reached.values()), reached
 
 
-def test_every_control_has_a_name(visit):
-    unnamed = visit.page.evaluate(
+def test_every_control_has_a_name(seen):
+    unnamed = seen.page.evaluate(
         """() => [...document.querySelectorAll("input, select, button, canvas, svg[role], [tabindex]")]
         .filter((at) => !(at.labels && at.labels.length) && !at.getAttribute("aria-label") && !at.textContent.trim())
         .map((at) => at.outerHTML)"""
@@ -428,8 +458,8 @@ def test_every_control_has_a_name(visit):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_is_readable_on_a_phone_by_day_and_night(browser, folder, scheme):
-    look = {"viewport": {"width": 360, "height": 740}, "color_scheme": scheme, "has_touch": True}
-    visit = Visit(browser, folder / "report.html", **look)
+    look = {"viewport": {"width": 360, "height": 740}, "device_scale_factor": 1, "has_touch": True}
+    visit = Visit(browser, folder / "report.html", color_scheme=scheme, **look)
     try:
         assert visit.page.evaluate("document.documentElement.scrollWidth") == 360
         ink, paper = visit.page.evaluate(
@@ -580,8 +610,8 @@ def test_ten_thousand_vertices_and_a_hundred_solutions_are_small_and_quick(brows
     seconds = []
     for _ in range(3):
         start = time.perf_counter()
-        visit = Visit(browser, path, viewport={"width": 1280, "height": 900})
-        picture = pixels(visit.page, "simplified")
+        visit = Visit(browser, path, viewport={"width": 1280, "height": 900}, device_scale_factor=1)
+        _, picture = pixels(visit.page)
         seconds.append(time.perf_counter() - start)
         visit.check()
         visit.close()
@@ -720,7 +750,8 @@ def test_a_page_that_cannot_be_made_leaves_the_old_one(folder, front, monkeypatc
     assert (folder / "report.html").read_bytes() == before
 
 
-def test_simplify_writes_the_page_unless_told_not_to(tmp_path, capsys):
+def test_simplify_writes_the_page_unless_told_not_to(tmp_path, monkeypatch):
+    monkeypatch.setattr(figures_module, "front_figure", sketch)
     command = ["simplify", "roof:5", "--evaluations", "60", "--population", "20"]
     assert main([*command, "-o", str(tmp_path / "with")]) == 0
     assert main([*command, "-o", str(tmp_path / "without"), "--no-page"]) == 0
