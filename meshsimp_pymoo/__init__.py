@@ -2,7 +2,7 @@
 
 The tree is the data flow. Bottom up; one part may import only parts above it in this list::
 
-    errors, arrays                 words that all share: one-line errors, types of arrays
+    errors, arrays, reprs          words that all share: one-line errors, types of arrays, what things call themselves
     settings, workers, indicators  what a user may set; threads, processes, Dask; dominance, knee, hypervolume
     memory         how much is free
     compiling/     functions that Python calls and functions inside them, their machine code on disk

@@ -212,12 +212,8 @@ class FrontSolution(_Numbers):
         return hash((id(self.front), self.solution))
 
     def __repr__(self) -> str:
-        q = self.quality
-        return (
-            f"<solution {self.solution} of {len(self.front)}{', free' if self.free else ''}: "
-            f"{q.triangles} triangles, error {q.error:.6g}, "
-            f"mean {q.mean_error:.4g}, max {q.max_error:.4g}>"
-        )
+        free = ", free" if self.free else ""
+        return f"<solution {self.solution} of {len(self.front)}{free}: {self.quality.in_words}>"
 
     def _repr_png_(self) -> bytes:
         from matplotlib.figure import Figure
@@ -990,7 +986,7 @@ class Front(Sequence[FrontSolution]):
         few, many = self.quality[0], self.quality[-1]
         free = f", {self.n_free} of {len(self)} free" if self.n_free else ""
         return (
-            f"<front of {self.name}: {len(self)} solutions{free}, {few.triangles} to {many.triangles} triangles, "
+            f"<front of {self.name}: {len(self)} solutions{free}, {few.triangles:,} to {many.triangles:,} triangles, "
             f"error {few.error:.6g} to {many.error:.6g}>"
         )
 

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from pymoo.core.indicator import Indicator
 
 from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.reprs import as_made
 
 __all__ = [
     "REFERENCE",
@@ -358,6 +359,8 @@ class _FrontIndicator(Indicator):
         """Return the indicator of the front ``F`` (n, m); a single solution may come as (m,)."""
         points = np.asarray(F)
         return self._do(points[None, :] if points.ndim == 1 and points.size else points, *args, **kwargs)
+
+    __repr__ = as_made
 
 
 class HypervolumeRatio(_FrontIndicator):

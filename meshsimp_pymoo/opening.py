@@ -28,7 +28,7 @@ from meshsimp_pymoo.formats.table import (
     read_source,
     refuse_foreign,
 )
-from meshsimp_pymoo.settings import settings_of, taken
+from meshsimp_pymoo.settings import by_name, settings_of, taken
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.orient import Up, front_patch
@@ -178,6 +178,7 @@ def _given(options: Options) -> str:
 # ---------------------------------------------------------------------------------------------------------- by windows
 
 
+@by_name(Options)
 def open_grid(
     model: str | os.PathLike[str] | npt.ArrayLike | OpenModel | HeightGrid,
     options: Options | None = None,

@@ -21,7 +21,8 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import textured
 from meshsimp_pymoo.opening import open_model
-from meshsimp_pymoo.settings import documentation, settings_of, taken
+from meshsimp_pymoo.reprs import as_made
+from meshsimp_pymoo.settings import by_name, documentation, settings_of, taken
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import (
     ERROR,
@@ -77,6 +78,8 @@ class ThreadRunner:
         if n_threads is not None and n_threads < 1:
             raise ValueError(f"n_threads={n_threads} is no number of threads; give 1 or more")
         self.n_threads = n_threads or os.cpu_count() or 1
+
+    __repr__ = as_made
 
     def __call__(self, f: Any, X: npt.NDArray[Any]) -> list[dict[str, Any]]:
         """Return what ``f`` gives for every row of X, the rows evaluated together."""
@@ -152,6 +155,7 @@ class MeshProblem(ElementwiseProblem):
     array([3., 2.])
     """
 
+    @by_name(Options, Rules)
     def __init__(
         self,
         model: str | Path | trimesh.Trimesh | SourceMesh | OpenModel | Surface,
@@ -167,9 +171,10 @@ class MeshProblem(ElementwiseProblem):
         elementwise_runner: Callable[..., Any] | None = None,
         **kwargs: Any,
     ) -> None:
+        """Open the model; ``help(MeshProblem)`` says what each argument means."""
         self.options = taken(Options, options, kwargs)
-        by_name = [name for name, known in settings_of(Rules).items() if name in kwargs and not known.derived]
-        named = {name: kwargs.pop(name) for name in by_name}
+        own = [name for name, known in settings_of(Rules).items() if name in kwargs and not known.derived]
+        named = {name: kwargs.pop(name) for name in own}
         _refuse_unknown(kwargs)
         if max_triangles is not None and max_triangles < 1:
             raise ValueError(f"max_triangles={max_triangles} leaves no mesh; give 1 or more")
@@ -358,6 +363,19 @@ class MeshProblem(ElementwiseProblem):
         """
         return mesh_of(self.surface, self.simplify(kept).faces)
 
+    def __repr__(self) -> str:
+        surface = self.surface
+        limits = [(name, getattr(self, name), column) for name, column in CONSTRAINTS.items()]
+        said = [f"{self.objectives[column]} at most {limit:,g}" for _, limit, column in limits if limit is not None]
+        said.append(surface.rules.in_words)
+        if self.regions:
+            said.append(f"error in {self.regions:,} regions")
+        objectives = f"{', '.join(self.objectives[:-1])} and {self.objectives[-1]}"
+        return (
+            f"<{type(self).__name__} {self.model.name}: {self.n_var:,} vertices, minimise {objectives}; "
+            f"{', '.join(said)}>"
+        )
+
     def name(self) -> str:
         """Return the model's name."""
         return f"MeshProblem({self.model.name})"
@@ -394,21 +412,6 @@ def _doc() -> str:
 
 
 MeshProblem.__doc__ = _doc()
-
-
-def _signature() -> inspect.Signature:
-    """Return the signature of MeshProblem with the settings by name, for help() and editors."""
-    own = list(inspect.signature(MeshProblem.__init__).parameters.values())[1:]
-    by_name = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=getattr(kind(), name))
-        for kind in (Options, Rules)
-        for name, known in settings_of(kind).items()
-        if not known.derived
-    ]
-    return inspect.Signature([own[0], *by_name, *own[1:]])
-
-
-MeshProblem.__signature__ = _signature()
 
 
 def _refuse_unknown(kwargs: dict[str, Any]) -> None:

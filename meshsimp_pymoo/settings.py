@@ -18,7 +18,7 @@ import math
 import re
 import reprlib
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -309,6 +309,7 @@ class Setting(NamedTuple):
 
 
 Settings = TypeVar("Settings")
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def setting(default: Any, **facts: Any) -> Any:
@@ -373,14 +374,8 @@ def read_back(kind: type[Settings], stored: Any) -> Settings:
     return kind(**stored)
 
 
-def documented(kind: type[Settings]) -> type[Settings]:
-    """Put the settings of a class into its docstring, in place of the word SETTINGS."""
-    kind.__doc__ = (inspect.getdoc(kind) or "").replace("SETTINGS", documentation(kind, derived=True))
-    return kind
-
-
 def documentation(*kinds: type[Any], derived: bool = False) -> str:
-    """Return the settings of classes as the parameters of a docstring; ``derived``: those that follow, too."""
+    """Return the settings of classes as the parameters of a docstring; those that are derived only if asked for."""
     lines = []
     for kind in kinds:
         for name, known in settings_of(kind).items():
@@ -389,6 +384,35 @@ def documentation(*kinds: type[Any], derived: bool = False) -> str:
             lines.append(f"{name} : {known.accepts}")
             lines += _wrapped(known.doc, "    ")
     return "\n".join(lines)
+
+
+def documented(kind: type[Settings]) -> type[Settings]:
+    """Name the settings in the docstring of their class, where that says SETTINGS."""
+    kind.__doc__ = (inspect.getdoc(kind) or "").replace("SETTINGS", documentation(kind, derived=True))
+    return kind
+
+
+def by_name(*kinds: type[Any]) -> Callable[[Function], Function]:
+    """Let the signature of a function that takes settings of classes as ``**kwargs`` name them, with their defaults.
+
+    They come first of what is given by keyword; for ``help()``, editors and notebooks.
+    """
+    names = [
+        inspect.Parameter(item.name, inspect.Parameter.KEYWORD_ONLY, default=item.default, annotation=item.type)
+        for kind in kinds
+        for item in dataclasses.fields(kind)
+        if not item.metadata["setting"].derived
+    ]
+
+    def named(function: Function) -> Function:
+        given = inspect.signature(function)
+        own = list(given.parameters.values())
+        of_keywords = (inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD)
+        first = next(k for k, one in enumerate(own) if one.kind in of_keywords)
+        function.__signature__ = given.replace(parameters=[*own[:first], *names, *own[first:]])  # type: ignore[attr-defined]
+        return function
+
+    return named
 
 
 def _wrapped(text: str, indent: str) -> Iterable[str]:

@@ -137,6 +137,13 @@ class StoredFront:
     series: dict[str, FloatArray] = field(default_factory=dict)
     faces: tuple[IntArray | None, ...] = ()
 
+    def __repr__(self) -> str:
+        T, error = self.quality["triangles"], self.quality["error"]
+        return (
+            f"<StoredFront {self.folder}: {len(T):,} solutions, {T[0]:,} to {T[-1]:,} triangles, error {error[0]:.6g} "
+            f"to {error[-1]:.6g}>"
+        )
+
     @property
     def F(self) -> FloatArray:
         """The objectives, (S, 2): error [model units] and triangles."""

@@ -26,6 +26,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.errors import reason_of, way_to_install
+from meshsimp_pymoo.reprs import as_made
 
 __all__ = [
     "DaskEngine",
@@ -231,6 +232,8 @@ class Serial:
     jobs = 1
     shares_files = True
 
+    __repr__ = as_made
+
     def close(self) -> None:
         """Nothing is open."""
 
@@ -266,6 +269,8 @@ class Processes:
         self.jobs = jobs
         self._pool: ProcessPoolExecutor | None = None
         self._shared: Any = None
+
+    __repr__ = as_made
 
     def each(self, work: Work, tasks: Iterable[Any], shared: Any = None) -> Iterator[tuple[int, Any]]:
         """See :class:`Engine`."""
@@ -388,6 +393,9 @@ class DaskEngine:
                 f"{address}: no Dask scheduler answers ({reason_of(problem)}); start one, or use processes (--jobs)"
             ) from None
         self.jobs = max(1, sum(self.client.nthreads().values()))
+
+    def __repr__(self) -> str:
+        return f"<DaskEngine: {self.jobs} threads at {self.client.scheduler.address}>"
 
     def close(self) -> None:
         """Leave the cluster; it goes on running."""

@@ -46,6 +46,7 @@ from meshsimp_pymoo.indicators import (
     merged_front,
     non_dominated,
 )
+from meshsimp_pymoo.reprs import brief
 
 __all__ = [
     "COVERAGE_THRESHOLD",
@@ -77,6 +78,7 @@ TRADE_OFFS = {"ranges": "trade_off", "paper": "trade_off_paper"}
 """The rules of `trade_off`, and the kind of `Solution` that each gives."""
 
 
+@brief
 @dataclass(frozen=True)
 class OptimalFront:
     """The best solutions that all methods found together, and who found them.
@@ -97,6 +99,7 @@ class OptimalFront:
         return float(np.mean([any(name == method for name, _ in runs) for runs in self.found_by]))
 
 
+@brief
 @dataclass(frozen=True)
 class PairTable:
     """A binary indicator between the runs of every two methods.
@@ -120,6 +123,7 @@ class PairTable:
         return summarise(self.values[a, b].ravel())
 
 
+@brief
 @dataclass(frozen=True)
 class Scores:
     """The indicators of a method against the pseudo-optimal front.
@@ -148,6 +152,7 @@ class Scores:
     merged_cardinality: int
 
 
+@brief
 @dataclass(frozen=True)
 class Comparison:
     """Two methods compared by one indicator on one model.

@@ -41,6 +41,7 @@ from meshsimp_pymoo.comparison.meshlab import (
 )
 from meshsimp_pymoo.errors import ToolUnavailable, raise_if_memory, reason_of, way_to_install
 from meshsimp_pymoo.plane.faces import used_rows
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_MESH, Quality, quality_of
 from meshsimp_pymoo.surface.model import OpenModel
@@ -114,6 +115,7 @@ class Baseline:
     in_paper: bool = False
 
 
+@brief
 @dataclass(frozen=True)
 class BaselineMesh:
     """A mesh made by a tool, with its score.

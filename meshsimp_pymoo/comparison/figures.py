@@ -25,6 +25,7 @@ from meshsimp_pymoo.comparison.store import StoredRun, classic_mesh
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study, on_all_models, ranked
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plain_numbers, plot_error, plot_mesh
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.height import HeightSurface
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ FRONT, SIDE = (90.0, 0.0), (20.0, -60.0)
 COLOUR_END = 0.98
 
 
+@brief
 @dataclass(frozen=True)
 class _Shown:
     """A mesh to draw: upright points, faces, and deviation and cover of the original's vertices."""

@@ -41,6 +41,7 @@ from numpy.typing import ArrayLike
 from scipy import stats
 
 from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.reprs import brief
 
 __all__ = [
     "ALPHA",
@@ -125,6 +126,7 @@ class SignedRank:
     note: str = ""
 
 
+@brief
 @dataclass(frozen=True)
 class Friedman:
     """Friedman's test between several methods over several cases, and Nemenyi's after it.

@@ -35,6 +35,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, put_text, read_npz, stays_inside
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.model import OpenModel
 
 Arrays = Mapping[str, npt.NDArray[Any]]
@@ -55,6 +56,7 @@ class ExperimentWarning(UserWarning):
     """Results are usable, but the user should know: runs are missing, damaged, stale or were skipped."""
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class StoredRun:
     """A finished run.

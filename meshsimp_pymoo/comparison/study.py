@@ -64,6 +64,7 @@ from meshsimp_pymoo.comparison.statistics import Friedman, friedman, rank_sum
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
 from meshsimp_pymoo.indicators import hypervolume_ratio, merged_front, non_dominated
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -177,6 +178,7 @@ class Picked:
         return float(self.run.arrays[column][self.row])
 
 
+@brief
 @dataclass(eq=False)
 class Case:
     """All runs on one model at one budget under one scoring.

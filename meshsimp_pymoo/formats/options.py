@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import (
     LARGEST,
     Choice,
@@ -156,6 +157,8 @@ class Options:
 
     def __post_init__(self) -> None:
         settle(self)
+
+    __repr__ = as_made
 
     @property
     def steps(self) -> tuple[float, float] | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.formats.material import Material
+from meshsimp_pymoo.reprs import brief
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
@@ -26,6 +27,7 @@ def metres_of(unit: Any) -> float | None:
     return METRES.get(str(unit or "").lower())
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class OutMesh:
     """A mesh to be written; see :func:`write_mesh` for its parts."""

@@ -22,6 +22,7 @@ from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
 from meshsimp_pymoo.report.figures import UNCOVERED, original_mesh
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import StoredFront
@@ -55,6 +56,7 @@ RECORDED = ("algorithm", "seed", "generations", "evaluations", "moves", "interru
 MOST_LISTED = 100
 
 
+@brief
 @dataclass(frozen=True)
 class _Embedded:
     """What the page holds of the meshes.

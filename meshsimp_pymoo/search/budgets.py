@@ -14,6 +14,7 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.compiling.store import told_of_compiling
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import Whole
 
 End = TypeVar("End", bound=Termination)
@@ -47,12 +48,15 @@ class Moves(Termination):
     """
 
     def __init__(self, n_max_moves: int | np.integer[Any]) -> None:
+        """Say how many moves are made."""
         super().__init__()
         given = n_max_moves.item() if isinstance(n_max_moves, np.integer) else n_max_moves
         try:
             self.n_max_moves = Whole(1).from_plain(given)
         except ValueError as problem:
             raise ValueError(f"Moves({given!r}): {problem}") from None
+
+    __repr__ = as_made
 
     def _update(self, algorithm: Any) -> float:
         moves = moves_of(algorithm)

@@ -51,6 +51,7 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, read_npz
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.budgets import Moves, WholeGenerations
 
 __all__ = ["CheckpointError", "Checkpoints", "NotResumable", "Stored", "difference", "read_checkpoint", "restore"]
@@ -104,6 +105,7 @@ class NotResumable(TypeError):
     """An algorithm holds state that a checkpoint cannot carry."""
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Stored:
     """A checkpoint that was read back and is whole.

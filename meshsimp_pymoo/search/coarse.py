@@ -16,6 +16,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.local_search import relocate
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.grid_surface import GridSurface
@@ -35,6 +36,7 @@ MOVES = 80
 TEMPERATURE = 0.1
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Coarse:
     """What the search of one mesh needs to know.

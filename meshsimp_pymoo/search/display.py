@@ -98,6 +98,10 @@ class FrontOutput(Output):
         self._bounds: FloatArray = np.ones(2)
         self._errors: list[Column] = []
 
+    def __repr__(self) -> str:
+        sizes = "" if self.sizes is None else f" at {', '.join(f'{size:,}' for size in self.sizes)} triangles"
+        return f"<FrontOutput{sizes}: {len(self.rows)} generation{'s' * (len(self.rows) != 1)}>"
+
     def initialize(self, algorithm: Any) -> None:
         """Make the columns; both ends of the front are evaluated once, beside the budget.
 

@@ -25,6 +25,7 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.faces import canonical_faces, used_rows
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
@@ -84,6 +85,7 @@ SECONDS_A_TRIANGLE, SECONDS_A_SAMPLE, MEASURING = 2.5e-6, 1.2e-7, 1.5e-8
 BETWEEN = REGIONS
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class FreeFront:
     """A free mesh, and those of it that were measured while it was thinned.

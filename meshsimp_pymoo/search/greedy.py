@@ -67,6 +67,12 @@ class NestedFront:
     triangles: np.ndarray
     n_vertices: int
 
+    def __repr__(self) -> str:
+        return (
+            f"<NestedFront: {len(self):,} subsets of {self.n_vertices:,} vertices, {self.triangles[0]:,} to "
+            f"{self.triangles[-1]:,} triangles, error {self.error[0]:.6g} to {self.error[-1]:.6g}>"
+        )
+
     def __len__(self) -> int:
         return len(self.error)
 

@@ -33,6 +33,7 @@ from pymoo.util.optimum import filter_optimum
 
 from meshsimp_pymoo.arrays import spread
 from meshsimp_pymoo.errors import SearchWarning
+from meshsimp_pymoo.reprs import of_algorithm
 from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
 from meshsimp_pymoo.search.free import (
     ABREAST,
@@ -311,6 +312,10 @@ class MemeticSearch(GeneticAlgorithm):
         self.triangles = triangles
         self.free = free
         self.idle = 0
+
+    def __repr__(self) -> str:
+        sizes = "" if self.triangles is None else " of {:,} to {:,} triangles".format(*self.triangles)
+        return of_algorithm(self, f"{self.pop_size:,} rungs{sizes}", *["free meshes"] * (self.free is not None))
 
     @property
     def moves(self) -> int:

@@ -13,6 +13,7 @@ from pymoo.core.individual import Individual
 from pymoo.core.mating import Mating
 from pymoo.core.problem import Problem
 
+from meshsimp_pymoo.reprs import of_algorithm
 from meshsimp_pymoo.search.operators import NeighbourShift, PackedDuplicates, PinnedCorners, SubsetUniformCrossover
 from meshsimp_pymoo.search.operators.neighbour_shift import shift_drawn
 from meshsimp_pymoo.search.operators.subset_uniform_crossover import from_either
@@ -154,6 +155,10 @@ class TchebycheffMOEAD(MOEAD):
         # child begin, and the moves. Empty where operators are asked child by child.
         self.from_second: NDArray[np.uint8] = np.empty((0, 0), dtype=np.uint8)
         self.shifts: tuple[NDArray[np.int64], ...] = ()
+
+    def __repr__(self) -> str:
+        facts = [f"{len(self.ref_dirs):,} sub-problems", f"{self.n_neighbors} neighbours"]
+        return of_algorithm(self, *facts, *["objectives by their ranges"] * self.normalised)
 
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         if problem.has_constraints():

@@ -4,14 +4,29 @@ from __future__ import annotations
 
 from typing import Any
 
-from pymoo.algorithms.moo.nsga2 import NSGA2
-from pymoo.algorithms.moo.nsga3 import NSGA3
+from pymoo.algorithms.moo.nsga2 import NSGA2 as PymooNSGA2
+from pymoo.algorithms.moo.nsga3 import NSGA3 as PymooNSGA3
 from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.util.ref_dirs import get_reference_directions
 
+from meshsimp_pymoo.reprs import of_algorithm
 from meshsimp_pymoo.search.operators import OAX, PackedDuplicates, SubsetUniformCrossover
 from meshsimp_pymoo.search.paper import CROSSOVER_PROBABILITY, GENERATIONS, POP_SIZE, paper_operators
 from meshsimp_pymoo.search.selection import crowded_tournament, violation_tournament
+
+
+class NSGA2(PymooNSGA2):
+    """pymoo's NSGA-II, which says what it is made of."""
+
+    def __repr__(self) -> str:
+        return of_algorithm(self, f"{self.pop_size:,} individuals")
+
+
+class NSGA3(PymooNSGA3):
+    """pymoo's NSGA-III, which says what it is made of."""
+
+    def __repr__(self) -> str:
+        return of_algorithm(self, f"{self.pop_size:,} individuals", f"{len(self.ref_dirs):,} directions")
 
 
 def nsga2_v1(pop_size: int = POP_SIZE, **kwargs: Any) -> NSGA2:

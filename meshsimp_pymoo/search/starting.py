@@ -51,6 +51,9 @@ class Start:
     parts: tuple[NestedFront, ...]
     seconds: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<Start of {self.seconds:g} s: {', '.join(map(repr, self.parts))}>"
+
     @classmethod
     def of(cls, *fronts: NestedFront) -> Start:
         """Put fronts together that are not whole; of each, the meshes as large as those of a later one are left out."""

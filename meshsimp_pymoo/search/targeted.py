@@ -34,6 +34,7 @@ from pymoo.util.display.multi import MultiObjectiveOutput
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, spread
 from meshsimp_pymoo.errors import SearchWarning, meant
 from meshsimp_pymoo.indicators import non_dominated
+from meshsimp_pymoo.reprs import of_algorithm
 from meshsimp_pymoo.search.budgets import Moves, compiling_left_out, part_of, seconds_given, stopping
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
 from meshsimp_pymoo.search.local_search import relocate_all
@@ -41,7 +42,15 @@ from meshsimp_pymoo.search.memetic import measurable
 from meshsimp_pymoo.search.operators import PackedDuplicates
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start
-from meshsimp_pymoo.search.wishes import SEARCHED, USUAL_BUDGET, beside, checked_limits, measure_for, shortfall
+from meshsimp_pymoo.search.wishes import (
+    SEARCHED,
+    USUAL_BUDGET,
+    beside,
+    checked_limits,
+    in_words,
+    measure_for,
+    shortfall,
+)
 from meshsimp_pymoo.surface.surface import Surface, error_of, movable_ground
 from meshsimp_pymoo.workers import on_threads
 
@@ -120,6 +129,9 @@ class TargetedSearch(Algorithm):
         self.seconds = 0.0
         #: What there is of the first answer until it is measured.
         self.begun: list[Start] = []
+
+    def __repr__(self) -> str:
+        return of_algorithm(self, in_words(self.limits))
 
     @property
     def moves(self) -> int:

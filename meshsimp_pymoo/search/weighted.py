@@ -14,6 +14,7 @@ from pymoo.operators.selection.tournament import TournamentSelection
 from pymoo.util.display.column import Column
 from pymoo.util.display.output import Output
 
+from meshsimp_pymoo.reprs import in_short, of_algorithm
 from meshsimp_pymoo.search.operators import (
     OAX,
     HalfPlaneCrossover,
@@ -195,6 +196,7 @@ class WeightedSum(Problem):
     """
 
     def __init__(self, problem: Problem, w: float) -> None:
+        """Weigh the objectives of a problem."""
         if problem.n_obj != 2:
             raise ValueError(f"WeightedSum weighs two objectives, the problem has {problem.n_obj}")
         self.w = require_probability("w", w)
@@ -208,6 +210,9 @@ class WeightedSum(Problem):
             xu=problem.xu,
             vtype=problem.vtype,
         )
+
+    def __repr__(self) -> str:
+        return f"WeightedSum({in_short(self.problem)}, {self.w:g})"
 
     def __getattr__(self, name: str) -> Any:
         # All else – pinned, surface, regions, mesh(), whatever an operator reads – is the inner problem's. Not before
@@ -285,6 +290,9 @@ class WeightedGA(GA):
         super().__init__(pop_size, **(defaults | kwargs))
         # pymoo's constructor puts its default here whatever is passed.
         self.termination = kwargs.get("termination", ("n_gen", GENERATIONS))
+
+    def __repr__(self) -> str:
+        return of_algorithm(self, f"w = {self.w:g}", f"{self.pop_size:,} individuals")
 
     def score(self, pop: Any) -> NDArray[np.float64]:
         """Return the weighted sum of each individual, (n,)."""

@@ -12,8 +12,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.reprs import brief
 
 
+@brief
 @dataclass(frozen=True)
 class Edges:
     """Half-edges ``3 * face + i`` (corner i to i + 1), sorted so that those of one edge stand together.

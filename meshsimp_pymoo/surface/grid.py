@@ -16,6 +16,7 @@ from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.source.heights import Heights
 from meshsimp_pymoo.formats.source.missing import is_nodata
 from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.centroids import QUANTUM, Between, between_vertices
 from meshsimp_pymoo.surface.model import OpenModel
 
@@ -23,6 +24,7 @@ from meshsimp_pymoo.surface.model import OpenModel
 BAND_SAMPLES = 2_000_000
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Cells:
     """Where the centroids of a grid's triangles are, two a cell, south-west and north-east of its diagonal.
@@ -107,6 +109,10 @@ class HeightGrid:
         for name, values in (("x", (x / unit + 1.0) - 1.0), ("y", (y / unit + 1.0) - 1.0)):
             object.__setattr__(self, name, values)
         object.__setattr__(self, "unit", unit)
+
+    def __repr__(self) -> str:
+        rows, columns = self.shape
+        return f"<HeightGrid {self.name}: {rows:,} rows of {columns:,} samples>"
 
     @property
     def shape(self) -> tuple[int, int]:

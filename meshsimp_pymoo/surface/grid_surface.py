@@ -54,6 +54,9 @@ class GridSurface:
         self.model = grid
         self.rules = rules
 
+    def __repr__(self) -> str:
+        return f"<GridSurface of {self.model.name}: {self.n_vertices:,} samples; {self.rules.in_words}>"
+
     @property
     def n_vertices(self) -> int:
         """Number N of samples."""

@@ -68,6 +68,13 @@ class HeightSurface:
         self._books = Reserve(partial(make_live, self.n_vertices), is_small)
         self._free: dict[bool, FreeGround] = {}
 
+    def __repr__(self) -> str:
+        rules = self.rules
+        return (
+            f"<HeightSurface of {self.model.name}: {self.n_vertices:,} vertices, {int(self.pinned.sum()):,} pinned, "
+            f"{rules.measure} measured; {rules.in_words}>"
+        )
+
     @property
     def n_vertices(self) -> int:
         """Number N of original vertices."""

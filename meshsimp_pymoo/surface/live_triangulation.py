@@ -61,6 +61,12 @@ class LiveTriangulation:
         self._group = np.cumsum(np.r_[True, (xy[1:] != xy[:-1]).any(axis=1)]) - 1 if self._has_twins else None
         build(self.ground, self.live, surface.sites(self._kept), model.name)
 
+    def __repr__(self) -> str:
+        return (
+            f"<LiveTriangulation of {self.model.name}: {int(self._kept.sum()):,} of {len(self._kept):,} vertices kept, "
+            f"{self.triangles:,} triangles, {self.surface.rules.measure} {self.error:.6g}>"
+        )
+
     @property
     def kept(self) -> BoolArray:
         """The subset, as a new bool array (N,)."""

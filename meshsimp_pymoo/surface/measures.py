@@ -184,6 +184,14 @@ class Quality:
         meaning="share whose least angle is below 5 degrees",
     )
 
+    @property
+    def in_words(self) -> str:
+        """What a mesh is told apart by."""
+        return (
+            f"{self.triangles:,} triangle{'s' * (self.triangles != 1)}, error {self.error:.6g}, "
+            f"mean {self.mean_error:.4g}, max {self.max_error:.4g}"
+        )
+
 
 MEASURES: dict[str, Measure] = {item.name: item.metadata["measure"] for item in fields(Quality)}
 # Those that can be minimised beside the triangles.

@@ -23,6 +23,7 @@ from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
 from meshsimp_pymoo.surface.orient import Up, open_faces, seen_upright, upright_rotation
 from meshsimp_pymoo.surface.places import below_others, feet, highest, warn_of_places
+from meshsimp_pymoo.surface.units import length_unit
 
 # What weights may add up to: their products with squares of deviations are numbers then.
 MOST_WEIGHT = 1e100
@@ -109,6 +110,14 @@ class OpenModel:
     found: dict[str, int] = field(default_factory=dict, repr=False)
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     material: Material | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        weighted = "" if self.weights is None else ", weighted"
+        size = " x ".join(f"{side:.4g}" for side in np.ptp(self.points, axis=0))
+        return (
+            f"<OpenModel {self.name}: {self.n_vertices:,} vertices, {len(self.faces):,} triangles{weighted}, "
+            f"{size} {length_unit(self.georeference)}>"
+        )
 
     @property
     def n_vertices(self) -> int:

@@ -35,6 +35,9 @@ class Nested:
     slope: FloatArray
     moved: tuple[IntArray | None, ...]
 
+    def __repr__(self) -> str:
+        return f"<Nested: {len(self):,} subsets of {len(self.rows):,} rows>"
+
     def __len__(self) -> int:
         return len(self.slope)
 
@@ -98,6 +101,9 @@ class Chromosomes:
     def __init__(self, nested: Nested, model: Any) -> None:
         self._nested = nested
         self._model = model
+
+    def __repr__(self) -> str:
+        return "<Chromosomes: {:,} subsets of {:,} vertices>".format(*self.shape)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import Choice, Pins, Weights, documented, setting, settle
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 
@@ -80,6 +81,18 @@ class Rules:
 
     def __post_init__(self) -> None:
         settle(self)
+
+    __repr__ = as_made
+
+    @property
+    def in_words(self) -> str:
+        """What people are told beside a model: what of it differs from the usual, and where the error counts."""
+        said = [f"footprint {self.footprint}", f"outside {self.outside}"]
+        if self.pin is not None:
+            said.append(f"pinned {self.pin}" if isinstance(self.pin, str) else "some vertices pinned")
+        if self.weights is not None:
+            said.append(f"weighted by {self.weights}" if isinstance(self.weights, str) else "weighted")
+        return ", ".join(said)
 
 
 DEFAULT = Rules()

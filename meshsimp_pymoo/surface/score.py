@@ -11,6 +11,7 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.faces import least_angles
 from meshsimp_pymoo.plane.hilbert import hilbert_keys
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.measures import (
@@ -78,6 +79,7 @@ def mesh_deviation(
     return deviation, covered
 
 
+@brief
 @dataclass(frozen=True)
 class MeshSamples:
     """What a mesh's heights do to the d_p of each original vertex, with the mesh fixed in the plane.

@@ -20,6 +20,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, spread
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.plane.faces import canonical_faces, is_canonical, used_rows
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_MESH, Quality
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import on_threads
@@ -50,6 +51,9 @@ class Simplified:
     deviation: FloatArray
     covered: BoolArray
 
+    def __repr__(self) -> str:
+        return f"<Simplified: {self.quality.in_words}>"
+
 
 @dataclass(frozen=True, eq=False)
 class FreeMesh:
@@ -72,6 +76,9 @@ class FreeMesh:
     faces: IntArray
     quality: Quality
 
+    def __repr__(self) -> str:
+        return f"<FreeMesh: {self.quality.in_words}>"
+
 
 @dataclass(frozen=True)
 class Scored:
@@ -90,6 +97,9 @@ class Scored:
     quality: Quality
     deviation: FloatArray
     covered: BoolArray
+
+    def __repr__(self) -> str:
+        return f"<Scored: {self.quality.in_words}>"
 
 
 @dataclass(frozen=True)
@@ -119,7 +129,14 @@ class Refitted:
     before: float
     bound: float
 
+    def __repr__(self) -> str:
+        return (
+            f"<Refitted: {len(self.faces):,} triangles, error {self.error:.6g}, {self.before:.6g} before, "
+            f"at least {self.bound:.6g}>"
+        )
 
+
+@brief
 @dataclass(frozen=True)
 class View:
     """How pictures and the page look at a surface, whose ``points`` they draw with z to the viewer.

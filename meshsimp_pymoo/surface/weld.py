@@ -18,6 +18,7 @@ from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, height_on, locate, triangulate_once
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.centroids import Between
 from meshsimp_pymoo.surface.evaluate import measure_between
 from meshsimp_pymoo.surface.grid import Cells, HeightGrid
@@ -36,6 +37,7 @@ from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.workers import on_threads
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class WeldedMesh:
     """A triangulated subset of a grid.

@@ -24,6 +24,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import thin
 from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -34,6 +35,7 @@ from meshsimp_pymoo.surface.rules import Rules
 FORESIGHT = 3.0
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Tile:
     """What a tile's task needs to know: everything, so that it can be done on any machine.

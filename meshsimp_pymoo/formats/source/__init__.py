@@ -81,6 +81,9 @@ class SourceMesh:
                 raise ValueError(f"rows has {len(self.rows)} entries for {len(self.points)} points")
             object.__setattr__(self, "rows", np.arange(len(self.points)))
 
+    def __repr__(self) -> str:
+        return f"<SourceMesh {self.name}: {self.sort} of {len(self.points):,} vertices, {len(self.faces):,} faces>"
+
     @property
     def scale(self) -> FloatArray:
         """What the coordinates are multiplied by before anything is measured, (3,): 1 unless they are degrees."""

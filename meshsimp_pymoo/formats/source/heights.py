@@ -15,11 +15,13 @@ from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
 from meshsimp_pymoo.formats.source.missing import is_nodata, warn_of_nodata
 from meshsimp_pymoo.memory import check_free
+from meshsimp_pymoo.reprs import brief
 
 # What a sample takes while a mesh is made of it: measured, rounded down.
 MESH_SAMPLE_BYTES = 300
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Grid:
     """A whole height grid in memory, and where its rows and columns lie.
@@ -309,6 +311,7 @@ class Heights(Protocol):
     def __getitem__(self, key: Any) -> Any: ...
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class PlacedHeights:
     """A part of a height grid that is read by windows, and where it lies.

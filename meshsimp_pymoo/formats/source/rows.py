@@ -12,6 +12,7 @@ from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.numbers import parse_numbers, whole
+from meshsimp_pymoo.reprs import brief
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class PlyElement:
     properties: list[PlyProperty]
 
 
+@brief
 @dataclass(frozen=True)
 class Ragged:
     """A list property whose lists differ in length: all values in a row, and the length of each list."""

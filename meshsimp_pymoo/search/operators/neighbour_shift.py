@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 from pymoo.core.variable import get
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool, require_probability, surface_of
 
 # Rows are mutated in blocks of about this many genes, so that even high rates need little memory beside X.
@@ -58,6 +59,8 @@ class NeighbourShift(Mutation):
             require_probability("prob_var", prob_var)
         super().__init__(prob=require_probability("prob", prob), prob_var=prob_var)
         self.along = along
+
+    __repr__ = as_made
 
     def _do(
         self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pymoo.core.sampling import Sampling
 
 from meshsimp_pymoo.arrays import IntArray
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.budgets import seconds_given
 from meshsimp_pymoo.search.operators.random_subset import RandomSubset
 from meshsimp_pymoo.search.requirements import pinned_vertices, require_probability, surface_of
@@ -37,11 +38,14 @@ class NestedSubsets(Sampling):
     """
 
     def __init__(self, triangles: tuple[int, int] | None = None, random_share: float = 0.0) -> None:
+        """Say which sizes are sampled."""
         super().__init__()
         if triangles is not None and not 1 <= triangles[0] <= triangles[1]:
             raise ValueError(f"triangles={triangles} is no range; give (lowest, highest), from 1 upwards")
         self.triangles = triangles
         self.random_share = require_probability("random_share", random_share)
+
+    __repr__ = as_made
 
     def _do(
         self, problem: Any, n_samples: int, *args: Any, random_state: np.random.Generator, **kwargs: Any

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.duplicate import DuplicateElimination
 
+from meshsimp_pymoo.reprs import as_made
+
 # Chromosomes are packed in blocks of about this many genes, so that long ones are not all stacked at once.
 GENES_PER_BLOCK = 1 << 24
 
@@ -43,6 +45,8 @@ class PackedDuplicates(DuplicateElimination):
 
     def __init__(self) -> None:
         super().__init__()
+
+    __repr__ = as_made
 
     def _do(self, pop: Any, other: Any, is_duplicate: NDArray[np.bool_]) -> NDArray[np.bool_]:
         if other is not None:

@@ -13,6 +13,7 @@ from pymoo.core.population import Population
 from pymoo.core.variable import get
 from pymoo.util import default_random_state
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool, require_probability, surface_of
 
@@ -29,6 +30,8 @@ class PairCrossover(Crossover):
         if n_offsprings not in (1, 2):
             raise ValueError(f"n_offsprings = {n_offsprings}: a pair of parents has 1 or 2 children here")
         super().__init__(2, n_offsprings, prob=require_probability("prob", prob))
+
+    __repr__ = as_made
 
     @default_random_state
     def do(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.repair import Repair
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.requirements import pinned_vertices, require_bool
 
 
@@ -22,6 +23,8 @@ class PinnedCorners(Repair):
     TypeError
         For a problem without ``pinned``, or chromosomes that are not bool.
     """
+
+    __repr__ = as_made
 
     def _do(self, problem: Any, X: NDArray[np.bool_], **kwargs: Any) -> NDArray[np.bool_]:
         require_bool(X, self)

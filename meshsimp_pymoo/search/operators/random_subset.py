@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.sampling import Sampling
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.requirements import pinned_vertices
 
 # A number of kept vertices, or a share of all of them.
@@ -53,8 +54,11 @@ class RandomSubset(Sampling):
     """
 
     def __init__(self, size: Size | Sequence[Size] | None = None) -> None:
+        """Say how many vertices the subsets keep."""
         super().__init__()
         self.size = _checked(size)
+
+    __repr__ = as_made
 
     def _do(
         self, problem: Any, n_samples: int, *args: Any, random_state: np.random.Generator, **kwargs: Any

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.operators.mesh_mutation import require_mesh
 from meshsimp_pymoo.search.requirements import require_probability
@@ -55,6 +56,8 @@ class Relocation(Mutation):
         self.moves_per_vertex = moves_per_vertex
         self.max_moves = max_moves
         self.temperature = temperature
+
+    __repr__ = as_made
 
     def _do(
         self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.mutation import Mutation
 
+from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.search.local_search import relocate_all
 from meshsimp_pymoo.search.operators.mesh_mutation import require_mesh
 from meshsimp_pymoo.search.requirements import require_probability
@@ -40,6 +41,8 @@ class SizeStep(Mutation):
         if not step >= 0:
             raise ValueError(f"step = {step} is no number of at least 0")
         self.step = step
+
+    __repr__ = as_made
 
     def _do(
         self, problem: Any, X: NDArray[np.bool_], *args: Any, random_state: np.random.Generator, **kwargs: Any
