@@ -79,6 +79,7 @@ def test_pypi_shows_the_readme_with_links_that_work_there():
             assert tag == f"v{PROJECT['version']}"
             assert how == ("raw" if path.endswith((".png", ".svg", ".jpg")) else "blob")
             assert (ROOT / path.partition("#")[0]).exists(), path
+
     # nothing but targets changed, code least of all
     def blocks(text: str) -> list[str]:
         return re.findall(r"^```.*?^```$", text, re.M | re.S)

@@ -477,7 +477,10 @@ def test_a_state_of_something_else_is_refused(whole_file, tmp_path, problems):
     path.write_bytes(whole_file)
     stored = read_checkpoint(path)
     others = [
-        (set_up("moead", problems["usual"]), "algorithm is a pymoo.*NSGA2, not a meshsimp_pymoo.*TchebycheffMOEAD"),
+        (
+            set_up("moead", problems["usual"]),
+            "algorithm is a meshsimp_pymoo.*NSGA2, not a meshsimp_pymoo.*TchebycheffMOEAD",
+        ),
         (set_up("nsga2_v2", problems["usual"]), "OAX"),
         (set_up("nsga2_v1", MeshProblem("roof:5")), r"an individual has \(90,\) variables, the problem 25"),
     ]
