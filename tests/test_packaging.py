@@ -34,7 +34,8 @@ def test_the_version_is_the_same_everywhere():
     assert yaml_of("CITATION.cff")["version"] == version
     assert yaml_of("conda/recipe.yaml")["context"]["version"] == version
     newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
-    assert newest and newest[1] == version
+    assert newest is not None
+    assert newest[1] == version
     assert metadata.version("meshsimp-pymoo") == version, "install the package again"
 
 
