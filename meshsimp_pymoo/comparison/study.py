@@ -557,8 +557,8 @@ class Study:
         if item is None:
             return "baseline"
         parts = [operator["name"] for operator in item["description"].get("operators", {}).values()]
-        paths = [path for path in (item["class"], *parts) if path and "." in path]
-        if any(not path.startswith(("pymoo.", "meshsimp_pymoo.")) for path in paths):
+        paths = [*([] if item["preset"] else [item["class"]]), *(name for name in parts if "." in name)]
+        if not all(path.startswith(("pymoo.", "meshsimp_pymoo.")) for path in paths):
             return "own"
         if not item["preset"]:
             return "pymoo"
