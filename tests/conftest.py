@@ -10,8 +10,9 @@ import pytest
 from browser import launched, playwright_engine
 from counts import SLOW
 from hypothesis import settings
-from sketching import sketch
+from sketching import sketch, sketch_into
 
+from meshsimp_pymoo.comparison import report
 from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
 
@@ -61,7 +62,7 @@ def _compiled() -> None:
         warming.finish()
 
 
-FRONT_FIGURE = figures.front_figure
+FRONT_FIGURE, SAVE = figures.front_figure, report._save
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +70,7 @@ def sketched():
     """Let the commands of a module draw sketches, a tenth of the work, but for tests that ask for `drawn`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "front_figure", sketch)
+        patch.setattr(report, "_save", sketch_into)
         yield
 
 
@@ -76,6 +78,7 @@ def sketched():
 def drawn(sketched, monkeypatch):
     """Let a test of such a module draw its pictures."""
     monkeypatch.setattr(figures, "front_figure", FRONT_FIGURE)
+    monkeypatch.setattr(report, "_save", SAVE)
 
 
 @pytest.fixture(scope="session")
@@ -112,6 +115,6 @@ def browser(engine):
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Let the tests that can go on for long be told how long."""
-    parser.addoption("--fuzz-cases", type=int, default=200, help="damaged inputs of each kind (default: %(default)s)")
+    parser.addoption("--fuzz-cases", type=int, default=100, help="damaged inputs of each kind (default: %(default)s)")
     parser.addoption("--fuzz-seed", type=int, default=1, help="of the damage (default: %(default)s)")
     parser.addoption("--soak", type=int, default=10, help="simplifications in one process (default: %(default)s)")

@@ -29,6 +29,7 @@ from meshsimp_pymoo.storage import CHECKPOINT, read_front
 
 PROGRAM = (sys.executable, "-m", "meshsimp_pymoo")
 QUICK = ("--generations", "2", "--population", "8", "--algorithm", "nsga2_v1")
+pytestmark = pytest.mark.usefixtures("sketched")
 needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="file names, streams and signals are others there")
 
 
@@ -152,6 +153,7 @@ def test_results_do_not_depend_on_the_standard_streams(tmp_path, streams, code):
 # ------------------------------------------------------------------------------------------------ a bare container
 
 
+@pytest.mark.usefixtures("drawn")
 def test_in_a_container_where_nothing_but_the_results_folder_can_be_written(tmp_path, roof):
     """All is read-only but one folder: no home, no temporary files, no cache; closed streams; the C locale."""
     work = tmp_path / "work"
@@ -321,7 +323,7 @@ cli.program()
 )
 def test_a_signal_ends_a_search_with_the_front_so_far(tmp_path, number, code):
     command = [*PROGRAM, "simplify", "jacksboro:20", "--time", "10min", "--threads", "1", "--json"]
-    command += ["--checkpoint", "0.2s", "-o", str(tmp_path / "out")]
+    command += ["--checkpoint", "0.2s", "--no-page", "-o", str(tmp_path / "out")]
     deadline = time.monotonic() + 60
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         while not (tmp_path / "out" / CHECKPOINT).exists():

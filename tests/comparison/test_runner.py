@@ -24,6 +24,7 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.population import Population
 from pymoo.optimize import minimize
 from samples import freed
+from sketching import sketch_into
 
 from meshsimp_pymoo.cli import main, terminal
 from meshsimp_pymoo.comparison import analysis, baselines, report, runner
@@ -608,7 +609,7 @@ def die(task: object, shared: object) -> None:
 
 
 def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_skipped(
-    config, tmp_path, monkeypatch, reference
+    config, stored, monkeypatch, reference
 ):
     def unavailable() -> None:
         raise ToolUnavailable("it needs the packages libgl1 and libopengl0")
@@ -616,10 +617,11 @@ def test_without_pymeshlab_everything_else_is_done_and_the_rows_are_named_as_ski
     there = meshlab_available()
     monkeypatch.setattr(baselines, "load_pymeshlab", unavailable)
     config.write_text(CONFIG + "baselines: meshlab\n", encoding="utf-8")
-    out = tmp_path / "out"
+    out = stored
+    record_of(out, problem="Peaks", algorithm="N2", seed=3).unlink()
     with pytest.warns(ExperimentWarning, match=r"skipped: Face / quadric_collapse.*Peaks / .*libgl1 and libopengl0"):
         done = run_experiment(config, out)
-    assert done.finished == RUNS
+    assert (done.finished, done.reused) == (1, RUNS - 1)
     assert "libopengl0" in done.skipped[0]
     write_tables(Study(out))
     assert "libopengl0" in (out / "findings.md").read_text()
@@ -813,6 +815,8 @@ def test_the_shell_runs_the_quick_configuration_shortened_and_reports_it_again(t
         text = text.replace(long, short)
     (tmp_path / "quick.yaml").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
+    # each figure is made; how they look on paper is shown in test_study_figures.py
+    monkeypatch.setattr(report, "_save", lambda draw, path: sketch_into(draw(), path))
     assert main(["run", "quick.yaml", "--jobs", "1"]) == 0
     out = tmp_path / "quick_results"
     said = capsys.readouterr()
@@ -901,7 +905,8 @@ def test_runs_follow_the_measure_and_the_weights_of_their_problem_and_the_findin
     assert "attribute *importance*" in said
 
 
-def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp_path):
+def test_weights_may_be_numbers_in_the_configuration_and_the_findings_say_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "_save", sketch_into)
     numbers = [round(0.1 * row, 1) for row in range(25)]
     (tmp_path / "study.yaml").write_text(
         f"problems: [{{model: 'roof:5', weights: {numbers}}}, {{name: square, model: 'roof:5', weights: "

@@ -1,7 +1,7 @@
 """Whatever is in a file, reading it ends in a result or in one line: no traceback, no hang, no more than 1 GiB.
 
-The usual suite tries some hundred cases of each kind; ``pytest tests/fuzz --fuzz-cases 20000`` tries many, ``-m slow``
-ten thousand of the small files that expand.
+The usual suite tries a hundred cases of each kind; ``pytest tests/fuzz --fuzz-cases 20000`` tries many, ``-m slow`` two
+thousand, and ten thousand of the small files that expand.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from counts import SLOW
 
 sys.path.insert(0, str(Path(__file__).parent))
 import expanding
@@ -42,8 +43,10 @@ def test_every_damaged_input_ends_in_a_result_or_in_one_line(kind, tmp_path, req
 
 
 @pytest.mark.slow
-def test_small_files_that_expand_end_in_a_result_or_in_one_line(tmp_path, request):
-    check_cases("expanding", EXPANDING, tmp_path, request)
+@pytest.mark.parametrize("kind", mutations.KINDS)
+def test_many_damaged_inputs_end_in_a_result_or_in_one_line(kind, tmp_path, request):
+    cases = EXPANDING if kind == "expanding" else SLOW * request.config.getoption("--fuzz-cases")
+    check_cases(kind, cases, tmp_path, request)
 
 
 def check_cases(kind: str, cases: int, tmp_path: Path, request: pytest.FixtureRequest) -> None:
