@@ -317,6 +317,15 @@ def test_moving_the_vertices_lowers_the_error_and_keeps_the_corners_and_the_size
     assert measure(GRID, moved).error < 0.97 * np.interp(200, whole.triangles, whole.error)
 
 
+def test_vertices_are_moved_on_the_grid_that_they_are_of():
+    hills = np.random.default_rng(1).normal(size=(2, 9, 30))
+    one, other = (CoarseGrid(grid).task(subset(grid, 0.1, 1), 30) for grid in map(open_grid, hills))
+    assert one.kept.tolist() == other.kept.tolist()
+    moved = move(one)
+    assert not np.array_equal(move(other), moved)
+    assert np.array_equal(move(one), moved)
+
+
 def test_vertices_are_moved_only_as_far_as_the_time_goes(front):
     store = InMemory()
     with pytest.warns(SearchWarning) as said:
