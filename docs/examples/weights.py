@@ -17,7 +17,7 @@ weights = np.empty(len(x))  # one for each row of the file
 weights[plain.model.source_index] = np.exp(-(((x - spot[0]) ** 2 + (y - spot[1]) ** 2) / 6000**2)) + 0.01
 weighted = MeshProblem("jacksboro:5", weights=weights)
 
-figure, axes = plt.subplots(1, 2, figsize=(9, 5), layout="constrained")
+figure, axes = plt.subplots(1, 2, figsize=(9, 5.2), layout="constrained")
 for ax, problem, title in zip(axes, (plain, weighted), ("all vertices count alike", "near the dot"), strict=True):
     mesh = simplify_to(problem, triangles=800, moves=600_000)
     mesh.plot(ax)
