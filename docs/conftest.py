@@ -121,8 +121,13 @@ def end(names: dict[str, Any]) -> None:
     shutil.rmtree(names["folder"])
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep each page in one process."""
+    config.option.dist = "loadfile"
+
+
 def pytest_xdist_auto_num_workers() -> int:
-    """Let pages run side by side; ``--dist loadfile`` keeps each in one process."""
+    """Let pages run side by side."""
     return 2
 
 
