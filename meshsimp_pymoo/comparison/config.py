@@ -36,6 +36,7 @@ import os
 import re
 import sys
 import textwrap
+import traceback
 import typing
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -135,6 +136,8 @@ TRIAL_VERTICES = 81
 TRIAL_GENERATIONS = 3
 # What a trial finds out does not depend on a large population; its time does.
 TRIAL_POPULATION = 100
+# Packages whose lines tell a reader of their own operators nothing.
+NOT_THEIRS = sys.stdlib_module_names | {"meshsimp_pymoo", "moocore", "numba", "numpy", "pymoo", "scipy"}
 # Settings of an algorithm that do not change what it finds.
 WITHOUT_EFFECT = {"output", "display", "callback", "verbose", "termination", "seed", "evaluator"}
 
@@ -167,7 +170,15 @@ def _blaming(*at: str | int, what: str = "") -> Iterator[None]:
     except Exception as problem:
         name = "" if isinstance(problem, ValueError) else f"{type(problem).__name__}: "
         reason = " ".join(str(problem).split()) or type(problem).__name__
-        raise _Mistake(f"{what}{what and ': '}{name}{reason}", *at) from problem
+        raise _Mistake(f"{what}{what and ': '}{name}{reason}{_line_of(problem)}", *at) from problem
+
+
+def _line_of(problem: Exception) -> str:
+    """Return the line of the reader's own code that an exception comes from; nothing where it is none of theirs."""
+    for frame, line in reversed(list(traceback.walk_tb(problem.__traceback__))):
+        if str(frame.f_globals.get("__name__", "")).partition(".")[0] not in NOT_THEIRS:
+            return f" ({Path(frame.f_code.co_filename).name}, line {line})"
+    return ""
 
 
 def _text(value: Any) -> str:

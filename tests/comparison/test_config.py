@@ -266,6 +266,16 @@ def test_an_operator_of_the_readers_is_another_one_once_its_module_is_changed(tm
     assert first == second
 
 
+def test_what_a_readers_operator_raises_is_said_with_its_line(tmp_path, monkeypatch):
+    text = "from pymoo.core.mutation import Mutation\nclass Wrong(Mutation):\n    def _do(self, problem, X, **k):\n"
+    text += "        X = X.copy()\n        return X[:, problem.vertices]\n"
+    (tmp_path / "readers_wrong.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    config = changed(tmp_path, algorithms="[{preset: nsga2_v1, operators: {mutation: readers_wrong.Wrong}}]")
+    with pytest.raises(ConfigError, match=r"no attribute 'vertices'.* \(readers_wrong\.py, line 5\)"):
+        read_experiment_file(config)
+
+
 def test_the_name_of_a_model_file_does_not_change_what_the_problem_is(tmp_path):
     source = load("pyramid:9")
     for name in ("one.ply", "other.ply"):
