@@ -12,7 +12,6 @@ from counts import SLOW
 from hypothesis import settings
 from sketching import sketch, sketch_into
 
-from meshsimp_pymoo.comparison import report
 from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
 
@@ -62,23 +61,23 @@ def _compiled() -> None:
         warming.finish()
 
 
-FRONT_FIGURE, SAVE = figures.front_figure, report._save
-
-
 @pytest.fixture(scope="module")
 def sketched():
     """Let the commands of a module draw sketches, a tenth of the work, but for tests that ask for `drawn`."""
+    from meshsimp_pymoo.comparison import report
+
+    pictures = [(figures, "front_figure", figures.front_figure), (report, "_save", report._save)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "front_figure", sketch)
         patch.setattr(report, "_save", sketch_into)
-        yield
+        yield pictures
 
 
 @pytest.fixture
 def drawn(sketched, monkeypatch):
     """Let a test of such a module draw its pictures."""
-    monkeypatch.setattr(figures, "front_figure", FRONT_FIGURE)
-    monkeypatch.setattr(report, "_save", SAVE)
+    for place, name, draw in sketched:
+        monkeypatch.setattr(place, name, draw)
 
 
 @pytest.fixture(scope="session")
