@@ -33,7 +33,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 collect_ignore_glob = ["*.py", "_build/*", "gallery/*"]
 # Commands that are shown, not run, by how they begin: they need what a test machine lacks, or change what is installed.
-SHOWN = ("apt-get", "conda", "docker", "git clone", "hatch", "pip", "pixi", "python -m venv", "source", "uv", ".venv")
+SHOWN = ("conda", "docker", "git clone", "pip", "python -m venv", "source")
 # What a machine says that runs a command for the first time, or slowly.
 ONCE = re.compile(r"^(meshsimp: .*\d% after |(meshsimp: compiling|compiled) once for this machine).*\n", re.MULTILINE)
 SAME = doctest.OutputChecker()

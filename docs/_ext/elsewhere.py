@@ -83,7 +83,7 @@ TYPES = {
 
 @cache
 def homes() -> dict[str, str]:
-    """Return what is public by where it is at home, as docstrings inside the package spell it, and by its bare name."""
+    """Return what is public by where it is at home, as docstrings inside the package spell it."""
     found = {}
     for name in meshsimp_pymoo.__all__:
         thing = getattr(meshsimp_pymoo, name)
@@ -95,8 +95,8 @@ def find(app: Any, env: Any, node: Any, inside: Any) -> nodes.reference | None:
     """Return a link for a name that no page of ours has as it is spelled."""
     target = node.get("reftarget", "")
     for start in _beginnings(target):
-        known = homes().get(start) or TYPES.get(start, "") if "." not in start else homes().get(start)
-        if known and known.startswith("meshsimp_pymoo."):
+        known = homes().get(start) or ("" if "." in start else TYPES.get(start, ""))
+        if known.startswith("meshsimp_pymoo."):
             spelled = known + target[len(start) :]
             domain = env.get_domain("py")
             return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", spelled, node, inside)

@@ -11,11 +11,13 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import Any
 
 from docutils import nodes
 from pygments.lexers.special import TextLexer
 from sphinx.util.docutils import SphinxDirective
+
+from meshsimp_pymoo import Options, Rules
 
 Rows = Iterable[Sequence[str]]
 TABLES: dict[str, tuple[Sequence[str], Callable[[], Rows]]] = {}
@@ -107,7 +109,8 @@ def about(kind: Any) -> str:
     return from_docstring(re.split("[:,]", documented)[0])
 
 
-LISTS: dict[str, Callable[[], Iterable[str]]] = {}
+# Lists in place of tables, by the class whose settings they are.
+LISTS = {"options": Options, "rules": Rules}
 
 
 def settings(kind: type[Any]) -> Iterator[str]:
@@ -124,23 +127,6 @@ def settings(kind: type[Any]) -> Iterator[str]:
         takes = from_docstring(known.accepts.removesuffix(", optional"))
         default = code(repr(defaults_of(kind)[name]))
         yield f"`{name}`, {in_shell}\n: {from_docstring(known.doc)}{only}\n\n  Takes {takes}; default {default}."
-
-
-def listed_options() -> Iterable[str]:
-    """Return the settings of how a model is read."""
-    from meshsimp_pymoo import Options
-
-    return settings(Options)
-
-
-def listed_rules() -> Iterable[str]:
-    """Return the settings of what counts."""
-    from meshsimp_pymoo import Rules
-
-    return settings(Rules)
-
-
-LISTS |= {"options": listed_options, "rules": listed_rules}
 
 
 @table("models", "name", "parameters and defaults", "what it is")
@@ -293,7 +279,7 @@ class TableOf(SphinxDirective):
         """Return the table."""
         (name,) = self.arguments
         if name in LISTS:
-            return parsed(self, "\n\n".join(LISTS[name]()))
+            return parsed(self, "\n\n".join(settings(LISTS[name])))
         if name not in TABLES:
             raise self.error(f"no table {name!r}; there are {', '.join((*TABLES, *LISTS))}")
         header, rows = TABLES[name]
@@ -302,10 +288,9 @@ class TableOf(SphinxDirective):
 
 
 class OptionsOf(SphinxDirective):
-    """What a command of the shell does, its options and examples; without a name, those of the command itself."""
+    """What a command of the shell does, its options and examples."""
 
-    optional_arguments = 1
-    option_spec: ClassVar[dict[str, Any]] = {}
+    required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         """Return the description."""
@@ -324,12 +309,11 @@ def cell(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-def command_parser(*name: str) -> Any:
-    """Return the parser of a command, or of the whole command line, with all arguments."""
+def command_parser(name: str) -> Any:
+    """Return the parser of a command, with all arguments."""
     from meshsimp_pymoo.cli.parser import make_parser
 
-    parser = make_parser()
-    found = commands_of(parser)[name[0]] if name else parser
+    found = commands_of(make_parser())[name]
     found.fill()
     return found
 
@@ -348,10 +332,9 @@ def described(parser: Any) -> Iterator[str]:
     yield from_help(parser.description)
     for group in parser._action_groups:
         known = [action for action in group._group_actions if action in shown and not _is_help(action)]
-        known = [action for action in known if not isinstance(action, argparse._SubParsersAction)]
         if not known:
             continue
-        if group.title not in ("options", "positional arguments", "commands"):
+        if group.title not in ("options", "positional arguments"):
             yield f"```{{rubric}} {from_help(group.title[0].upper() + group.title[1:])}\n```"
         if group.description:
             yield from_help(group.description)
@@ -369,8 +352,7 @@ def described(parser: Any) -> Iterator[str]:
 
 
 def _plain_name(action: argparse.Action) -> str:
-    name = str(action.metavar or action.dest).upper() if not action.choices else str(action.metavar or action.dest)
-    name = name if action.metavar is None else str(action.metavar)
+    name = str(action.metavar or (action.dest if action.choices else action.dest.upper()))
     return f"[{name}]" if action.nargs in ("?", "*") else name
 
 
