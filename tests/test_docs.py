@@ -39,12 +39,7 @@ def test_every_file_of_the_repository_that_a_page_names_exists():
     named = {
         (page.name, path)
         for page in PAGES
-        for path in re.findall(r"\{repo\}`([^`<]+?)(?:#[^`]*)?`", page.read_text(encoding="utf-8"))
-    }
-    named |= {
-        (page.name, path)
-        for page in PAGES
-        for path in re.findall(r"\{repo\}`[^`]*<([^>#`]+)(?:#[^>]*)?>`", page.read_text(encoding="utf-8"))
+        for path in re.findall(r"\{repo\}`(?:[^`<]*<)?([^`<>#]+)[^`]*`", page.read_text(encoding="utf-8"))
     }
     assert {("yaml.md", f"configs/{name}.yaml") for name in ("quick", "paper", "scans")} <= named
     assert not [place for place in named if not (ROOT / place[1]).exists()]
