@@ -36,6 +36,7 @@ from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
 from meshsimp_pymoo.opening import applicable, open_grid, open_model
 from meshsimp_pymoo.problem import MeshProblem, mesh_of
+from meshsimp_pymoo.reprs import in_short
 from meshsimp_pymoo.search.budgets import Moves, moves_of, seconds_given
 from meshsimp_pymoo.search.coarse import of_size, slope_of
 from meshsimp_pymoo.search.free import MEASURED_SHARE, FreeLadder, guarding, in_turn, rungs_of
@@ -1044,8 +1045,13 @@ class Front(Sequence[FrontSolution]):
         try:
             options, rules, _ = self._recorded()
             if hasattr(source, "rules"):
-                if plain(source.rules) != plain(rules):
-                    raise ResultError(f"{where}: has other rules than this {type(source).__name__}: {rules}; {way_out}")
+                mine, stored = plain(source.rules), plain(rules)
+                if mine != stored:
+                    differ = ", ".join(
+                        f"{name}={in_short(stored[name])}" for name in stored if stored[name] != mine[name]
+                    )
+                    kind = type(source).__name__
+                    raise ResultError(f"{where}: has other rules than this {kind}: {differ}; {way_out}")
                 surface: Surface = source
             elif isinstance(self._kept, Nested):
                 surface = GridSurface(open_grid(source, applicable(source, options)), rules)

@@ -345,7 +345,7 @@ def test_a_stored_front_is_read_back_with_its_surface_and_no_other(folder, front
     assert whole.best(triangles=10).mesh.faces.tolist() == front.best(triangles=10).mesh.faces.tolist()
     with pytest.raises(ResultError, match="is the front of another model"):
         Front.load(folder, model=circle(40, seed=2))
-    with pytest.raises(ResultError, match=r"has other rules than this Circle: Rules\(.*measure='error'\)"):
+    with pytest.raises(ResultError, match=r"has other rules than this Circle: measure='error'; "):
         Front.load(folder, model=circle(40, measure="rms_error"))
 
 
