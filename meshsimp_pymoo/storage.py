@@ -424,6 +424,8 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     folder = Path(folder)
     if not folder.is_dir():
         raise ResultError(f"{folder}: no such folder")
+    if not (folder / "front.csv").exists():
+        raise ResultError(f"{folder}: holds no front (front.csv is missing); name the folder that simplify -o made")
     quality, meshes, refitted_meshes = read_front_csv(folder / "front.csv")
     refitted_error = quality.pop("refitted_error", None)
     count = len(meshes)
@@ -493,6 +495,7 @@ def read_record(path: Path, count: int) -> dict[str, Any]:
         wrong += ["model.georeference"] * (not isinstance(model.get("georeference") or {}, dict))
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
         wrong.append("chosen")
+    wrong += ["wish"] * (not _is_wish(run.get("wish") or {}))
     wrong += ["objectives"] * (objectives is not None and not _are_objectives(objectives))
     if wrong:
         raise ResultError(f"{path}: {', '.join(wrong)} is not what a front's record holds; write the front again")
@@ -502,6 +505,13 @@ def read_record(path: Path, count: int) -> dict[str, Any]:
             "the model again"
         )
     return run
+
+
+def _is_wish(limits: Any) -> bool:
+    wished = [name for name, measure in MEASURES.items() if measure.wish]
+    return isinstance(limits, dict) and all(
+        name in wished and type(limit) in (int, float) and 0 <= limit < math.inf for name, limit in limits.items()
+    )
 
 
 def _are_objectives(names: Any) -> bool:

@@ -31,9 +31,12 @@ from meshsimp_pymoo import Front, MeshProblem, memetic
 from meshsimp_pymoo.cli import main, searching
 from meshsimp_pymoo.cli.commands.completion import SHELLS
 from meshsimp_pymoo.cli.parser import make_parser
+from meshsimp_pymoo.cli.requests import Wish
+from meshsimp_pymoo.cli.results import _worth_picking
 from meshsimp_pymoo.cli.terminal import described, front_in_words
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import all_formats, write_mesh, written_formats
 from meshsimp_pymoo.front import FrontSolution
 from meshsimp_pymoo.plane.faces import used_rows
@@ -1000,6 +1003,59 @@ def test_pick_refuses_a_model_that_changed(tmp_path, roof_ply, capsys):
     assert (tmp_path / "a.ply").is_file()
 
 
+@pytest.fixture(scope="module")
+def around_100(tmp_path_factory):
+    """Return a folder with the folder `out` of a front that was searched around 100 triangles of face:200."""
+    folder = tmp_path_factory.mktemp("around")
+    wish = ("--triangles", 100, "--moves", 5000, "--up", "z", "--meshes", "none", "--no-page")
+    assert run("simplify", "face:200", "-o", folder / "out", *wish, "--quiet") == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--triangles", 100), ""),
+        (("--triangles", 60), ""),  # within a factor of two
+        (("--triangles", 30), "{around}; far from it the meshes are poor. For this wish: {way}--triangles 30{then}"),
+        (
+            ("--max-error", "1e-09", "--mean-error", 0.25),
+            "this is the original itself; {around}. For this wish: {way}--mean-error 0.25 --max-error 1e-09{then}",
+        ),
+        (("--solution", 0), "{around}; far from it the meshes are poor. For this size: {way}--triangles {size}{then}"),
+        (("--solution", "last"), "this is the original itself; {around}"),
+    ],
+)
+def test_pick_says_that_a_mesh_is_far_from_what_was_searched(around_100, monkeypatch, capsys, options, said):
+    monkeypatch.chdir(around_100)
+    front = read_front("out")
+    last = len(front.quality["triangles"]) - 1
+    assert run("pick", "out", *(last if word == "last" else word for word in options)) == 0
+    expected = said.format(
+        around="out was searched around at most 100 triangles",
+        way="meshsimp simplify face:200 ",
+        then=", with the options of then",
+        size=front.quality["triangles"][0],
+    )
+    assert capsys.readouterr().err == (f"meshsimp: note: {expected}\n" if said else "")
+
+
+def test_what_a_missed_wish_leaves_is_picked_by_its_parts(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    quick = ("--moves", 2000, "--meshes", "none", "--no-page")
+    assert run("simplify", "face:200", "-o", "out", "--triangles", 20, "--max-error", 2, *quick) == 1
+    said = re.findall(r"(take one of them|or): meshsimp (.*)", capsys.readouterr().out)
+    parts = ["pick out --triangles 20 -o small.ply", "pick out --max-error 2 -o close.ply"]
+    assert said == list(zip(("take one of them", "or"), parts, strict=True))
+    front = Front.load("out")
+    for part, limit in zip(parts, ({"triangles": 20}, {"max_error": 2}), strict=True):
+        assert run(*part.split()) == 0
+        out, err = capsys.readouterr()
+        assert out.startswith(f"solution {front.best(**limit).solution} of out: ")
+        assert err == ""  # each was searched for
+    assert _worth_picking(front, Wish({"triangles": 1})) == ["--solution 0"]  # nothing keeps it
+
+
 def test_pick_overwrites_only_when_asked_and_leaves_nothing_behind(picked, tmp_path, capsys):
     path = tmp_path / "a.obj"
     path.write_text("mine")
@@ -1037,9 +1093,16 @@ def test_pick_says_what_is_impossible(picked, capsys, options, code, message):
     assert re.search(message, one_line(capsys))
 
 
-def test_pick_needs_a_front(tmp_path, capsys):
+def test_pick_needs_a_front(tmp_path, monkeypatch, capsys):
     assert run("pick", tmp_path / "no", "--knee") == 2
     assert "no: no such folder" in one_line(capsys)
+    monkeypatch.chdir(tmp_path)
+    for command in (("pick", ".", "--knee"), ("score", "roof:3", "roof:3", "--front", ".")):
+        assert run(*command) == 2
+        said = ".: holds no front (front.csv is missing); name the folder that simplify -o made"
+        assert one_line(capsys) == f"meshsimp: {said}\n"
+    assert run("report", ".") == 2
+    assert ".: holds neither a front (front.csv) nor an experiment (experiment.json); name" in one_line(capsys)
 
 
 def test_a_mesh_of_the_front_scores_what_the_front_says(picked, tmp_path, capsys):
@@ -1096,6 +1159,25 @@ def test_score_refuses_a_front_of_another_model_or_reading(picked, tmp_path, cap
     write_mesh(tmp_path / "wall.ply", upright * [1, 0, 1], load("roof:3").faces)
     assert run("score", "face:200", tmp_path / "wall.ply") == 2
     assert re.search(r"wall\.ply: cannot be measured against face:200: none of the 8 faces has", one_line(capsys))
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"), [("out.ply", "out --format ply"), ("a b/out.XML", "'a b/out' --format landxml")]
+)
+def test_a_mesh_file_is_not_taken_for_the_folder_to_make(tmp_path, monkeypatch, capsys, name, instead):
+    monkeypatch.chdir(tmp_path)
+    assert run("simplify", "roof:5", "-o", name, *QUICK) == 2
+    said = f"meshsimp: {name}: -o names a folder, for the front and the mesh you want; say -o {instead}\n"
+    assert one_line(capsys) == said
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "out.ply").mkdir()
+    assert run("simplify", "roof:5", "-o", "out.ply", "--quiet", *QUICK) == 0  # a folder of such a name is one
+
+
+def test_a_format_goes_by_its_suffix_too(tmp_path, capsys):
+    options = ("--format", "XML", "--pick", "knee", "--quiet", "--no-page", *QUICK)
+    assert run("simplify", "roof:5", "-o", tmp_path / "out", *options) == 0
+    assert (tmp_path / "out" / "chosen.xml").is_file()
 
 
 def test_simplify_alone_names_its_folder_after_the_model(tmp_path, roof_ply, monkeypatch, capsys):
@@ -1190,6 +1272,41 @@ def test_info_in_json_can_be_read_by_programs(roof_ply, capsys):
     assert run("info", roof_ply, "--json") == 0
     content = json.loads(capsys.readouterr().out)
     assert (content["vertices"], content["triangles"], content["folds"], content["refusal"]) == (25, 32, 0, None)
+
+
+def test_info_says_how_a_grid_is_sampled_and_what_its_verdict_rests_on(tmp_path, capsys):
+    elevation = np.arange(30.0).reshape(5, 6)
+    elevation[0, :2] = -9999
+    np.savez(tmp_path / "dem.npz", z=elevation, x=[0, 1, 2, 3, 4, 9], y=[8, 6, 4, 2, 0])
+    np.save(tmp_path / "dem.npy", elevation)
+    assert run("info", tmp_path / "dem.npy", "--spacing", "30,25.5", "--nodata=-9999") == 0
+    out, err = capsys.readouterr()
+    assert "\n  grid            6 x 5 samples, 30 x 25.5 apart; 2 without data\n" in out
+    assert err == ""
+    assert run("info", tmp_path / "dem.npz") == 0
+    out = capsys.readouterr().out
+    assert "\n  grid            6 x 5 samples, ? x 2 apart; 0 without data\n" in out
+    assert out.endswith("\n  verdict         usable, but see the warning: 2 heights of -9999\n")
+    assert run("info", tmp_path / "dem.npz", "--json") == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["grid"] == {"columns": 6, "rows": 5, "spacing": [None, 2.0], "without_data": 0}
+    assert content["suspected_nodata"] == [-9999]
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"), [("metre", "2 x 2 m"), ("US survey foot", "2 x 2 US survey foot"), ("degree", "2 x 2 degree")]
+)
+def test_info_says_the_unit_of_a_grid_s_plane(tmp_path, monkeypatch, capsys, unit, said):
+    grid = replace(grid_source(np.eye(3), 2.0, 2.0), georeference={"unit": unit, "height_unit": "metre"})
+    monkeypatch.setattr("meshsimp_pymoo.formats.table.read_source", lambda *_: grid)
+    monkeypatch.setattr("meshsimp_pymoo.opening.read_source", lambda *_: grid)
+    assert run("info", tmp_path / "a.tif") == 0
+    assert f"\n  grid            3 x 3 samples, {said} apart; 0 without data\n" in capsys.readouterr().out
+
+
+def test_info_says_the_area_in_plan_as_a_share_of_the_surface_s(capsys):
+    assert run("info", "roof:3") == 0  # both of its slopes by hand: 1 x 2 in plan, 2 sqrt 2 in space
+    assert "\n  area in plan    70.7% of the surface's (100%: flat)\n" in capsys.readouterr().out
 
 
 def test_info_says_what_was_mended(tmp_path, capsys):

@@ -379,7 +379,10 @@ DAMAGE = {
         lambda f: (f / "series.csv").write_text("series,minimised,triangles\na,nan,2\n"),
         r"series\.csv, line 2: nan,2 is no error",
     ),
-    "no csv": (lambda f: (f / "front.csv").unlink(), r"front\.csv: cannot be read \(No such file"),
+    "no csv": (
+        lambda f: (f / "front.csv").unlink(),
+        r"out: holds no front \(front\.csv is missing\); name the folder that simplify -o",
+    ),
     "cut csv": (
         cut("front.csv", 0.5),
         r"front\.csv, line \d+: .*|front\.npz: its F is not that of front\.csv",
@@ -438,6 +441,9 @@ DAMAGE = {
     "objectives without triangles": (change_run(objectives=["error"]), r"run\.json: objectives is not"),
     "objectives in a list": (change_run(objectives=[["error"], "triangles"]), r"run\.json: objectives is not"),
     "objectives in a mapping": (change_run(objectives={"error": 1, "triangles": 2}), r"run\.json: objectives is not"),
+    "wish no mapping": (change_run(wish="small"), r"run\.json: wish is not what a front"),
+    "wish for nothing known": (change_run(wish={"beauty": 1}), r"run\.json: wish is not"),
+    "wish for no number": (change_run(wish={"triangles": "few"}), r"run\.json: wish is not"),
     "of an earlier version": (
         change_run(settings={"footprint": "hull", "outside": "ignore"}, objectives=["error", "triangles"]),
         r"run\.json: is of an earlier version, .*; simplify the model again",

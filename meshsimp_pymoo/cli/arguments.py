@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from meshsimp_pymoo.errors import UsageError
-from meshsimp_pymoo.formats.table import read_suffixes
+from meshsimp_pymoo.formats.table import read_suffixes, written_formats
 from meshsimp_pymoo.settings import Choice, Real, Whole, defaults_of, settings_of
 from meshsimp_pymoo.surface.measures import MEASURES
 
@@ -168,6 +168,16 @@ def mesh_count(text: str) -> int | None:
     if text == "all":
         return None
     return 0 if text == "none" else int(whole(0)(text))
+
+
+def format_name(text: str) -> str:
+    """Return the name of a format that is written, of its name or its suffix; other words as they are.
+
+    >>> format_name("xml"), format_name("PLY"), format_name("dxf")
+    ('landxml', 'ply', 'dxf')
+    """
+    word = text.lower()
+    return next((kind.name for kind in written_formats().values() if f".{word}" in kind.suffixes), word)
 
 
 def numbered(front: Any, count: int, number: int) -> int:

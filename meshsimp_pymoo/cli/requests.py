@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from meshsimp_pymoo.cli.arguments import option, settings_from, wishes_of
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import listed
+from meshsimp_pymoo.formats.table import listed, written_formats
 from meshsimp_pymoo.search.presets import DEFAULT, PRESETS
 from meshsimp_pymoo.search.wishes import SEARCHED, measure_for
 from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
@@ -56,6 +56,12 @@ class Wish:
     def options(self) -> str:
         """The limits as the command line names them."""
         return listed([option(name) for name in self.limits], "and") if self.limits else ""
+
+    @property
+    def spelled(self) -> str:
+        """All of it as the command line of ``meshsimp simplify`` says it."""
+        said = [f"{option(name)} {limit:.15g}" for name, limit in self.limits.items()]
+        return " ".join(said + ["--pick knee"] * self.knee)
 
     def of(self, front: Any) -> tuple[Any | None, str]:
         """Return the solution of a front that is wanted, if one is, and why there is none, if so."""
@@ -153,6 +159,8 @@ class Request:
 
 def request_of(args: argparse.Namespace) -> Request:
     """Return what a command line of ``meshsimp simplify`` asks for; from here on no namespace travels."""
+    if args.output is not None:
+        _refuse_file(args.output)
     folder = args.output or f"{re.sub(r'[^A-Za-z0-9._-]+', '_', Path(args.model).stem)}_front"
     measure = next((name for name, known in OBJECTIVES.items() if known.minimised == args.measure), None)
     request = Request(
@@ -175,6 +183,17 @@ def request_of(args: argparse.Namespace) -> Request:
     if not request.is_targeted:
         return request
     return replace(request, rules=replace(request.rules, measure=measure_for(request.wish.limits, measure)))
+
+
+def _refuse_file(folder: str) -> None:
+    """Refuse what looks like a mesh file for the folder to make."""
+    from meshsimp_pymoo.files import as_argument
+
+    path = Path(folder)
+    kind = next((kind for kind in written_formats().values() if path.suffix.lower() in kind.suffixes), None)
+    if kind is not None and not path.is_dir():
+        instead = f"-o {as_argument(path.with_suffix(''))} --format {kind.name}"
+        raise UsageError(f"{folder}: -o names a folder, for the front and the mesh you want; say {instead}")
 
 
 def _lowers_another(request: Request) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from meshsimp_pymoo.cli.requests import Output, Request
+from meshsimp_pymoo.cli.requests import Output, Request, Wish
 from meshsimp_pymoo.cli.terminal import (
     DRAWING,
     INTERRUPTED,
@@ -27,10 +27,10 @@ from meshsimp_pymoo.cli.terminal import (
     tell_origin,
     there,
 )
-from meshsimp_pymoo.errors import ResultError
+from meshsimp_pymoo.errors import Missed, ResultError
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import format_to_write
-from meshsimp_pymoo.front import Front
+from meshsimp_pymoo.front import Front, FrontSolution
 from meshsimp_pymoo.search.checkpoint import difference
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
@@ -87,7 +87,7 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
         except KeyboardInterrupt:
             undrawn = True
     shown.close()
-    _summarise(front, output)
+    _summarise(front, output, request.wish)
     if front.run.get("interrupted"):
         say(f"interrupted after {front.run['generations']} generations; {folder} holds the front so far")
     asked = even_selection(len(front), output.meshes)
@@ -123,11 +123,11 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
     return OK
 
 
-def _summarise(front: Front, output: Output) -> None:
+def _summarise(front: Front, output: Output, wish: Wish) -> None:
     if output.json:
         tell(json.dumps(_summary(front, output), indent=2))
     elif not output.quiet:
-        _tell(front, output)
+        _tell(front, output, wish)
 
 
 def _chosen_path(output: Output) -> Path:
@@ -161,7 +161,7 @@ def _summary(front: Front, output: Output) -> dict[str, Any]:
     } | {name: front.run[name] for name in SAID if name in front.run}
 
 
-def _tell(front: Front, output: Output) -> None:
+def _tell(front: Front, output: Output, wish: Wish) -> None:
     model, run, folder = front.model, front.run, output.folder
     few, many, chosen = front.quality[0], front.quality[-1], run["chosen"]
     unit, system = front.unit, reference_system(model.georeference)
@@ -194,8 +194,29 @@ def _tell(front: Front, output: Output) -> None:
     if "mesh_origin" in run:
         tell_origin(run["mesh_origin"])
     if chosen is None:
-        size = _round_size(front)
-        tell(f"take one of them: meshsimp pick {as_argument(folder)} --triangles {size} -o small.ply")
+        words = "take one of them"
+        for said in _worth_picking(front, wish):
+            name = "small" if said.startswith("--triangles") else "close"
+            tell(f"{words}: meshsimp pick {as_argument(folder)} {said} -o {name}.ply")
+            words = "or"
+
+
+def _worth_picking(front: Front, wish: Wish) -> list[str]:
+    """Return which solutions are worth an example where none is chosen: that keep a part of what was wished for."""
+    if not wish.limits:
+        return [f"--triangles {_round_size(front)}"]
+    alone = [Wish({name: limit}) for name, limit in wish.limits.items()]
+    kept = [one.spelled for one in alone if one.of(front)[0] is not None]
+    return kept or [f"--solution {nearest(front, wish.limits).solution}"]
+
+
+def nearest(front: Front, limits: Mapping[str, float]) -> FrontSolution:
+    """Return the solution within limits, or the one that comes nearest to them."""
+    try:
+        return front.best(**limits)
+    except Missed as missed:
+        found: FrontSolution = missed.nearest
+        return found
 
 
 def _round_size(front: Front) -> int:

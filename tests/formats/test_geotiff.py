@@ -82,6 +82,7 @@ def test_a_window_is_a_part_of_the_whole_with_the_same_places_and_rows(tiff, opt
     assert_array_equal(np.divmod(part.rows[[0, -1]], 50), [[5, 34], [17, 36]])
     assert len(part.points) == 600
     assert part.georeference["window"] == [17, 5, 20, 30]
+    assert (whole.grid, part.grid) == ((50, 40, 10, 5), (20, 30, 10, 5))
 
 
 @pytest.mark.parametrize("window", [(0, 0, 13, 9), (3, 8, 4, 2), (10**12, 0, 4, 4)])
@@ -142,6 +143,7 @@ def test_mirrored_and_turned_rasters_lie_as_they_say_and_face_up(tiff, transform
     row, column = np.divmod(source.rows, 12)
     expected = np.array([transform @ (j + 0.5, i + 0.5) for i, j in zip(row, column, strict=True)])
     assert_allclose(source.points[:, :2], expected, rtol=0, atol=1e-8)
+    assert_allclose(source.grid, (12, 9, np.hypot(*transform[0:4:3]), np.hypot(*transform[1:5:3])), rtol=1e-6)
     a, b, c = (source.points[source.faces[:, k], :2] for k in range(3))
     area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     assert_allclose(area, abs(transform.determinant), rtol=1e-6)

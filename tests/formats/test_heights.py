@@ -12,7 +12,7 @@ from pyramid import hill
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.source.heights import Grid, grid_source
 from meshsimp_pymoo.formats.table import read_source
 
 
@@ -25,6 +25,15 @@ def test_a_grid_runs_east_and_south_and_faces_up():
     assert_array_equal(source.points[4], [0, -5, 4])
     a, b, c = (source.points[source.faces[:, k]] for k in range(3))
     assert_array_equal(np.cross(b - a, c - a)[:, 2], np.full(12, 10.0))
+
+
+def test_a_grid_knows_its_size_and_how_far_its_samples_are_apart():
+    elevation = np.arange(12.0).reshape(3, 4)
+    elevation[1, 1] = np.nan
+    assert grid_source(elevation, 2.0, 5.0).grid == (4, 3, 2.0, 5.0)
+    uneven = Grid(elevation, np.array([0.0, 1.0, 2.0, 4.0]), np.array([9.0, 6.0, 3.0]))
+    assert str(uneven.mesh("uneven").grid) == "(4, 3, nan, 3.0)"
+    assert uneven.mesh("its west", (0, 0, 3, 3)).grid == (3, 3, 1.0, 3.0)
 
 
 @pytest.mark.parametrize("corner", [(0, 0), (0, 1), (1, 0), (1, 1)])

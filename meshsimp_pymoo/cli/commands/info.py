@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _describe(model: str, options: Options, *, as_json: bool) -> int:
     import json
+    import math
     from dataclasses import asdict
 
     import numpy as np
@@ -60,6 +61,7 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.formats.source.classes import classes_in_words
+    from meshsimp_pymoo.formats.source.missing import suspects
     from meshsimp_pymoo.opening import mended_source
     from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
     from meshsimp_pymoo.surface.places import count_places
@@ -97,6 +99,14 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         rows["vertices"] += f" ({len(source.repeats):,} that repeated others are merged with them)"
     if len(used) < len(source.points):
         rows["vertices"] += f" ({len(source.points) - len(used):,} more belong to no face)"
+    if source.grid is not None:
+        columns, lines, *steps = source.grid
+        missing = columns * lines - len(source.points)
+        even = [None if math.isnan(step) else step for step in steps]
+        content["grid"] = {"columns": columns, "rows": lines, "spacing": even, "without_data": missing}
+        rows["grid"] = f"{columns} x {lines} samples, {_apart(steps, source.georeference)}; {missing:,} without data"
+    odd = list(suspects(source.points[:, 2])) if source.sort != "mesh" else []
+    content["suspected_nodata"] = [value for value, *_ in odd]
     if classes := source.georeference.get("classes"):
         content["classes"] = classes
         rows["classes"] = classes_in_words(classes)
@@ -116,13 +126,14 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
         flipped = " (its faces are wound the other way)" if facts.flipped else ""
         rows |= {
             "up": ", ".join(f"{value:.6g}" for value in up) + flipped,
-            "seen from there": f"{facts.net_share:.1%} of the area",
+            "area in plan": f"{facts.net_share:.1%} of the surface's (100%: flat)",
             "parts": f"{facts.components}",
             "border": f"{facts.border_edges:,} edges, {facts.border_loops} closed loop(s)",
             "vertical": f"{facts.vertical_faces:,} faces",
             "folded over": f"{'' if facts.complete else 'at least '}{facts.n_folded:,} faces ({facts.fold_share:.2%})",
         }
-    rows["verdict"] = "refused" if refusal else "usable: an open height field"
+    doubt = f"usable, but see the warning: {odd[0][1]:,} heights of {odd[0][0]:.9g}" if odd else ""
+    rows["verdict"] = "refused" if refusal else doubt or "usable: an open height field"
     if as_json:
         tell(json.dumps(content | {"refusal": refusal}, indent=2))
     else:
@@ -137,6 +148,16 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
 
 def _sides(extent: Any) -> str:
     return " x ".join(f"{value:.6g}" for value in extent)
+
+
+def _apart(steps: Any, georeference: dict[str, Any]) -> str:
+    from meshsimp_pymoo.surface.measures import LENGTH
+    from meshsimp_pymoo.surface.units import length_unit
+
+    unit = str(georeference.get("unit") or "")
+    named = length_unit({"unit": unit or None})  # of the plane; heights may have another one
+    across, down = ("?" if step != step else f"{step:.6g}" for step in steps)
+    return f"{across} x {down} {unit if named == LENGTH else named}".rstrip() + " apart"
 
 
 def _file_unit(georeference: dict[str, Any]) -> str:

@@ -9,7 +9,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from meshsimp_pymoo.cli.requests import Wish
+    from meshsimp_pymoo.front import Front, FrontSolution
 
+# By which factor in triangles a mesh differs from what was searched that is said to be far from it.
+FAR = 2
 HELP = "take one mesh out of a front that is stored"
 DESCRIPTION = """\
 Take one mesh out of the front in OUT, which `meshsimp simplify` wrote. No search
@@ -96,6 +99,8 @@ def _pick(
         return TARGET_MISSED
     if path is not None:
         solution.save(path, overwrite=overwrite)
+    if note := _how_far(front, folder, model, solution, wish):
+        say(f"note: {note}")
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
@@ -106,3 +111,41 @@ def _pick(
         tell(f"{which} of {folder}{', free' * solution.free}: {described(solution.quality, front.unit)}")
         tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK
+
+
+def _how_far(front: Front, folder: str, model: str | None, solution: FrontSolution, wish: Wish) -> str:
+    """Say, where a front was searched around a wish, that a solution is far from it, and how to search for this one."""
+    from dataclasses import asdict
+
+    from meshsimp_pymoo.cli.results import nearest
+    from meshsimp_pymoo.files import as_argument
+    from meshsimp_pymoo.search.wishes import in_words, shortfall
+
+    limits = front.run.get("wish")
+    if not limits:
+        return ""
+    own, answer = solution.triangles, nearest(front, limits)
+    searched = {answer.triangles}
+    if shortfall(asdict(answer.quality), limits) > 0.0:  # then each of them was searched for, too
+        searched |= {nearest(front, {name: limit}).triangles for name, limit in limits.items()}
+    is_whole = solution.quality.vertices == front.run["model"].get("vertices")
+    if own in searched or (not is_whole and any(near <= FAR * own <= FAR**2 * near for near in searched)):
+        return ""
+    around = f"{folder} was searched around {in_words(limits)}"
+    said = f"this is the original itself; {around}" if is_whole else f"{around}; far from it the meshes are poor"
+    if is_whole and not wish.spelled:
+        return said
+    wanted, what = (wish.spelled, "wish") if wish.spelled else (f"--triangles {own}", "size")
+    way = f"meshsimp simplify {as_argument(model or front.name)} {wanted}"
+    return f"{said}. For this {what}: {way}{_with_options(front)}"
+
+
+def _with_options(front: Front) -> str:
+    from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.settings import plain
+    from meshsimp_pymoo.surface.rules import Rules
+
+    usual = plain(Options()) | plain(Rules())
+    made = (front.run.get("options") or {}) | (front.run.get("rules") or {})
+    others = any(made.get(name, value) != value for name, value in usual.items() if name != "measure")
+    return ", with the options of then" * others

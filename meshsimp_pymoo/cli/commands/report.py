@@ -41,4 +41,11 @@ def run(args: argparse.Namespace) -> int:
             return report_on_front(out, args.model, **shown)
     if args.model is not None:
         raise UsageError(f"--model is for the page of a front; {out} holds none")
+    from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE
+
+    if not (out / EXPERIMENT_FILE).exists():
+        raise UsageError(
+            f"{out}: holds neither a front (front.csv) nor an experiment ({EXPERIMENT_FILE}); name the folder that "
+            "simplify -o or run made"
+        )
     return report_on_experiment(out, {}, **shown)

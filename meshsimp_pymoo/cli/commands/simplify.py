@@ -51,6 +51,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         add_wishes,
         add_workers,
         duration,
+        format_name,
         mesh_count,
         tile,
         typed,
@@ -160,7 +161,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     output = parser.add_argument_group("what is written and shown")
     output.add_argument(
         "--format",
-        type=str.lower,
+        type=format_name,
         choices=list(written_formats()),
         default=Output.format,
         help="of the meshes (default: %(default)s)",

@@ -62,6 +62,8 @@ class SourceMesh:
         whoever names the former means the latter. Default none.
     material : Material, optional
         What all faces look like.
+    grid : (int, int, float, float), optional
+        Of a height grid: columns, rows, and how far both are apart; NaN where that is uneven [file units].
     """
 
     points: FloatArray
@@ -74,6 +76,7 @@ class SourceMesh:
     sort: str = "mesh"
     repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64))
     material: Material | None = None
+    grid: tuple[int, int, float, float] | None = None
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):

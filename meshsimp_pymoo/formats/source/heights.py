@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +19,8 @@ from meshsimp_pymoo.reprs import brief
 
 # What a sample takes while a mesh is made of it: measured, rounded down.
 MESH_SAMPLE_BYTES = 300
+# By which share of it the spacing of an even grid may differ, as coordinates are rounded.
+EVEN = 1e-3
 
 
 @brief
@@ -289,9 +291,19 @@ def grid_mesh(
             f"{name}: only {len(rows)} of {z.size} samples have data and no cell has three; check nodata ({nodata})"
         )
     numbers = i * file_columns + j
-    return build_source(
+    source = build_source(
         points, faces, {}, name, rows=numbers, up="z", georeference=georeference, sort="grid", repeats="none"
     )
+    (n_rows, n_columns), (row, column) = z.shape, corner
+    across = _spacing(*place(np.full(n_columns, row), column + np.arange(n_columns)))
+    down = _spacing(*place(row + np.arange(n_rows), np.full(n_rows, column)))
+    return replace(source, grid=(n_columns, n_rows, across, down))
+
+
+def _spacing(x: FloatArray, y: FloatArray) -> float:
+    """Return how far the samples of a line are apart; NaN where that differs by more than rounding."""
+    steps = np.hypot(np.diff(x), np.diff(y))
+    return float(steps.mean()) if np.ptp(steps) <= EVEN * steps.mean() else float("nan")
 
 
 # ---------------------------------------------------------------------------------------------------------- by windows

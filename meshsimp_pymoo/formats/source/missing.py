@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray
@@ -45,6 +47,15 @@ def is_nodata(height: AnyArray, nodata: float) -> BoolArray:
 
 def warn_of_nodata(z: FloatArray, name: str) -> None:
     """Warn of a usual "no data" value among the heights (S,) that is farther from all others than these are apart."""
+    for value, count, low, high in suspects(z):
+        warn_of(
+            f"{name}: {count} of {len(z)} heights are {value:.9g}, far from all others ({low:g} to {high:g}); if that "
+            f"means 'no sample', say nodata={value:.9g} (--nodata={value:.9g})"
+        )
+
+
+def suspects(z: FloatArray) -> Iterator[tuple[float, int, float, float]]:
+    """Yield such values among heights (S,), how many have them, and between what all others lie."""
     for value in (float(z.min(initial=np.inf)), float(z.max(initial=-np.inf))):
         if value not in NODATA_HABITS and not NODATA_SIZE <= abs(value) < np.inf:
             continue
@@ -53,7 +64,4 @@ def warn_of_nodata(z: FloatArray, name: str) -> None:
             continue
         low, high = float(others.min()), float(others.max())
         if max(low - value, value - high) > high - low:
-            warn_of(
-                f"{name}: {len(z) - len(others)} of {len(z)} heights are {value:.9g}, far from all others ({low:g} to "
-                f"{high:g}); if that means 'no sample', say nodata={value:.9g} (--nodata={value:.9g})"
-            )
+            yield value, len(z) - len(others), low, high
