@@ -74,12 +74,23 @@ class Missed(LookupError):
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """Return which of the known words was meant, most likely; None if none is near.
 
+    Of several that are as near, the first.
+
     >>> nearest("Widnow", ["spacing", "window"]), nearest("smooth", ["spacing", "window"])
     ('window', None)
+    >>> nearest("nsga2", ["moead", "nsga2_v1", "nsga2_v2"])
+    'nsga2_v1'
     """
     by_lower = {name.lower(): name for name in known}
-    near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.5)
-    return by_lower[near[0]] if near else None
+    if not difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.5):
+        return None
+    matcher = difflib.SequenceMatcher(b=word.lower())
+
+    def likeness(name: str) -> float:
+        matcher.set_seq1(name)
+        return matcher.ratio()
+
+    return by_lower[max(by_lower, key=likeness)]
 
 
 def meant(word: str, known: Iterable[str]) -> str:

@@ -41,7 +41,7 @@ import typing
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, partial, wraps
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
@@ -53,6 +53,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.comparison.baselines import BASELINES
+from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.errors import InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
@@ -170,10 +171,10 @@ def _blaming(*at: str | int, what: str = "") -> Iterator[None]:
     except Exception as problem:
         name = "" if isinstance(problem, ValueError) else f"{type(problem).__name__}: "
         reason = " ".join(str(problem).split()) or type(problem).__name__
-        raise _Mistake(f"{what}{what and ': '}{name}{reason}{_line_of(problem)}", *at) from problem
+        raise _Mistake(f"{what}{what and ': '}{name}{reason}{line_of(problem)}", *at) from problem
 
 
-def _line_of(problem: Exception) -> str:
+def line_of(problem: Exception) -> str:
     """Return the line of the reader's own code that an exception comes from; nothing where it is none of theirs."""
     for frame, line in reversed(list(traceback.walk_tb(problem.__traceback__))):
         if str(frame.f_globals.get("__name__", "")).partition(".")[0] not in NOT_THEIRS:
@@ -774,7 +775,8 @@ def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str, besi
 def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
     """Let an algorithm run on a tiny model, and set it up for every problem, before anything is run.
 
-    Return why its state cannot be saved; nothing if it can.
+    What is the reader's own runs twice, for it may take chance from elsewhere than its seed. Return why the state of
+    the algorithm cannot be saved; nothing if it can.
     """
     value, built, reason = config.merged_values[0], [problem.build() for problem in problems], ""
     for entry, problem in zip(problems, built, strict=True):
@@ -792,20 +794,26 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
     wanted = dict.fromkeys((problem.objectives, problem.regions) for problem in built)
     trials = [MeshProblem(TRIAL_MODEL, objectives=names, regions=n, n_threads=1) for names, n in wanted]
     trials += [problem.build() for problem in problems if problem.model.n_vertices < TRIAL_VERTICES]
+    is_own = not all(map(_is_known, [config.path, *(part.name for part in config.operators.values())]))
+
+    def begun(trial: MeshProblem) -> tuple[Any, Any]:
+        searched, algorithm = config.searched(trial, value), small.build(value)
+        if sampling := _sized_sampling(algorithm):
+            sampling.size = None  # meant for the problems, on which it was tried
+        if searched.n_obj > 1 and minimises_one_number(algorithm):
+            way_out = f"as in merged_over: {{{WEIGHT}: [0, 0.5, 1]}}, and it searches the weighted sum"
+            raise ValueError(f"it minimises one number; give it weights of the error, {way_out}")
+        algorithm.setup(searched, termination=("n_gen", TRIAL_GENERATIONS), seed=1)
+        return searched, algorithm
+
     for trial in trials:
         with (
             _blaming(what=f"the algorithm {config.name!r} fails on {trial.model.name!r}, a trial"),
             warnings.catch_warnings(),
+            _checked_operators(config),
         ):
             warnings.simplefilter("ignore", RuntimeWarning)  # about numbers of the trial, not of the user's models
-            searched = config.searched(trial, value)
-            algorithm = small.build(value)
-            if sampling := _sized_sampling(algorithm):
-                sampling.size = None  # meant for the problems, on which it was tried
-            if searched.n_obj > 1 and minimises_one_number(algorithm):
-                way_out = f"as in merged_over: {{{WEIGHT}: [0, 0.5, 1]}}, and it searches the weighted sum"
-                raise ValueError(f"it minimises one number; give it weights of the error, {way_out}")
-            algorithm.setup(searched, termination=("n_gen", TRIAL_GENERATIONS), seed=1)
+            searched, algorithm = begun(trial)
             try:
                 keeper: Checkpoints | None = Checkpoints(Path(), algorithm, {})
             except NotResumable as problem:
@@ -826,7 +834,71 @@ def _try_out(config: AlgorithmConfig, problems: Sequence[ProblemConfig]) -> str:
                 reason = str(problem)
             if algorithm.opt is None or algorithm.opt.get("F").shape[1:] != (searched.n_obj,):
                 raise ValueError("its result is no front of (error, triangles)")
+            if is_own and trial is trials[0] and algorithm.pop is not None:
+                _, again = begun(trial)
+                while again.has_next():
+                    again.next()
+                if not all(np.array_equal(again.pop.get(name), algorithm.pop.get(name)) for name in ("X", "F")):
+                    text = (
+                        f"{config.name}: the same seed gave two different results on the trial; take all chance from "
+                        "random_state, else no run repeats"
+                    )
+                    warnings.warn(text, ExperimentWarning, stacklevel=3)
     return reason
+
+
+@contextlib.contextmanager
+def _checked_operators(config: AlgorithmConfig) -> Iterator[None]:
+    """Have operators of the reader's own say what they return, where that is not what pymoo goes on with."""
+    with contextlib.ExitStack() as until_done:
+        for kind, operator in config.operators.items():
+            if not _is_known(operator.name):
+                until_done.enter_context(_checked(kind, operator.name))
+        yield
+
+
+@contextlib.contextmanager
+def _checked(kind: str, name: str) -> Iterator[None]:
+    target = _class_of(kind, name)
+    inherited, work = "_do" not in vars(target), target._do
+
+    @wraps(work)
+    def checked(operator: Any, *args: Any, **kwargs: Any) -> Any:
+        found = work(operator, *args, **kwargs)
+        if found is None:
+            end = {"sampling": "X", "duplicates": "is_duplicate"}.get(kind, "an array like X")
+            raise ValueError(f"{kind} {name} returned nothing; end _do with return {end}")
+        expected = _shape_of(kind, operator, args)
+        if expected is None or (isinstance(found, np.ndarray) and (found.dtype, found.shape) == (bool, expected)):
+            return found
+        array = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else f"a {type(found).__name__}"
+        raise ValueError(f"{kind} {name} returned {array}; expected bool {expected}")
+
+    target._do = checked
+    try:
+        yield
+    finally:
+        if inherited:
+            del target._do
+        else:
+            target._do = work
+
+
+def _shape_of(kind: str, operator: Any, args: Sequence[Any]) -> tuple[int, ...] | None:
+    """Return the shape of what an operator has to return, called by pymoo with these; None if they are others."""
+    if kind == "duplicates":
+        return (len(args[0]),) if args else None
+    if len(args) < 2:
+        return None
+    problem, given = args[:2]
+    if kind == "sampling":
+        return given, problem.n_var
+    return (operator.n_offsprings, *given.shape[1:]) if kind == "crossover" else given.shape
+
+
+def _is_known(path: str) -> bool:
+    """Return whether what is named (a path, or a name of ours) comes with pymoo or with this package."""
+    return "." not in path or path.startswith(("pymoo.", "meshsimp_pymoo."))
 
 
 def _sized_sampling(algorithm: Any) -> RandomSubset | None:

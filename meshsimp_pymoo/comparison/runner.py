@@ -29,6 +29,7 @@ import contextlib
 import os
 import shutil
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -52,6 +53,7 @@ from meshsimp_pymoo.comparison.config import (
     Budget,
     Experiment,
     ProblemConfig,
+    line_of,
     read_experiment_file,
 )
 from meshsimp_pymoo.comparison.store import (
@@ -65,7 +67,7 @@ from meshsimp_pymoo.comparison.store import (
     write_run,
 )
 from meshsimp_pymoo.comparison.trace import Trace
-from meshsimp_pymoo.errors import ResultError, ToolUnavailable
+from meshsimp_pymoo.errors import ResultError, ToolUnavailable, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.front import Front
@@ -107,6 +109,8 @@ BASELINE_EVALUATIONS = 2000
 
 # The folder, inside the experiment's, of the state of searches that are not finished.
 CHECKPOINTS = ".checkpoints"
+# The file, in the experiment's folder, of the tracebacks of runs that failed in the last call.
+FAILED = "failed.txt"
 
 # What is stored of each solution beside F.
 QUALITY_COLUMNS = tuple(name for name in MEASURES if name not in ("error", "triangles"))
@@ -150,9 +154,16 @@ class Task:
     @property
     def label(self) -> str:
         """What people call it."""
+        return f"{self.problem} / {self.algorithm.name}{self._value(' / ')} / seed {self.seed}"
+
+    @property
+    def sentence(self) -> str:
+        """The same in a sentence."""
+        return f"the run {self.algorithm.name!r} on {self.problem}{self._value(', ')}, seed {self.seed}"
+
+    def _value(self, separator: str) -> str:
         merged = self.algorithm.merged_parameter
-        value = f" / {merged}={self.merged_value}" if merged else ""
-        return f"{self.problem} / {self.algorithm.name}{value} / seed {self.seed}"
+        return f"{separator}{merged}={self.merged_value}" if merged else ""
 
     @property
     def search(self) -> dict[str, Any]:
@@ -238,7 +249,8 @@ def run_experiment(
     ConfigError
         If anything in the configuration is wrong; nothing has been run or written then.
     ResultError
-        If the folder cannot be used, or a process died.
+        If the folder cannot be used, or a process died; or if an algorithm or operator raised an exception, once all
+        other runs are done.
     """
     if jobs < 1:
         raise ValueError(f"jobs is {jobs}; it must be 1 or more")
@@ -260,7 +272,8 @@ def run_experiment(
         problems = {problem.name: problem for problem in experiment.problems}
         shared = _Shared(problems, store.folder, checkpoint, experiment.not_resumable, (engine or own).jobs)
         with own:
-            _perform_all(missing, store, engine or own, shown, shared)
+            if failed := _perform_all(missing, store, engine or own, shown, shared):
+                raise _failed(failed, len(missing), out)
             with contextlib.suppress(OSError):
                 shutil.rmtree(out / CHECKPOINTS)
             rows, not_here, computed = _baselines(experiment, tasks, store, own, shown, shared)
@@ -662,15 +675,33 @@ class _Shared:
     jobs: int  # how many at once
 
 
-def _perform_all(tasks: Sequence[Task], store: RunStore, engine: Engine, shown: _Shown, shared: _Shared) -> None:
+@dataclass(frozen=True)
+class _Failure:
+    """What an algorithm or operator raised: texts, for an exception of a reader's may not survive the way here."""
+
+    run: str
+    reason: str
+    traceback: str
+
+
+def _perform_all(
+    tasks: Sequence[Task], store: RunStore, engine: Engine, shown: _Shown, shared: _Shared
+) -> list[_Failure]:
+    """Do all tasks; return those that failed, by their places. They are said and stored at once: it may take hours."""
+    log = store.folder.parent / FAILED
+    log.unlink(missing_ok=True)
+    failed: dict[int, _Failure] = {}
     if not engine.shares_files:
         shared = replace(shared, folder=None)
     if shared.folder is not None and shared.checkpoint is not None:
         to_do = {task.algorithm.name for task in tasks}
-        for name, reason in shared.not_resumable.items():
-            if name in to_do:
-                line = f"{name}: a search that is cut off begins anew, for its state cannot be saved: {reason}"
-                warnings.warn(line, ExperimentWarning, stacklevel=3)
+        reasons = {name: reason for name, reason in shared.not_resumable.items() if name in to_do}
+        if reasons:
+            one = len(reasons) == 1
+            whose = "a search that is" if one else "searches that are"
+            line = f"{listed(list(reasons))}: {whose} cut off {'begins' if one else 'begin'} anew, for "
+            line += f"{'its' if one else 'their'} state cannot be saved: {'; '.join(dict.fromkeys(reasons.values()))}"
+            warnings.warn(line, ExperimentWarning, stacklevel=3)
         for task in tasks:  # damage is named here, not by the processes
             _usable_checkpoint(task, _checkpoint_of(task, store.folder.parent))
     if shown.progress is not None:
@@ -679,11 +710,27 @@ def _perform_all(tasks: Sequence[Task], store: RunStore, engine: Engine, shown: 
     tasks = list(tasks) if engine.jobs == 1 else sorted(tasks, key=lambda task: -task.work)
     try:
         for place, finished in engine.each(_work_on, tasks, shared):
+            if isinstance(finished[-1], _Failure):
+                failure = failed[place] = finished.pop()
+                with log.open("a", encoding="utf-8") as file:
+                    file.write(f"{failure.run}\n\n{failure.traceback}\n")
+                if len(failed) == 1 and len(tasks) > 1:
+                    line = f"{failure.run}, failed: {failure.reason}; the other runs are done first"
+                    warnings.warn(line, ExperimentWarning, stacklevel=3)
             for run in finished:
                 store.add(run if isinstance(run, Path) else write_run(store.folder, *run))
             shown.add(tasks[place].work, tasks[place].label)
     except EngineError as problem:
         raise _interrupted(store, problem) from None
+    return [failed[place] for place in sorted(failed)]
+
+
+def _failed(failed: Sequence[_Failure], n_tasks: int, out: Path) -> ResultError:
+    others = f", as did {len(failed) - 1} more of {n_tasks}" if len(failed) > 1 else ""
+    return ResultError(
+        f"{failed[0].run}, failed{others}: {failed[0].reason}; finished runs are kept in {out}: mend it and give the "
+        f"same command (traceback: {out / FAILED})"
+    )
 
 
 def _interrupted(store: RunStore, problem: EngineError) -> ResultError:
@@ -691,25 +738,31 @@ def _interrupted(store: RunStore, problem: EngineError) -> ResultError:
 
 
 def _work_on(task: Task, shared: _Shared) -> list[Any]:
-    """Do a task; return the records of its runs, or, where the folder is out of reach, all that is to be written."""
-    if shared.folder is not None:
-        return list(_perform_and_write(task, shared, shared.folder))
-    return [
-        (f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts)
-        for k, arrays, facts in perform(task, shared.problems[task.problem].build(), jobs=shared.jobs)
-    ]
+    """Do a task; return the records of its runs, or, where the folder is out of reach, all that is to be written.
+
+    Where its algorithm raises an exception, that is the last item.
+    """
+    done: list[Any] = []
+    runs = _performed(task, shared)
+    while True:
+        try:
+            k, arrays, facts = next(runs)
+        except StopIteration:
+            return done
+        except MemoryError:
+            raise
+        except Exception as problem:
+            reason = f"{type(problem).__name__}: {reason_of(problem)}{line_of(problem)}"
+            return [*done, _Failure(task.sentence, reason, traceback.format_exc())]
+        run = f"{task.label} / {task.budgets[k].name}", task.descriptions[k], arrays, facts
+        done.append(run if shared.folder is None else write_run(shared.folder, *run))
 
 
-def _perform_and_write(task: Task, shared: _Shared, folder: Path) -> list[Path]:
-    problem = shared.problems[task.problem].build()
+def _performed(task: Task, shared: _Shared) -> Iterator[tuple[int, dict[str, npt.NDArray[Any]], dict[str, Any]]]:
     how: dict[str, Any] = {"jobs": shared.jobs}
-    if shared.checkpoint is not None and task.algorithm.name not in shared.not_resumable:
-        how |= {"checkpoint": _checkpoint_of(task, folder.parent), "interval": shared.checkpoint}
-    paths = []
-    for k, arrays, facts in perform(task, problem, **how):
-        label = f"{task.label} / {task.budgets[k].name}"
-        paths.append(write_run(folder, label, task.descriptions[k], arrays, facts))
-    return paths
+    if shared.folder is not None and shared.checkpoint is not None and task.algorithm.name not in shared.not_resumable:
+        how |= {"checkpoint": _checkpoint_of(task, shared.folder.parent), "interval": shared.checkpoint}
+    yield from perform(task, shared.problems[task.problem].build(), **how)
 
 
 # ------------------------------------------------------------------------------------------------------ baselines

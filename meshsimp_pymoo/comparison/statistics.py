@@ -51,6 +51,7 @@ __all__ = [
     "Summary",
     "friedman",
     "holm",
+    "least_cases",
     "magnitude",
     "performance_profile",
     "rank_sum",
@@ -376,8 +377,7 @@ def friedman(values: ArrayLike, *, alpha: float = ALPHA) -> Friedman:
     n, k = table.shape
     ranks = stats.rankdata(-table, axis=1)
     mean_ranks = ranks.mean(axis=0)
-    spread = stats.studentized_range.ppf(1 - alpha, k, np.inf) / math.sqrt(2)
-    difference = float(spread * math.sqrt(k * (k + 1) / (6 * n)))
+    difference = _critical_difference(n, k, alpha)
     chi2, f, p, note = _friedman_test(ranks)
     order = [int(column) for column in np.argsort(mean_ranks, kind="stable")]
     if not p < alpha:
@@ -392,6 +392,31 @@ def friedman(values: ArrayLike, *, alpha: float = ALPHA) -> Friedman:
             groups.append(tuple(near))
             end = place + len(near)
     return Friedman(mean_ranks, chi2, f, p, difference, tuple(groups), note)
+
+
+def least_cases(k: int, *, alpha: float = ALPHA) -> int:
+    """Return from how many cases on `friedman` can tell any two of k methods apart: where all cases agree.
+
+    With fewer, Nemenyi's critical difference is more than the first mean rank and the last can differ by, or not even
+    cases that all agree bring Friedman's p below the level of significance.
+
+    Examples
+    --------
+    >>> least_cases(2), least_cases(5)
+    (6, 3)
+    """
+    n = 2
+    while (
+        _critical_difference(n, k, alpha) > k - 1 or _friedman_test(np.tile(np.arange(1.0, k + 1), (n, 1)))[2] >= alpha
+    ):
+        n += 1
+    return n
+
+
+def _critical_difference(n: int, k: int, alpha: float) -> float:
+    """Return Nemenyi's critical difference of the mean ranks of k methods over n cases."""
+    spread = stats.studentized_range.ppf(1 - alpha, k, np.inf) / math.sqrt(2)
+    return float(spread * math.sqrt(k * (k + 1) / (6 * n)))
 
 
 def _friedman_test(ranks: FloatArray) -> tuple[float, float, float, str]:

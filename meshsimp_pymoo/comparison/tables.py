@@ -31,7 +31,7 @@ from pathlib import Path
 import numpy as np
 
 from meshsimp_pymoo.comparison.analysis import PairTable, selected_solutions
-from meshsimp_pymoo.comparison.statistics import Summary, magnitude, signed_rank, summarise
+from meshsimp_pymoo.comparison.statistics import Summary, least_cases, magnitude, signed_rank, summarise
 from meshsimp_pymoo.comparison.study import (
     CLASSIC_NAMES,
     EPSILON_SHIFT,
@@ -86,6 +86,8 @@ class Table:
         Text, whole numbers, floats, or None for an empty cell.
     shown : Table, optional
         The table to show to people, where it is laid out differently from the one for programs.
+    note : str
+        A sentence below it, for people; mostly empty.
     """
 
     name: str
@@ -93,12 +95,13 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     shown: Table | None = None
+    note: str = ""
 
     def part(self, headings: Mapping[str, str], rows: Sequence[tuple[Cell, ...]]) -> Table:
         """Return some of its columns, by their headings for people, of some of its rows."""
         places = [self.columns.index(column) for column in headings]
         shown = tuple(tuple(row[place] for place in places) for row in rows)
-        return Table(self.name, self.title, tuple(headings.values()), shown)
+        return Table(self.name, self.title, tuple(headings.values()), shown, note=self.note)
 
     def csv(self) -> str:
         """Return the table for programs, floats with all their digits."""
@@ -115,6 +118,7 @@ class Table:
         lines = [f"**{markdown_text(self.title)}**", "", _piped(self.columns)]
         lines.append("|" + "|".join("---:" if right else "---" for right in self.right_aligned) + "|")
         lines += [_piped(row) for row in self.rounded_rows]
+        lines += ["", markdown_text(self.note)] if self.note else []
         return "\n".join(lines) + "\n"
 
     def latex(self) -> str:
@@ -133,7 +137,9 @@ class Table:
             r"\midrule",
         ]
         lines += [" & ".join(_escaped(cell) for cell in row) + r" \\" for row in self.rounded_rows]
-        lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+        lines += [r"\bottomrule", r"\end{tabular}"]
+        lines += [rf"\par {_escaped(self.note)}"] if self.note else []
+        lines += [r"\end{table}"]
         return "\n".join(lines) + "\n"
 
     @property
@@ -208,13 +214,17 @@ def ranking(study: Study, budget: str, scoring: str) -> Table:
     medians = [{method: float(np.median(scores.hvr)) for method, scores in case.scores.items()} for case in cases]
     ranks: dict[str, float] = {}
     alike: set[str] = set()
-    said = "no two methods on all models"
+    said, note = "no two methods on all models", ""
     if len(on_all_models(cases)) > 1:
         methods, found = ranked(cases)
         ranks = dict(zip(methods, map(float, found.mean_ranks), strict=True))
         best = int(np.argmin(found.mean_ranks))
         alike = {methods[k] for group in found.groups if best in group for k in group} | {methods[best]}
         said = f"Friedman p = {found.p:.2g}, critical difference {found.critical_difference:.3g}"
+        if len(cases) < (least := least_cases(len(methods))):
+            models = "1 model" if len(cases) == 1 else f"{len(cases)} models"
+            note = f"With {models} Nemenyi's test cannot tell {len(methods)} methods apart, however they rank; "
+            note += f"at least {least} models are needed."
     columns = (
         "method", "kind", "mean_rank", "hvr_median", "best_on", "models", "evaluations_mean", "measured_by",
         "not_told_apart_from_best",
@@ -238,7 +248,7 @@ def ranking(study: Study, budget: str, scoring: str) -> Table:
         "models": "of models", "evaluations_mean": "evaluations a front", "measured_by": "measured by",
         "not_told_apart_from_best": "not told apart from the best",
     }  # fmt: skip
-    table = Table("ranking", title, columns, tuple(rows))
+    table = Table("ranking", title, columns, tuple(rows), note=note)
     return replace(table, shown=table.part(names, [(*row[:6], _round_or_none(row[6]), *row[7:]) for row in rows]))
 
 

@@ -102,7 +102,7 @@ class HeightSurface:
 
     @property
     def neighbours(self) -> Csr:
-        """The one-rings of the original mesh."""
+        """One-rings of the original, (indptr, indices): those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``."""
         return self.model.neighbours
 
     @property

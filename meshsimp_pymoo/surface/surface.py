@@ -272,7 +272,7 @@ class Surface(Protocol):
 
     @property
     def neighbours(self) -> Csr:
-        """Where each vertex may move."""
+        """Where each vertex may move: (indptr, indices); those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``."""
         ...
 
     @property

@@ -7,6 +7,7 @@ import os
 import re
 import sys
 import time
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from pymoo.optimize import minimize
 
 from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.config import BUDGET_KINDS, PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
+from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh
@@ -274,6 +276,94 @@ def test_what_a_readers_operator_raises_is_said_with_its_line(tmp_path, monkeypa
     config = changed(tmp_path, algorithms="[{preset: nsga2_v1, operators: {mutation: readers_wrong.Wrong}}]")
     with pytest.raises(ConfigError, match=r"no attribute 'vertices'.* \(readers_wrong\.py, line 5\)"):
         read_experiment_file(config)
+
+
+OWN = """
+import numpy as np
+from pymoo.core.crossover import Crossover
+from pymoo.core.duplicate import DuplicateElimination
+from pymoo.core.mutation import Mutation
+from pymoo.core.repair import Repair
+from pymoo.core.sampling import Sampling
+
+
+class M(Mutation):
+    def _do(self, problem, X, random_state=None, **kwargs):
+        return {}
+
+
+class C(Crossover):
+    def __init__(self):
+        super().__init__(2, 2)
+
+    def _do(self, problem, X, random_state=None, **kwargs):
+        return {}
+
+
+class S(Sampling):
+    def _do(self, problem, n_samples, random_state=None, **kwargs):
+        return {}
+
+
+class R(Repair):
+    def _do(self, problem, X, random_state=None, **kwargs):
+        return {}
+
+
+class D(DuplicateElimination):
+    def _do(self, pop, other, is_duplicate):
+        return {}
+"""
+
+
+def with_own(tmp_path, monkeypatch, kind: str, returned: str) -> Path:
+    """Write a configuration with an operator of a kind that returns what an expression gives."""
+    (tmp_path / "readers_kinds.py").write_text(OWN.replace("{}", returned))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "readers_kinds", raising=False)
+    importlib.invalidate_caches()
+    name = f"readers_kinds.{kind[0].upper()}"
+    return changed(tmp_path, algorithms=f"[{{preset: nsga2_v1, operators: {{{kind}: {name}}}}}]")
+
+
+@pytest.mark.parametrize(
+    ("kind", "returned", "said"),
+    [
+        ("mutation", "X[:, 1:].astype(float)", "float64 (100, 80); expected bool (100, 81)"),
+        ("mutation", "X * 1", "int64 (100, 81); expected bool (100, 81)"),
+        ("mutation", "None", "nothing; end _do with return an array like X"),
+        ("mutation", "list(X)", "a list; expected bool (100, 81)"),
+        ("crossover", "X[:1]", "bool (1, 50, 81); expected bool (2, 50, 81)"),
+        ("sampling", "np.ones((n_samples, 80), bool)", "bool (100, 80); expected bool (100, 81)"),
+        ("sampling", "None", "nothing; end _do with return X"),
+        ("repair", "X[1:]", "bool (99, 81); expected bool (100, 81)"),
+        ("duplicates", "None", "nothing; end _do with return is_duplicate"),
+        ("duplicates", "1.0 * is_duplicate", "float64 (100,); expected bool (100,)"),
+    ],
+)
+def test_what_a_readers_operator_returns_is_named_where_it_is_not_what_pymoo_takes(
+    kind, returned, said, tmp_path, monkeypatch
+):
+    config = with_own(tmp_path, monkeypatch, kind, returned)
+    name = f"readers_kinds.{kind[0].upper()}"
+    assert f"on 'pyramid:9', a trial: {kind} {name} returned {said}" in message(config)
+    operator = sys.modules["readers_kinds"]
+    assert getattr(operator, kind[0].upper())._do.__module__ == "readers_kinds"
+    assert not hasattr(getattr(operator, kind[0].upper())._do, "__wrapped__")  # as it was before the trial
+
+
+@pytest.mark.parametrize(
+    ("chance", "repeats"),
+    [("random_state.random", True), ("np.random.random", False), ("np.random.default_rng().random", False)],
+)
+def test_chance_that_does_not_come_from_the_seed_is_found_in_the_trial(chance, repeats, tmp_path, monkeypatch):
+    config = with_own(tmp_path, monkeypatch, "mutation", f"X ^ ({chance}(X.shape) < 0.1)")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ExperimentWarning)
+        read_experiment_file(config)
+    said = [str(warning.message) for warning in caught]
+    line = "nsga2_v1: the same seed gave two different results on the trial; take all chance from random_state, else "
+    assert said == ([] if repeats else [f"{line}no run repeats"])
 
 
 def test_the_name_of_a_model_file_does_not_change_what_the_problem_is(tmp_path):

@@ -605,6 +605,88 @@ def die(task: object, shared: object) -> None:
     os._exit(9)
 
 
+WRONG = """
+from pymoo.core.mutation import Mutation
+
+
+class OwnError(Exception):
+    def __init__(self, one, two):  # which no pickle brings to another process
+        super().__init__(one + two)
+
+
+class Wrong(Mutation):
+    def _do(self, problem, X, **kwargs):
+        if problem.n_var != 81:
+            raise OwnError("only on\\n", "the real model")
+        return X
+"""
+
+
+@pytest.fixture
+def failing(tmp_path, monkeypatch):
+    """An experiment with an operator that fails on one of its models, and not in the trial."""
+    (tmp_path / "readers_late.py").write_text(WRONG, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    text = CONFIG.replace("N1, preset: nsga2_v1", "Own, preset: nsga2_v1, operators: {mutation: readers_late.Wrong}")
+    text = re.sub(r"  - \{name: (N2|G1).*\n", "", text).replace("[1, 2, 3]", "[1, 2]")
+    config = tmp_path / "late.yaml"
+    config.write_text(text, encoding="utf-8")
+    yield config
+    sys.modules.pop("readers_late", None)
+
+
+def check_what_is_said_and_left(out: Path, said: str) -> None:
+    assert said == (
+        "the run 'Own' on Face, seed 1, failed, as did 1 more of 4: OwnError: only on the real model "
+        f"(readers_late.py, line 13); finished runs are kept in {out}: mend it and give the same command "
+        f"(traceback: {out / 'failed.txt'})"
+    )
+    store = RunStore(out)
+    assert sorted(store.get(key).record["problem"] for key in store.paths) == ["Peaks"] * 4
+    log = (out / "failed.txt").read_text()
+    assert log.count("Traceback") == 2
+    assert log.count("OwnError: only on") == 2
+    assert "the run 'Own' on Face, seed 2\n\nTraceback" in log
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_an_operator_raises_on_the_real_model_is_said_in_a_line_once_all_other_runs_are_done(
+    failing, jobs, capsys
+):
+    out = failing.parent / "out"
+    assert main(["run", str(failing), "-o", str(out), "--jobs", str(jobs), "-q"]) == 2
+    _, first, last = capsys.readouterr().err.splitlines()  # before: that its state cannot be saved
+    assert re.search(
+        r"the run 'Own' on Face, seed [12], failed: OwnError: .* line 13\); the other runs are done", first
+    )
+    check_what_is_said_and_left(out, last.removeprefix("meshsimp: "))
+    module = failing.parent / "readers_late.py"
+    if jobs == 1:  # mended, it is done again: all of it, for the operator is another one now
+        module.write_text(WRONG.replace("!= 81", "< 0"), encoding="utf-8")
+        sys.modules.pop("readers_late")
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ExperimentWarning)
+            assert run_experiment(failing, out).finished == 8
+        assert "not asked for" in str(caught[-1].message)
+        assert not (out / "failed.txt").exists()
+
+
+@pytest.mark.slow
+def test_what_an_operator_raises_on_a_cluster_is_said_in_a_line(failing):
+    distributed = pytest.importorskip("distributed")
+    out = failing.parent / "out"
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0", silence_logs=50
+        ) as cluster,
+        DaskEngine(cluster.scheduler_address) as engine,
+        pytest.warns(ExperimentWarning, match="failed"),
+        pytest.raises(ResultError) as caught,
+    ):
+        run_experiment(failing, out, engine=engine)
+    check_what_is_said_and_left(out, str(caught.value))
+
+
 # ------------------------------------------------------------------------------------------------------ baselines
 
 
@@ -724,14 +806,16 @@ class Unsaved(NSGA2):
     """NSGA-II of somebody's own, of whose state a checkpoint knows nothing."""
 
 
-def test_an_algorithm_whose_state_cannot_be_saved_is_named_once_before_its_searches(tmp_path):
+def test_algorithms_whose_state_cannot_be_saved_are_named_once_before_their_searches(tmp_path):
     text = CONFIG.replace("{name: N1, preset: nsga2_v1", "{name: U1, class: test_runner.Unsaved")
+    second = "{name: U2, class: test_runner.Unsaved, parameters: {pop_size: 10"
+    text = text.replace("{name: N2, preset: nsga2_v2, parameters: {pop_size: 12", second)
     (tmp_path / "u.yaml").write_text(text.replace("[1, 2, 3]", "[1, 2]"), encoding="utf-8")
     with pytest.warns(ExperimentWarning) as caught:
         run_experiment(tmp_path / "u.yaml", tmp_path / "out", checkpoint=0.0)
     assert [str(warning.message) for warning in caught] == [
-        "U1: a search that is cut off begins anew, for its state cannot be saved: algorithm is a test_runner.Unsaved, "
-        "which a checkpoint cannot carry"
+        "U1 and U2: searches that are cut off begin anew, for their state cannot be saved: algorithm is a "
+        "test_runner.Unsaved, which a checkpoint cannot carry"
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("error", ExperimentWarning)

@@ -89,6 +89,23 @@ def test_the_tests_are_the_analysis_own(study):
     assert float(row["mean_a"]) > float(row["mean_b"])  # negated: larger is better
 
 
+@pytest.mark.parametrize(("n_models", "n_methods", "least"), [(1, 2, 6), (2, 3, 3), (2, 5, 3), (5, 2, 6)])
+def test_where_the_ranks_of_so_few_models_can_tell_nothing_apart_that_is_said_below(
+    tmp_path, n_models, n_methods, least
+):
+    fronts = {f"m{n}": {f"N{k}": {1: [(1 + k / 10, 20)]} for k in range(n_methods)} for n in range(n_models)}
+    table = tables.ranking(Study(store(tmp_path / "few", fronts)), BUDGET, NEAREST)
+    models = "1 model" if n_models == 1 else f"{n_models} models"
+    said = f"With {models} Nemenyi's test cannot tell {n_methods} methods apart, however they rank; at least {least} "
+    assert table.markdown().endswith(f"|\n\n{said}models are needed.\n")
+    assert f"\\par {said}" in table.latex()
+    assert said not in table.csv()
+    enough = {f"m{n}": fronts["m0"] for n in range(least)}
+    table = tables.ranking(Study(store(tmp_path / "enough", enough)), BUDGET, NEAREST)
+    assert table.note == ""
+    assert [row["not_told_apart_from_best"] for row in read(table)][-1] == ""  # where all agree, the last is told apart
+
+
 def test_of_a_large_table_people_are_shown_some_columns_by_names_of_their_own():
     table = Table("t", "A title", ("a", "b", "c"), ((1, 2.0, "x"), (3, 4.0, "y")))
     part = table.part({"c": "third", "a": "first"}, table.rows[1:])
