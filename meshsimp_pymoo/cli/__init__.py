@@ -5,7 +5,8 @@ code    meaning
 ======  ==============================================================================================
 0       done
 1       no solution of the front meets the wanted target; ``simplify`` has written the front, ``pick`` nothing
-2       bad input: one line on stderr says what, where and the way out; nothing is written
+2       bad input: one line on stderr says what, where and the way out; nothing is written, but of an experiment
+        that some runs failed of, all others
 130     interrupted (Ctrl-C): the front found so far is written, if there was one; of an experiment, all runs
         that were finished
 143     the same after SIGTERM, which schedulers and containers send
