@@ -42,6 +42,10 @@ class CodeWarning(UserWarning):
     """Compiled code cannot be kept or read: nothing is wrong but the time it takes to make it again."""
 
 
+class ExperimentWarning(UserWarning):
+    """Results are usable, but the user should know: runs are missing, damaged, stale, failed or were skipped."""
+
+
 class PictureWarning(UserWarning):
     """A picture or a page could not be made; the results are there."""
 

@@ -53,8 +53,7 @@ from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.comparison.baselines import BASELINES
-from meshsimp_pymoo.comparison.store import ExperimentWarning
-from meshsimp_pymoo.errors import InputError, meant, reason_of
+from meshsimp_pymoo.errors import ExperimentWarning, InputError, meant, reason_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import listed
@@ -869,9 +868,10 @@ def _checked(kind: str, name: str) -> Iterator[None]:
             end = {"sampling": "X", "duplicates": "is_duplicate"}.get(kind, "an array like X")
             raise ValueError(f"{kind} {name} returned nothing; end _do with return {end}")
         expected = _shape_of(kind, operator, args)
-        if expected is None or (isinstance(found, np.ndarray) and (found.dtype, found.shape) == (bool, expected)):
+        X = np.asarray(found) if kind == "sampling" else found  # pymoo takes rows in a list there
+        if expected is None or (isinstance(X, np.ndarray) and (X.dtype, X.shape) == (bool, expected)):
             return found
-        array = f"{found.dtype} {found.shape}" if isinstance(found, np.ndarray) else f"a {type(found).__name__}"
+        array = f"{X.dtype} {X.shape}" if isinstance(X, np.ndarray) else f"a {type(X).__name__}"
         raise ValueError(f"{kind} {name} returned {array}; expected bool {expected}")
 
     target._do = checked

@@ -26,8 +26,8 @@ from typing import TYPE_CHECKING
 from meshsimp_pymoo.comparison import findings_page, tables
 from meshsimp_pymoo.comparison.findings import Finding, findings
 from meshsimp_pymoo.comparison.page import experiment_page
-from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.comparison.study import Study
+from meshsimp_pymoo.errors import ExperimentWarning
 from meshsimp_pymoo.files import draw_into, locked, new_folder, put_back, put_text
 from meshsimp_pymoo.report.document import slug
 

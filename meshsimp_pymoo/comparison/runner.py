@@ -58,7 +58,6 @@ from meshsimp_pymoo.comparison.config import (
 )
 from meshsimp_pymoo.comparison.store import (
     FORMAT,
-    ExperimentWarning,
     RunStore,
     claim_experiment,
     fingerprint,
@@ -67,7 +66,7 @@ from meshsimp_pymoo.comparison.store import (
     write_run,
 )
 from meshsimp_pymoo.comparison.trace import Trace
-from meshsimp_pymoo.errors import ResultError, ToolUnavailable, reason_of
+from meshsimp_pymoo.errors import ExperimentWarning, ResultError, ToolUnavailable, reason_of
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.front import Front

@@ -52,10 +52,6 @@ KEY_DIGITS = 16
 NOT_STORED = ("attributes", "facts", "georeference", "found", "material")
 
 
-class ExperimentWarning(UserWarning):
-    """Results are usable, but the user should know: runs are missing, damaged, stale or were skipped."""
-
-
 @brief
 @dataclass(frozen=True, eq=False)
 class StoredRun:

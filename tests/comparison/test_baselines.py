@@ -25,10 +25,10 @@ from meshsimp_pymoo.comparison.config import read_experiment_file
 from meshsimp_pymoo.comparison.figures import fronts_figure, meshes_figure
 from meshsimp_pymoo.comparison.report import write_tables
 from meshsimp_pymoo.comparison.runner import run_experiment
-from meshsimp_pymoo.comparison.store import ExperimentWarning, classic_mesh
+from meshsimp_pymoo.comparison.store import classic_mesh
 from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.comparison.tables import baselines as baselines_table
-from meshsimp_pymoo.errors import ToolUnavailable
+from meshsimp_pymoo.errors import ExperimentWarning, ToolUnavailable
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning

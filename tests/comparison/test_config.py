@@ -16,8 +16,8 @@ from pymoo.optimize import minimize
 
 from meshsimp_pymoo.comparison.baselines import BASELINES
 from meshsimp_pymoo.comparison.config import BUDGET_KINDS, PROBLEM_OPTIONS, ConfigError, read_experiment_file, settings
-from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ExperimentWarning
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.problem import MeshProblem
@@ -350,6 +350,11 @@ def test_what_a_readers_operator_returns_is_named_where_it_is_not_what_pymoo_tak
     operator = sys.modules["readers_kinds"]
     assert getattr(operator, kind[0].upper())._do.__module__ == "readers_kinds"
     assert not hasattr(getattr(operator, kind[0].upper())._do, "__wrapped__")  # as it was before the trial
+
+
+def test_a_readers_sampling_may_return_rows_in_a_list(tmp_path, monkeypatch):
+    row = "random_state.random(problem.n_var) < 0.5"
+    read_experiment_file(with_own(tmp_path, monkeypatch, "sampling", f"[{row} for _ in range(n_samples)]"))
 
 
 @pytest.mark.parametrize(

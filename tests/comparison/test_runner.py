@@ -35,11 +35,11 @@ from meshsimp_pymoo.comparison.findings_page import reservations
 from meshsimp_pymoo.comparison.meshlab import meshlab_available
 from meshsimp_pymoo.comparison.report import write_report, write_tables
 from meshsimp_pymoo.comparison.runner import perform, plan, run_experiment
-from meshsimp_pymoo.comparison.store import FORMAT, ExperimentWarning, RunStore, read_run
+from meshsimp_pymoo.comparison.store import FORMAT, RunStore, read_run
 from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.comparison.trace import Trace
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ResultError, ToolUnavailable
+from meshsimp_pymoo.errors import ExperimentWarning, ResultError, ToolUnavailable
 from meshsimp_pymoo.files import locked
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.indicators import non_dominated

@@ -14,10 +14,10 @@ from handmade import BUDGET, store
 
 from meshsimp_pymoo.comparison import tables
 from meshsimp_pymoo.comparison.report import write_tables
-from meshsimp_pymoo.comparison.store import ExperimentWarning
 from meshsimp_pymoo.comparison.study import EPSILON_SHIFT, Study
 from meshsimp_pymoo.comparison.study import INDICATORS as NAMES
 from meshsimp_pymoo.comparison.tables import Table
+from meshsimp_pymoo.errors import ExperimentWarning
 from meshsimp_pymoo.report.document import slug
 
 # Optimal together: (10, 20), (5, 40), (0, 60). Normalised by that front: error / 10, (triangles - 20) / 40.
