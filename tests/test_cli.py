@@ -28,7 +28,7 @@ from samples import freed
 
 import meshsimp_pymoo
 from meshsimp_pymoo import Front, MeshProblem, memetic
-from meshsimp_pymoo.cli import main, searching
+from meshsimp_pymoo.cli import main, searching, terminal
 from meshsimp_pymoo.cli.commands.completion import SHELLS
 from meshsimp_pymoo.cli.parser import make_parser
 from meshsimp_pymoo.cli.requests import Wish
@@ -443,7 +443,10 @@ def test_the_front_of_a_closed_surface_is_cut_out_when_asked(tmp_path, capsys):
     ball = trimesh.creation.icosphere(subdivisions=3)
     write_mesh(tmp_path / "ball.ply", ball.vertices, ball.faces)
     assert run("simplify", tmp_path / "ball.ply", "-o", tmp_path / "no", "--up", "z") == 2
-    assert "--patch front" in one_line(capsys)
+    assert one_line(capsys).endswith("cut out the patch that faces the viewer with --patch front\n")
+    assert run("info", tmp_path / "ball.ply") == 2
+    said = "name the viewing side with --up z and cut the patch that faces it with --patch front"
+    assert said in capsys.readouterr().err
     assert run("simplify", tmp_path / "ball.ply", "-o", tmp_path / "out", "--up", "z", "--patch", "front", *QUICK) == 0
     mesh = trimesh.load(tmp_path / "out" / read_front(tmp_path / "out").meshes[-1], process=False)
     assert mesh.vertices[:, 2].min() > -0.2
@@ -510,6 +513,17 @@ def test_a_terminal_sees_progress_in_short_lines(tmp_path, monkeypatch):
     lines = [line.strip() for line in re.split(r"\x1b|[\r\n]", shown) if "left" in line]
     assert re.fullmatch(r"\[2Kroof\.ply \S+ +\d+ % \d+ s left; drawing", lines[-1])
     assert "a_folder_with_a_long_name" not in shown
+
+
+def test_a_stage_that_takes_longer_than_estimated_says_so(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "LATE_SECONDS", 0.0)
+    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.25)
+    with terminal.Stages(False, "compiling", {"compiling": 0.3}, lines=True) as shown:
+        with shown.stage("compiling", "compiling once"):
+            time.sleep(0.9)
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"meshsimp: compiling: \d+% after 0 s; 0 s left; compiling once", first)
+    assert last == "meshsimp: compiling: after 1 s; longer than estimated; compiling once"
 
 
 def test_the_front_so_far_is_said_at_a_few_sizes():
@@ -1196,7 +1210,7 @@ def test_a_grid_with_an_obvious_nodata_value_is_read_with_a_warning(tmp_path, ca
     elevation[:, 0] = -9999
     np.save(tmp_path / "dem.npy", elevation)
     assert run("info", tmp_path / "dem.npy") == 0
-    said = r"warning: .*dem\.npy: 5 of 30 heights are -9999, far from all others \(1 to 29\); .* \(--nodata=-9999\)"
+    said = r"warning: .*dem\.npy: 5 of 30 heights are -9999, far from all others \(1 to 29\); .*, say --nodata=-9999\n"
     assert re.search(said, capsys.readouterr().err)
     assert run("info", tmp_path / "dem.npy", "--nodata=-9999") == 0
     out, err = capsys.readouterr()
@@ -1344,7 +1358,35 @@ def test_a_mesh_is_described_by_every_measure_that_means_something(monkeypatch):
     whole = replace(quality, surface_error=0.123456, min_angle_median=31.4159, below_5_degrees=0.0123456)
     said = said.replace("1234.57", "1234.57 m").replace("0.1235", "0.1235 m").replace("0.2346", "0.2346 m")
     said = said.replace("3.457", "3.457 m")
-    assert described(whole, "m") == f"{said}, surface 0.1235 m, least angle 31.42 degrees, thin triangles 0.01235"
+    assert described(whole, "m") == f"{said}, surface 0.1235 m, least angle 31.42 degrees, thin triangles 1.2 %"
+    for share, percent in ((0.0, "0"), (0.00023, "0.02 %"), (0.007458, "0.7 %"), (1.0, "100 %")):
+        assert described(replace(whole, below_5_degrees=share)).endswith(f", thin triangles {percent}")
+
+
+def test_a_share_of_the_triangles_is_resolved_when_the_original_is_known(tmp_path, capsys):
+    out, wish = tmp_path / "out", ("--triangles", "29%")  # of 578: 167.62
+    same = ("simplify", "peaks:18", "-o", out, *wish, "--moves", "20000", "--no-page")
+    assert run(*same) == 0
+    assert "searched: around at most 167 triangles;" in capsys.readouterr().out
+    stored = json.loads((out / "run.json").read_text())
+    assert (stored["settings"]["triangles"], stored["wish"], stored["model"]["triangles"]) == (
+        167,
+        {"triangles": 167},
+        578,
+    )
+    assert run("pick", out, *wish) == 0
+    assert f"solution {stored['chosen']} of" in capsys.readouterr().out
+    (out / "front.png").unlink()
+    assert run(*same) == 0  # which is known again
+    assert "making the pictures that are missing" in capsys.readouterr().err
+    np.save(tmp_path / "grid.npy", np.random.default_rng(1).random((70, 80)))
+    tiled = ("simplify", tmp_path / "grid.npy", "--tile", "64", "-o", tmp_path / "tiles", "--triangles", "0.5%")
+    assert run(*tiled, "--no-page") == 0
+    stored = json.loads((tmp_path / "tiles" / "run.json").read_text())
+    assert stored["settings"]["triangles"] == 54  # of 2 x 69 x 79 = 10902
+    capsys.readouterr()
+    for share in ("0%", "101%", "%", "nan%", "-5%"):
+        assert run("pick", out, f"--triangles={share}") == 2, share
 
 
 def test_info_without_a_model_lists_the_built_in_ones(capsys):

@@ -11,6 +11,7 @@ import pytest
 
 import meshsimp_pymoo
 from meshsimp_pymoo import warming
+from meshsimp_pymoo.cli import preparing
 from meshsimp_pymoo.compiling.store import Stored
 from meshsimp_pymoo.warming import PARTS, SEARCH, WISH, Warming
 
@@ -109,6 +110,14 @@ def test_the_first_call_says_that_it_compiles_and_keeps_it_apart(first_call):
     assert run["compile_seconds"] > 1
     assert run["seconds"] < 5
     assert any(line.startswith("compiled once for this machine: ") for line in said)
+
+
+def test_the_message_names_what_is_compiled_besides(monkeypatch):
+    monkeypatch.setattr(warming, "missing", lambda names: [part for part in PARTS if part.name in names])
+    monkeypatch.setattr(Warming, "expected", 13.4)
+    once = "compiling once for this machine"
+    assert preparing._once(Warming([*SEARCH, "scores"])) == f"{once}, about 13 s"
+    assert preparing._once(Warming(["free meshes", "scores"])) == f"{once}: free meshes and scores, about 13 s"
 
 
 @pytest.mark.slow

@@ -9,8 +9,8 @@ from __future__ import annotations
 import argparse
 import re
 import textwrap
-from collections.abc import Callable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.formats.table import read_suffixes, written_formats
@@ -73,14 +73,23 @@ def add_wishes(wanted: Any) -> None:
     """Add the ways to say which mesh of a front is wanted: one for each measure that has one."""
     for name, measure in MEASURES.items():
         if measure.wish:
-            kind, metavar = (Real(0), "E") if measure.unit else (Whole(1), "N")
-            wanted.add_argument(option(name), type=typed(kind.from_text), metavar=metavar, help=measure.wish)
+            parse: Callable[[str], Any]
+            if measure.unit:
+                parse, metavar, further = Real(0).from_text, "E", ""
+            else:
+                parse, metavar, further = count_or_share, "N", ", or of that share of the original's (10%%)"
+            wanted.add_argument(option(name), type=typed(parse), metavar=metavar, help=measure.wish + further)
 
 
-def wishes_of(args: argparse.Namespace) -> dict[str, float]:
+def wishes_of(args: argparse.Namespace) -> dict[str, Any]:
     """Return the limits that the command line names, by measure."""
     wished = {name: getattr(args, name) for name, measure in MEASURES.items() if measure.wish}
     return {name: limit for name, limit in wished.items() if limit is not None}
+
+
+def in_numbers_of(limits: Mapping[str, Any], original: Callable[[], int]) -> dict[str, Any]:
+    """Return limits with numbers of triangles for shares of the original's; these are asked for where it matters."""
+    return {name: limit.of(original()) if isinstance(limit, Share) else limit for name, limit in limits.items()}
 
 
 def option(name: str) -> str:
@@ -143,6 +152,30 @@ def typed(parse: Callable[[str], Any]) -> Callable[[str], Any]:
 def whole(least: int) -> Callable[[str], Any]:
     """Return the type of whole numbers of at least this."""
     return typed(Whole(least).from_text)
+
+
+class Share(NamedTuple):
+    """A number of things as a share of the original's, whose number is known when that is open."""
+
+    percent: float
+
+    def of(self, count: int) -> int:
+        """Return the number, rounded down, but at least 1.
+
+        >>> Share(10.0).of(5813), Share(29.0).of(100), Share(0.01).of(100)
+        (581, 29, 1)
+        """
+        return max(1, int(self.percent * count / 100))
+
+
+def count_or_share(text: str) -> int | Share:
+    """Return the whole number of "500", or the share of "10%"."""
+    if not text.endswith("%"):
+        return Whole(1).from_text(text)
+    percent = Real(0, strict=True).from_text(text[:-1])
+    if percent > 100:
+        raise ValueError(f"{text!r} is more than all of the original's")
+    return Share(percent)
 
 
 def tile(text: str) -> int:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 
 from meshsimp_pymoo.cli.terminal import Stages, say
 from meshsimp_pymoo.compiling.store import place, told_of_compiling
+from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.warming import Warming
 
 ONCE = "compiling once for this machine"
@@ -26,7 +27,7 @@ class Compiling:
         if not self._warming.parts:
             return
         before = self.seconds
-        with self._shown.stage("compiling", f"{ONCE}, about {self._warming.expected:.0f} s"):
+        with self._shown.stage("compiling", _once(self._warming)):
             self._warming.finish()
         self.seconds = before + self._shown.seconds["compiling"]
 
@@ -38,7 +39,7 @@ def compiling(names: Iterable[str], shown: Stages) -> Iterator[Compiling]:
     shown.expect("compiling", warming.expected)
     if warming.parts and not shown.quiet:
         if not sys.stderr.isatty():
-            say(f"{ONCE}, about {warming.expected:.0f} s")
+            say(f"{_once(warming)} (longer on a busy machine)")
         _say_where()
     found = Compiling(warming, shown)
 
@@ -72,6 +73,13 @@ def said_when_compiling(quiet: bool) -> Iterator[None]:
 
     with told_of_compiling(told):
         yield
+
+
+def _once(warming: Warming) -> str:
+    """Say that parts are compiled, which where it is not all that a search needs, and about how long it takes."""
+    names = [part.name for part in warming.parts]
+    what = "" if "evaluation" in names else f": {listed(names, 'and')}"
+    return f"{ONCE}{what}, about {warming.expected:.0f} s"
 
 
 def _say_where() -> None:

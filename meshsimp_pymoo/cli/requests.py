@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from meshsimp_pymoo.cli.arguments import option, settings_from, wishes_of
+from meshsimp_pymoo.cli.arguments import Share, in_numbers_of, option, settings_from, wishes_of
 from meshsimp_pymoo.errors import UsageError
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import listed, written_formats
@@ -43,14 +43,18 @@ class Search:
 class Wish:
     """Which solution is wanted as the chosen mesh: within limits, by measure, or the knee; none if nothing is said."""
 
-    limits: dict[str, float] = field(default_factory=dict)
+    limits: dict[str, Any] = field(default_factory=dict)
     knee: bool = False
 
     @property
     def triangles(self) -> int | None:
-        """The most triangles that are wanted."""
+        """The most triangles that are wanted; None too where they are a share and the original is not known yet."""
         found = self.limits.get("triangles")
-        return None if found is None else int(found)
+        return None if found is None or isinstance(found, Share) else int(found)
+
+    def among(self, original: Callable[[], int]) -> Wish:
+        """Return what is wanted of an original with so many triangles."""
+        return replace(self, limits=in_numbers_of(self.limits, original))
 
     @property
     def options(self) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from meshsimp_pymoo.cli.arguments import in_numbers_of
 from meshsimp_pymoo.cli.requests import Output, Request, Wish
 from meshsimp_pymoo.cli.terminal import (
     DRAWING,
@@ -56,7 +57,15 @@ def lacks_pictures(output: Output, what: Mapping[str, Any]) -> bool:
         run = read_front(folder).run
     except ResultError:
         return False
-    return not difference({name: run.get(name) for name in what}, what)
+    settings = in_numbers_of(what["settings"], lambda: triangles_of(run["model"]))
+    return not difference({name: run.get(name) for name in what}, {**what, "settings": settings})
+
+
+def triangles_of(model: Mapping[str, Any]) -> int:
+    """Return how many triangles an original has, by its record; a grid of tiles has two for each square."""
+    if "rows" in model:
+        return 2 * (int(model["rows"]) - 1) * (int(model["columns"]) - 1)
+    return int(model["triangles"])
 
 
 def hand_over_stored(request: Request, surface: Surface, shown: Stages) -> int:

@@ -6,7 +6,7 @@ import gc
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,7 @@ def _simplify(request: Request, shown: Stages) -> int:
             format_to_write(output.format).check(problem.model)
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
+        request = replace(request, wish=request.wish.among(lambda: len(problem.model.faces)))
         _refuse_impossible(problem, request.wish, quiet=output.quiet)
     if search.time is not None:
         seconds = _search_seconds(request, search.time)
@@ -241,7 +242,7 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
         elif search.moves is not None:
             amount -= _free_moves(amount)
     if request.is_targeted:
-        algorithm: Any = targeted(pop_size=search.population, **request.wish.limits)  # type: ignore[arg-type]
+        algorithm: Any = targeted(pop_size=search.population, **request.wish.limits)
     elif request.free.free and preset.frees:
         algorithm = preset.function(pop_size=search.population, triangulation="free", **request.free.how)
     else:

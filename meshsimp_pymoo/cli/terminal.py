@@ -7,6 +7,7 @@ import json
 import logging
 import math
 import os
+import re
 import shutil
 import signal
 import sys
@@ -78,6 +79,9 @@ ENDING = (signal.SIGINT, signal.SIGTERM)
 
 # Where nobody sees a bar: seconds between two lines of progress, and at least this share of the time so far.
 LINE_SECONDS, LINE_SHARE = 10.0, 0.05
+
+# What is said where a stage of which only the clock tells takes so much longer than it was thought to [s].
+LATE, LATE_SECONDS = "longer than estimated", 1.0
 
 # Of the name before the progress bar; the front so far is to fit beside it into 80 columns.
 LONGEST_NAME = 18
@@ -272,7 +276,9 @@ class Stages:
             share, words = told
             left = (now - begun) * (1 - share) / share if share > 0 else max(self._plan[stage] - (now - begun), 0.0)
             spent = now - self._begun
-            self._draw(spent / max(spent + left + later, 1e-9), f"{_in_words(left + later)} left; {words}")
+            is_late = share == 0 and now - begun > self._plan[stage] + LATE_SECONDS
+            known = LATE if is_late else f"{_in_words(left + later)} left"
+            self._draw(spent / max(spent + left + later, 1e-9), f"{known}; {words}")
 
         def show(share: float, words: str) -> None:
             nonlocal told
@@ -362,7 +368,8 @@ def _lines(name: str) -> Iterator[Callable[[float, str], None]]:
         pause = LINE_SECONDS
         while not done.wait(pause):
             spent, (share, state) = time.perf_counter() - begun, told
-            say(f"{name}: {share:.0%} after {_in_words(spent)}{state and '; '}{state}")
+            known = "" if state.startswith(LATE) else f"{share:.0%} "
+            say(f"{name}: {known}after {_in_words(spent)}{state and '; '}{state}")
             pause = max(LINE_SECONDS, LINE_SHARE * spent)
 
     speaking = threading.Thread(target=speak, name="meshsimp-lines", daemon=True)
@@ -435,6 +442,9 @@ def described(quality: Quality, unit: str = LENGTH) -> str:
         if measure.meaning and not math.isnan(value):
             number = f"{value:.{6 if name == 'error' else 4}g}" if isinstance(value, float) else f"{value}"
             behind = in_unit(unit) if measure.is_error else f" {measure.unit}" * bool(measure.unit)
+            if measure.is_share and value:
+                percent = 100 * value
+                number, behind = f"{round(percent, 1) or float(f'{percent:.1g}'):g}", " %"
             said.append(f"{measure.label.removesuffix(' error')} {number}{behind}")
     return ", ".join(said)
 
@@ -451,7 +461,17 @@ def in_unit(unit: str) -> str:
 
 def say(line: str) -> None:
     """Print one line on stderr."""
-    print(f"meshsimp: {printable(line)}", file=sys.stderr)
+    print(f"meshsimp: {printable(_with_options(line))}", file=sys.stderr)
+
+
+def _with_options(line: str) -> str:
+    """Return what a message of the package says with the options, without what Python calls them.
+
+    >>> _with_options("cut it with --patch front (patch='front')"), _with_options("say classes=2 (--classes 2)")
+    ('cut it with --patch front', 'say --classes 2')
+    """
+    line = re.sub(r"(--[a-z-]+ \S+) \([a-z_]+='[^']*'\)", r"\1", line)
+    return re.sub(r"\b[a-z_]+=\S+ \((--[^()]+)\)", r"\1", line)
 
 
 def there(folder: Path, *names: str) -> str:

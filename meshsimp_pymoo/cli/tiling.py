@@ -11,7 +11,7 @@ from typing import Any
 
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import TILED_FROM, Free, Output, Request, Search, Tiling
-from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures
+from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures, triangles_of
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, WRITING, Stages, answering, say, stop_if_interrupted
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.formats.options import Options
@@ -59,10 +59,10 @@ def refuse_alone(tiling: Tiling) -> None:
 def simplify_tiled(request: Request, shown: Stages) -> int:
     """Thin a height grid tile by tile and write its front to a new folder; return the exit code."""
     _refuse_unknown(request)
-    wish, output, tiling = request.wish, request.output, request.tiling
+    output, tiling = request.output, request.tiling
     out, tile = output.folder, tiling.tile or TILE
     timed = {} if request.search.time is None else {"time": request.search.time}
-    what = {"settings": request.wanted | timed | {"tile": tile, "pieces": tiling.pieces}}
+    what: dict[str, Any] = {"settings": request.wanted | timed | {"tile": tile, "pieces": tiling.pieces}}
     is_drawn_only = lacks_pictures(output, what | {"options": plain(request.options)})
     if not is_drawn_only:
         _claim(output)
@@ -71,6 +71,10 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
             grid = open_grid(request.model, request.options)
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
+    rows, columns = grid.shape
+    wish = request.wish.among(lambda: triangles_of({"rows": rows, "columns": columns}))
+    request = replace(request, wish=wish)
+    what["settings"] |= wish.limits
     rules = replace(request.rules, measure=request.measure or Rules().measure)
     surface = GridSurface(grid, rules)
     if is_drawn_only:

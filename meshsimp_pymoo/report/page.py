@@ -181,7 +181,7 @@ def simplification_page(
         thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing)],
         heights={"value": f"{exaggeration:g}", "step": f"{exaggeration / 20:g}", "most": f"{5 * exaggeration:g}"},
         examples={
-            "triangles": columns["triangles"][count // 2],
+            "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,

@@ -52,6 +52,8 @@ class Measure(NamedTuple):
         Of a wish for an error: the objective of the same order, which is lowered for it.
     more_is_better : bool
         Whether nobody wants at most so much of it.
+    is_share : bool
+        Whether people read it in per cent.
     """
 
     of: Callable[[Any, float], Any] | None
@@ -64,6 +66,7 @@ class Measure(NamedTuple):
     wish: str = ""
     searched: str = ""
     more_is_better: bool = False
+    is_share: bool = False
 
     @property
     def is_error(self) -> bool:
@@ -182,6 +185,7 @@ class Quality:
     below_5_degrees: float = _measure_of_mesh(
         label="thin triangles",
         meaning="share whose least angle is below 5 degrees",
+        is_share=True,
     )
 
     @property

@@ -184,7 +184,7 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
     if best is None:
         raise ModelError(
             f"{source.name}: faces all ways alike (net projected area {length / max(area, 1e-300):.2g} of the area), "
-            "like a closed surface; name the viewing side with --up (up='z') and cut the patch that faces it with "
+            "like a closed surface; name the viewing side with --up z (up='z') and cut the patch that faces it with "
             "--patch front (patch='front')"
         )
     if best[1].refusal_from_there is None:

@@ -80,7 +80,9 @@ def test_equal_texture_coordinates_under_several_numbers_are_no_seam(textures):
 
 def test_at_seams_the_texture_stays_behind_with_their_number_and_the_rest_is_read(textures):
     text = textured(extra="vt 0.3 0.3\nf 1/6 2/6 3/3\n")
-    with pytest.warns(ModelWarning, match="2 of 5 vertices lie on seams.*its texture stays behind") as said:
+    with pytest.warns(
+        ModelWarning, match="2 of 5 vertices lie on seams.*its texture stays behind .*With a texture"
+    ) as said:
         source = read_source(write(textures, "a.obj", text))
     assert len(said) == 1
     assert "uv" not in source.attributes
@@ -90,7 +92,7 @@ def test_at_seams_the_texture_stays_behind_with_their_number_and_the_rest_is_rea
 
 def test_vertices_without_a_place_on_the_image_are_counted(textures):
     text = textured(extra="v 2 2 2\nf 1 2 6\n")
-    with pytest.warns(ModelWarning, match="1 of 6 vertices have no place on it; its texture stays behind"):
+    with pytest.warns(ModelWarning, match="1 of 6 vertices have no place on it; its texture stays behind$"):
         assert "uv" not in read_source(write(textures, "a.obj", text)).attributes
 
 

@@ -162,6 +162,7 @@ def test_the_page_opens_with_the_chosen_solution_and_says_all_its_numbers(seen, 
     assert f"of {len(front.model.faces):,}" in text
     assert f"{100 * front[2].vertices / front.model.n_vertices:.3g}" in text
     assert f"meshes/002_{front[2].triangles}.ply" in text
+    assert seen.page.input_value("#most-triangles") == str(front[2].triangles)  # to begin a search with
 
 
 def test_a_click_picks_a_solution(used, front):

@@ -85,10 +85,12 @@ def _pick(
     import json
 
     from meshsimp_pymoo.cli.arguments import numbered
+    from meshsimp_pymoo.cli.results import triangles_of
     from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, in_numbers, say, tell
     from meshsimp_pymoo.front import Front
 
     front = Front.load(folder, model=model)
+    wish = wish.among(lambda: triangles_of(front.run["model"]))
     solution: Any
     if number is not None:
         solution, missed = front[numbered(folder, len(front), number)], ""

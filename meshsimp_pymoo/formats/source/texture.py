@@ -55,7 +55,8 @@ def uv_of_corners(vertex: IntArray, uv: FloatArray, name: str) -> FloatArray | N
 def _left_behind(name: str, several: int, without: int, count: int) -> str:
     words = {"lie on seams of the texture, with several coordinates each": several, "have no place on it": without}
     parts = [f"{number} of {count} vertices {what}" for what, number in words.items() if number]
-    return f"{name}: {' and '.join(parts)}; its texture stays behind"
+    way_out = ' (turn it into vertex colours first: docs, "A scan", With a texture)' if several else ""
+    return f"{name}: {' and '.join(parts)}; its texture stays behind{way_out}"
 
 
 def merged(attributes: Mapping[str, npt.ArrayLike], first: IntArray, place: IntArray, name: str) -> dict[str, AnyArray]:
