@@ -944,7 +944,7 @@ def test_where_there_is_no_terminal_a_line_now_and_then_says_how_far_it_is(capsy
 
 def test_a_report_of_nothing_is_refused(tmp_path, capsys):
     assert main(["report", str(tmp_path)]) == 2
-    assert "no experiment is stored there" in capsys.readouterr().err
+    assert "holds neither a front" in capsys.readouterr().err
 
 
 def test_a_leftover_of_a_killed_process_is_removed(config, stored):
