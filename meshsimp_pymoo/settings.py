@@ -278,6 +278,32 @@ class Weights:
         return value
 
 
+class Lines:
+    """Polylines: a file or a word that names them, or lists of positions."""
+
+    def from_text(self, text: str) -> str:
+        """Return the name."""
+        return str(self.from_plain(text))
+
+    def from_plain(self, value: Any) -> Any:
+        """Return the name or the lists."""
+        if isinstance(value, str) and value.strip():
+            return value
+        if isinstance(value, list) and value and all(self._is_line(line) for line in value):
+            return value
+        raise ValueError(
+            "expected a file, sharp:DEGREES, outline, or a list of lines, each a list of two or more positions "
+            "[x, y] or [x, y, z]"
+        )
+
+    def _is_line(self, line: Any) -> bool:
+        if not isinstance(line, list) or len(line) < 2:
+            return False
+        lengths = {len(place) if isinstance(place, list) else 0 for place in line}
+        numbers = (number for place in line for number in place) if lengths <= {2, 3} and len(lengths) == 1 else [""]
+        return all(isinstance(x, (int, float)) and not isinstance(x, bool) and math.isfinite(x) for x in numbers)
+
+
 class Setting(NamedTuple):
     """What is known of a setting beside its name and default.
 

@@ -40,6 +40,9 @@ class OutMesh:
     name: str = "surface"
     up: FloatArray | None = None
     material: Material | None = None
+    #: Chains of edges of the mesh that are break lines: rows of ``vertices``, in order; with their names.
+    lines: tuple[IntArray, ...] = ()
+    line_names: tuple[str, ...] = ()
 
     @property
     def uv(self) -> AnyArray | None:

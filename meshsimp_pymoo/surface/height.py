@@ -19,6 +19,7 @@ from meshsimp_pymoo.surface.centroids import Between, between_vertices
 from meshsimp_pymoo.surface.evaluate import evaluate_subsets, make_workspace, triangulate_subset
 from meshsimp_pymoo.surface.free import FreeGround
 from meshsimp_pymoo.surface.ground import Ground, make_ground
+from meshsimp_pymoo.surface.lining import lined_model
 from meshsimp_pymoo.surface.live import build
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.model import OpenModel
@@ -61,6 +62,8 @@ class HeightSurface:
 
     def __init__(self, model: OpenModel, rules: Rules = DEFAULT) -> None:
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        if rules.break_lines is not None:
+            self.model = lined_model(self.model, rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
         is_small = self.n_vertices < LARGE

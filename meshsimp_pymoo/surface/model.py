@@ -21,6 +21,7 @@ from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
+from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.orient import Up, open_faces, seen_upright, upright_rotation
 from meshsimp_pymoo.surface.places import below_others, feet, highest, warn_of_places
 from meshsimp_pymoo.surface.units import length_unit
@@ -87,6 +88,8 @@ class OpenModel:
         degrees.
     material : Material, optional
         What all faces look like, as far as the file says.
+    lines : ModelLines, optional
+        Break lines, whose vertices are among the points; see :func:`~meshsimp_pymoo.surface.lining.lined_model`.
     """
 
     name: str
@@ -110,6 +113,7 @@ class OpenModel:
     found: dict[str, int] = field(default_factory=dict, repr=False)
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     material: Material | None = field(default=None, repr=False)
+    lines: ModelLines | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         weighted = "" if self.weights is None else ", weighted"
@@ -146,9 +150,10 @@ class OpenModel:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of the geometry and weights: the same for the same vertices and faces in the same file order."""
+        """SHA-256 of geometry, weights and lines: the same for the same vertices and faces in the same file order."""
         digest = hashlib.sha256()
-        for array in (self.points, self.faces, self.source_index, self.weights):
+        segments = None if self.lines is None else self.lines.segments
+        for array in (self.points, self.faces, self.source_index, self.weights, segments):
             if array is not None:
                 digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""Which vertices every mesh keeps: the corners, and what the user names."""
+"""Which vertices every mesh keeps: the corners, those of break lines, and what the user names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LANDMARK_REACH = 0.01
 
 
 def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | AnyArray | None = None) -> BoolArray:
-    """Return which vertices every mesh keeps: the corners, and what ``pin`` names (see `Rules`).
+    """Return which vertices every mesh keeps: the corners, break lines, and what ``pin`` names (see `Rules`).
 
     Raises
     ------
@@ -27,6 +27,8 @@ def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | AnyArray | None
     """
     pinned = np.zeros(model.n_vertices, bool)
     pinned[model.corners] = True
+    if model.lines is not None:
+        pinned[model.lines.vertices] = True
     for part in _pin_parts(pin):
         if isinstance(part, str):
             if part not in PINS:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from meshsimp_pymoo.errors import InputError
 from meshsimp_pymoo.reprs import as_made
-from meshsimp_pymoo.settings import Choice, Pins, Weights, documented, setting, settle
+from meshsimp_pymoo.settings import Choice, Lines, Pins, Real, Weights, documented, setting, settle
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 
 FOOTPRINTS = ("model", "hull")
@@ -70,6 +71,29 @@ class Rules:
         help="per-vertex attribute of the file that says how much each vertex counts in the error (default: all alike)",
         metavar="NAME",
     )
+    break_lines: Any = setting(
+        None,
+        kind=Lines(),
+        accepts='path, "sharp:DEGREES", "outline", or a list of (n, 2) or (n, 3) arrays, optional',
+        doc="Polylines that are chains of edges of every mesh, in the frame of the model's file: a file of them, or "
+        "arrays. Those with heights (x, y, z) bring their own, those without (x, y) take the surface's. "
+        '``"sharp:30"`` takes the edges where two faces of the original meet at more than 30 degrees, ``"outline"`` '
+        "its outline and the rims of its holes.",
+        help="polylines that are chains of edges of every mesh: a file of them, or the edges where faces meet at more "
+        "than so many degrees, or the outline and the rims of holes",
+        metavar="FILE|sharp:DEGREES|outline",
+    )
+    line_tolerance: float | None = setting(
+        None,
+        kind=Real(0),
+        accepts="float, optional",
+        doc="How far a vertex of a break line may be from the line that is left of it, in space [model units]: each "
+        'line is thinned once, by Douglas-Peucker. Needed with a file or arrays; for ``"sharp:"`` and ``"outline"`` '
+        "1e-3 of the diagonal where nothing is said.",
+        help="how far break lines may move, in space [model units]: each is thinned once by that much; needed with a "
+        "file (default for sharp: and outline: 1e-3 of the diagonal)",
+        metavar="L",
+    )
     measure: str = setting(
         "error",
         kind=Choice(tuple(OBJECTIVES)),
@@ -81,6 +105,16 @@ class Rules:
 
     def __post_init__(self) -> None:
         settle(self)
+        is_word = isinstance(self.break_lines, str) and (
+            self.break_lines == "outline" or self.break_lines.startswith("sharp:")
+        )
+        if self.break_lines is None and self.line_tolerance is not None:
+            raise InputError(f"line_tolerance is {self.line_tolerance:g}, and there are no break_lines; name them")
+        if self.break_lines is not None and self.line_tolerance is None and not is_word:
+            raise InputError(
+                "break_lines need a line_tolerance: how far they may move in space [model units], such as the accuracy "
+                "they were surveyed with; 0 keeps every vertex that is not between two others on a straight line"
+            )
 
     __repr__ = as_made
 
@@ -92,6 +126,10 @@ class Rules:
             said.append(f"pinned {self.pin}" if isinstance(self.pin, str) else "some vertices pinned")
         if self.weights is not None:
             said.append(f"weighted by {self.weights}" if isinstance(self.weights, str) else "weighted")
+        if self.break_lines is not None:
+            named = f" of {self.break_lines}" if isinstance(self.break_lines, str) else ""
+            within = "" if self.line_tolerance is None else f" within {self.line_tolerance:g}"
+            said.append(f"break lines{named}{within}")
         return ", ".join(said)
 
 
