@@ -293,7 +293,10 @@ class HeightSurface:
         )
 
     def refit(self, mesh: Simplified, *, tolerance: float = TOLERANCE, until: float | None = None) -> Refitted:
-        """Move a mesh's vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
+        """Move a mesh's vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`.
+
+        Those on break lines stay.
+        """
         if not tolerance > 0:
             raise ValueError(
                 f"tolerance={tolerance} is not positive; give a small share of the error such as {TOLERANCE}"
@@ -316,8 +319,16 @@ class HeightSurface:
         )
         A.sum_duplicates()
         original = model.points[rows, 2]
+        on_line = self._ground.lines.at
         heights, bound = least_error(
-            A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance, until=until
+            A,
+            model.points[counts, 2],
+            weights[counts],
+            samples.gap[counts],
+            original,
+            tolerance=tolerance,
+            until=until,
+            held=on_line[rows] >= 0 if len(on_line) else None,
         )
         raised = own + (heights - original)[:, None] * (model.rotation[2] / model.scale)
         error = self.score(raised, compact).quality.error
