@@ -29,7 +29,6 @@ from meshsimp_pymoo.surface.measures import (
     MAXIMUM,
     MEASURES,
     OBJECTIVES,
-    OF_MESH,
     REGIONS,
     SQUARES,
     TRIANGLES,
@@ -53,7 +52,7 @@ MEMO_SIZE = 100_000
 # Regions in which the error may be kept with each solution and each chromosome remembered.
 MOST_REGIONS = 4096
 # Numbers of each solution that pymoo keeps beside its objectives.
-REPORTED = tuple(name for name in MEASURES if name != "triangles" and name not in OF_MESH)
+REPORTED = tuple(name for name, measure in MEASURES.items() if name != "triangles" and measure.of is not None)
 
 
 # What pymoo asks of an evaluation; there are no equality constraints.

@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
+import os
 import re
 import reprlib
 import sys
@@ -287,6 +288,8 @@ class Lines:
 
     def from_plain(self, value: Any) -> Any:
         """Return the name or the lists."""
+        if isinstance(value, os.PathLike):
+            value = os.fspath(value)
         if isinstance(value, str) and value.strip():
             return value
         if isinstance(value, list) and value and all(self._is_line(line) for line in value):

@@ -8,6 +8,7 @@ import math
 import pydoc
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from meshsimp_pymoo.settings import (
     Choice,
     Column,
     Direction,
+    Lines,
     Part,
     Pins,
     Real,
@@ -100,6 +102,9 @@ WRONG_TEXTS = [
     (Pins(PINS), "rim", "'rim' is not a whole number"),
 ]
 PLAIN = [
+    (Lines(), "sharp:30", "sharp:30"),
+    (Lines(), Path("a") / "b.geojson", str(Path("a") / "b.geojson")),
+    (Lines(), [[[0, 1.5], [2, 3]], [[0, 0, 0], [1, 1, 1]]], [[[0, 1.5], [2, 3]], [[0, 0, 0], [1, 1, 1]]]),
     (Choice(("hull", "model")), "model", "model"),
     (Weights(), "importance", "importance"),
     (Weights(), [1, 2.5], [1, 2.5]),
@@ -122,6 +127,9 @@ PLAIN = [
     (Pins(PINS), [7, "hull", [0.5, 1.5]], [7, "hull", [0.5, 1.5]]),
 ]
 WRONG_PLAIN = [
+    (Lines(), "sharp:30", "sharp:30"),
+    (Lines(), Path("a") / "b.geojson", str(Path("a") / "b.geojson")),
+    (Lines(), [[[0, 1.5], [2, 3]], [[0, 0, 0], [1, 1, 1]]], [[[0, 1.5], [2, 3]], [[0, 0, 0], [1, 1, 1]]]),
     (Choice(("hull", "model")), "Hull", r"did you mean 'hull'\?"),
     (Choice(("hull", "model")), None, "expected one of hull, model"),
     (Choice(("front",)), 3, "^expected front$"),
@@ -151,6 +159,13 @@ WRONG_PLAIN = [
     (Direction(), [0, 0, 0], "three numbers that are not all 0"),
     (Direction(), [0, 1], "expected an axis"),
     (Direction(), "", "expected an axis"),
+    (Lines(), [], "expected a file, sharp:DEGREES, outline, or a list of lines"),
+    (Lines(), " ", "expected a file"),
+    (Lines(), [[[0, 0]]], "each a list of two or more positions"),
+    (Lines(), [[[0, 0], [1, 1, 1]]], "each a list of two or more positions"),
+    (Lines(), [[[0, 0], [1, math.nan]]], "each a list of two or more positions"),
+    (Lines(), [[[0, 0], [1, True]]], "each a list of two or more positions"),
+    (Lines(), [[0, 0], [1, 1]], "each a list of two or more positions"),
     (Pins(PINS), 1.5, "expected corners, hull, border, or a list"),
     (Pins(PINS), True, "expected corners, hull, border, or a list"),
 ]
@@ -195,6 +210,7 @@ pins = st.one_of(
     st.lists(st.one_of(wholes, st.sampled_from(PINS), positions), max_size=4),
 )
 names = st.text(min_size=1).filter(str.strip)
+lines = st.lists(st.lists(st.lists(reals, min_size=3, max_size=3), min_size=2, max_size=3), min_size=1, max_size=2)
 SETTINGS = {
     "up": st.one_of(st.sampled_from(["auto", "z", "-x"]), directions),
     "patch": st.none() | st.just("front"),
@@ -213,6 +229,8 @@ SETTINGS = {
     "outside": st.sampled_from(OUTSIDES),
     "pin": st.none() | pins,
     "weights": st.none() | names | st.lists(reals, min_size=1),
+    "break_lines": st.none() | st.sampled_from(["outline", "sharp:30"]) | lines,
+    "line_tolerance": st.none() | st.floats(0, MOST_REAL),
     "measure": st.sampled_from(list(OBJECTIVES)),
 }
 
@@ -221,7 +239,10 @@ SETTINGS = {
 @given(data=st.data())
 def test_what_is_stored_of_settings_is_read_back(kind, data):
     assert set(settings_of(Options)) | set(settings_of(Rules)) == set(SETTINGS), "a new setting: draw it here too"
-    settings = kind(**{name: data.draw(SETTINGS[name], label=name) for name in settings_of(kind)})
+    drawn = {name: data.draw(SETTINGS[name], label=name) for name in settings_of(kind)}
+    if kind is Rules:  # a tolerance is for lines, and all but words need one
+        assume((drawn["line_tolerance"] is None) == (drawn["break_lines"] is None))
+    settings = kind(**drawn)
     stored = json.loads(json.dumps(plain(settings), allow_nan=False))
     assert list(stored) == list(settings_of(kind))
     assert read_back(kind, stored) == settings
@@ -288,7 +309,7 @@ def test_defaults_are_read_back_and_missing_settings_have_them():
     [
         (None, "None holds no rules"),
         ([1], r"\[1\] holds no rules"),
-        ({"foot": "hull"}, "'foot' is none of the rules: footprint, outside, pin, weights, measure"),
+        ({"foot": "hull"}, "'foot' is none of the rules: footprint, outside, pin, weights, break_lines, line_tol"),
         ({"footprint": "hul"}, r"footprint is 'hul': unknown \(did you mean 'hull'\?\)"),
         ({"pin": {}}, "pin is {}: expected corners, hull, border, or a list"),
         ({"weights": 3}, "weights is 3: expected the name of an attribute"),

@@ -43,7 +43,7 @@ from meshsimp_pymoo.errors import ToolUnavailable, raise_if_memory, reason_of, w
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_MESH, Quality, quality_of
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, quality_of
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.surface import Surface, require_rules
 
@@ -237,7 +237,7 @@ def baseline_meshes(surface: Surface, method: str, triangles: Iterable[int]) -> 
     known = BASELINES[method]
     tool: Any = known.tool
     simplify = tool(surface.model)
-    none = quality_of((name, 0 if name in COUNTED else np.inf) for name in MEASURES if name not in OF_MESH)
+    none = quality_of((name, 0 if name in COUNTED else np.inf) for name, row in MEASURES.items() if row.of is not None)
     none = replace(none, uncovered=surface.n_vertices)
     meshes = []
     for number in numbers:

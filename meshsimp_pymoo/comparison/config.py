@@ -67,7 +67,7 @@ from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_o
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.model import OpenModel
-from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.rules import Rules, is_word_for_lines, meant_word_for_lines
 
 if TYPE_CHECKING:
     from pymoo.core.algorithm import Algorithm
@@ -324,11 +324,11 @@ class ProblemConfig:
     options: Options  # how it is read
     rules: Rules  # what counts; their measure is what is minimised beside the triangles
     limits: Mapping[str, Any]  # other arguments of `MeshProblem`; see LIMITS
-    model: OpenModel  # the model, opened; it holds the weights
+    model: OpenModel  # the model, opened; it holds the weights and the break lines
 
     def build(self) -> MeshProblem:
         """Return the problem, evaluated by one thread: an experiment's runs are what is done in parallel."""
-        surface = HeightSurface(self.model, replace(self.rules, weights=None))
+        surface = HeightSurface(self.model, self.rules.of_the_model)
         return MeshProblem(surface, **self.limits, n_threads=1)
 
     def description(self) -> dict[str, Any]:
@@ -728,13 +728,17 @@ def _check_inside(text: str, whose: str, at: str) -> None:
 def _opened(entry: _Problem, file: _File, models: Path) -> ProblemConfig:
     options = file.problem.given() | {key: value for key, value in entry.given().items() if key in PROBLEM_OPTIONS}
     where = _model_path(entry.model, models, file.folder)
+    lines = options.get("break_lines")
+    found = options
+    if isinstance(lines, str) and not is_word_for_lines(lines):
+        found = options | {"break_lines": _lines_path(lines, models)}
     with _blaming():
-        problem = MeshProblem(where, **options, n_threads=1)
+        problem = MeshProblem(where, **found, n_threads=1)
     return ProblemConfig(
         name=entry.name,
         source=entry.model,
         options=problem.options,
-        rules=problem.surface.rules,
+        rules=replace(problem.surface.rules, break_lines=lines),
         limits={key: value for key, value in options.items() if key in LIMITS},
         model=problem.model,
     )
@@ -757,6 +761,17 @@ def _model_path(source: str, models: Path, named: str) -> str:
         raise _Mistake(f"the file is missing, for there is no folder {models}; {way_out}", "model")
     near = meant(Path(source).name, [item.name for item in models.iterdir()])
     raise _Mistake(f"there is no file {path}{near}", "model")
+
+
+def _lines_path(source: str, models: Path) -> str:
+    """Return the file of break lines, which lies in the folder of models."""
+    _check_inside(source, "of models", "break_lines")
+    path = models / source
+    if not is_there(path):
+        beside = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = meant_word_for_lines(source) or meant(path.name, beside)
+        raise _Mistake(f"there is no file {path}{near}", "break_lines")
+    return str(path)
 
 
 def _check_arguments(arguments: Mapping[str, Any], target: Any, owner: str, besides: Collection[str] = ()) -> None:

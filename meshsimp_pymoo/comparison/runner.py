@@ -87,7 +87,7 @@ from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import machine, now, package_versions
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, TRIANGLES, Quality, measured
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, TRIANGLES, Quality, measured
 from meshsimp_pymoo.surface.surface import measured_meshes
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
 
@@ -111,8 +111,8 @@ CHECKPOINTS = ".checkpoints"
 # The file, in the experiment's folder, of the tracebacks of runs that failed in the last call.
 FAILED = "failed.txt"
 
-# What is stored of each solution beside F.
-QUALITY_COLUMNS = tuple(name for name in MEASURES if name not in ("error", "triangles"))
+# What is stored of each solution beside F. Break lines are the same in all meshes of a problem.
+QUALITY_COLUMNS = tuple(name for name in MEASURES if name not in ("error", "triangles", *OF_LINES))
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, put_text, read_npz, stays_inside
 from meshsimp_pymoo.reprs import brief
+from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import OpenModel
 
 Arrays = Mapping[str, npt.NDArray[Any]]
@@ -50,6 +51,10 @@ KEY_DIGITS = 16
 
 # What is not stored of a model: results can be shown without its colours and the checks it passed.
 NOT_STORED = ("attributes", "facts", "georeference", "found", "material")
+# Break lines are stored as arrays whose names begin so.
+LINES = "lines_"
+# What a model need not have.
+OPTIONAL = ("weights", "scale")
 
 
 @brief
@@ -293,6 +298,8 @@ def write_model(out: Path, model: OpenModel) -> str:
     content = io.BytesIO()
     parts = {name: getattr(model, name) for name in _stored_fields()}
     stored: dict[str, Any] = {name: np.asarray(part) for name, part in parts.items() if part is not None}
+    if model.lines is not None:
+        stored |= {LINES + name: part for name, part in model.lines.arrays().items()}
     np.savez_compressed(content, **stored)
     _put(path, content.getvalue())
     return relative
@@ -320,10 +327,11 @@ def read_model(out: Path, relative: object, expected: str) -> OpenModel:
     path = out / relative
     try:
         arrays = _arrays(path.read_bytes(), path)
-        names = [name for name in _stored_fields() if name not in ("weights", "scale") or name in arrays]
+        names = [name for name in _stored_fields() if name not in OPTIONAL or name in arrays]
         stored: dict[str, Any] = {name: arrays[name] for name in names}
         plain = {name: values.item() for name, values in stored.items() if values.ndim == 0}
-        model = OpenModel(**(stored | plain), attributes={})
+        lines = {name.removeprefix(LINES): part for name, part in arrays.items() if name.startswith(LINES)}
+        model = OpenModel(**(stored | plain), attributes={}, lines=ModelLines.of_arrays(lines) if lines else None)
     except (OSError, KeyError, ValueError, TypeError) as problem:
         raise ResultError(f"{path}: is damaged ({reason_of(problem)}); run the experiment again") from None
     if model.hash != expected:
@@ -333,7 +341,7 @@ def read_model(out: Path, relative: object, expected: str) -> OpenModel:
 
 def _stored_fields() -> list[str]:
     """Return the parts of a model that are stored: arrays, texts and numbers."""
-    return [part.name for part in fields(OpenModel) if part.name not in NOT_STORED]
+    return [part.name for part in fields(OpenModel) if part.name not in (*NOT_STORED, "lines")]
 
 
 def _put(path: Path, content: bytes) -> None:

@@ -510,8 +510,8 @@ class Study:
         """Return the stored model of a problem with its rules, or with those of a scoring."""
         outside = "nearest" if scoring == "nearest" else problem.rules.outside
         model = read_model(self.out, problem.stored, problem.hash)
-        # the model holds the weights; pins are in every subset that was stored
-        return HeightSurface(model, replace(problem.rules, outside=outside, weights=None, pin=None))
+        # pins are in every subset that was stored
+        return HeightSurface(model, replace(problem.rules.of_the_model, outside=outside, pin=None))
 
     def comparisons(self, budget: str, scoring: str, indicator: str) -> list[Comparison]:
         """Compare every two methods with chance on all models; Holm's correction is over all of these."""

@@ -42,7 +42,7 @@ from meshsimp_pymoo.comparison.study import (
     on_all_models,
     ranked,
 )
-from meshsimp_pymoo.surface.measures import MEASURES, OF_MESH
+from meshsimp_pymoo.surface.measures import MEASURES, OF_LINES, OF_MESH
 
 __all__ = [
     "COMPARISONS",
@@ -66,7 +66,7 @@ DIGITS = 4
 AS_SEARCHED = {
     f"{name.removesuffix('_error')}_as_searched" if measure.of else name: name
     for name, measure in MEASURES.items()
-    if name in OF_MESH or (measure.is_error and name != "error")
+    if name in OF_MESH or (measure.is_error and name not in ("error", *OF_LINES))
 }
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
 from meshsimp_pymoo.reprs import brief
 
 
@@ -49,3 +52,59 @@ class ModelLines:
     def vertices(self) -> IntArray:
         """The rows of all vertices of the thinned lines, ascending; every mesh keeps them."""
         return np.unique(np.concatenate(self.chains))
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """What each vertex of the originals, joined, stands for: half of both pieces beside it, as a share of all."""
+        halves = [np.linalg.norm(np.diff(line, axis=0), axis=1) / 2.0 for line in self.originals]
+        length = np.concatenate([np.r_[half, 0.0] + np.r_[0.0, half] for half in halves])
+        return np.asarray(length / length.sum())
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of all that decides meshes and line errors."""
+        digest = hashlib.sha256()
+        for name, array in self.arrays().items():
+            if name != "names":
+                digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    def arrays(self) -> dict[str, AnyArray]:
+        """Return the lines as arrays to be stored, one after the other; :meth:`of_arrays` reads them back."""
+        return {
+            "originals": np.concatenate(self.originals),
+            "original_start": _starts(self.originals),
+            "chains": np.concatenate(self.chains),
+            "chain_start": _starts(self.chains),
+            "names": np.array(self.names),
+            "tolerance": np.array(self.tolerance),
+            "added": self.added,
+        }
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, AnyArray]) -> ModelLines:
+        """Return the lines that :meth:`arrays` stored, without what was found.
+
+        Raises
+        ------
+        KeyError
+            If an array is missing.
+        ValueError
+            If they do not fit together.
+        """
+        originals = _parts(arrays["originals"], arrays["original_start"])
+        chains = _parts(arrays["chains"], arrays["chain_start"])
+        names = tuple(arrays["names"].tolist())
+        if not len(originals) == len(chains) == len(names):
+            raise ValueError(f"{len(originals)} lines have {len(chains)} chains and {len(names)} names")
+        return cls(originals, chains, names, float(arrays["tolerance"]), arrays["added"])
+
+
+def _starts(parts: Sequence[AnyArray]) -> IntArray:
+    return np.cumsum([0, *map(len, parts)])
+
+
+def _parts(joined: AnyArray, start: IntArray) -> tuple[AnyArray, ...]:
+    if start[0] != 0 or start[-1] != len(joined) or (np.diff(start) < 2).any():
+        raise ValueError(f"{len(joined)} vertices are not cut into lines of two or more")
+    return tuple(np.split(joined, start[1:-1]))

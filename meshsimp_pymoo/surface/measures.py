@@ -54,6 +54,8 @@ class Measure(NamedTuple):
         Whether nobody wants at most so much of it.
     is_share : bool
         Whether people read it in per cent.
+    of_lines : bool
+        Whether only models with break lines have it.
     """
 
     of: Callable[[Any, float], Any] | None
@@ -67,6 +69,7 @@ class Measure(NamedTuple):
     searched: str = ""
     more_is_better: bool = False
     is_share: bool = False
+    of_lines: bool = False
 
     @property
     def is_error(self) -> bool:
@@ -120,6 +123,11 @@ class Quality:
         Median over the triangles of the least angle of each, in the plane [degrees].
     below_5_degrees : float
         Share of the triangles whose least angle in the plane is below 5 degrees.
+    line_max_error : float
+        Largest vertical distance of the mesh from a vertex of a break line as it was given. Only where the model has
+        break lines [model units].
+    line_mean_error : float
+        Mean of that distance, weighted by the length of the lines. Only where the model has break lines [model units].
     """
 
     error: float = _measure(
@@ -187,6 +195,18 @@ class Quality:
         meaning="share whose least angle is below 5 degrees",
         is_share=True,
     )
+    line_max_error: float = _measure_of_mesh(
+        label="line max error",
+        meaning="the largest at any vertex of a break line",
+        unit=LENGTH,
+        of_lines=True,
+    )
+    line_mean_error: float = _measure_of_mesh(
+        label="line mean error",
+        meaning="mean along the break lines",
+        unit=LENGTH,
+        of_lines=True,
+    )
 
     @property
     def in_words(self) -> str:
@@ -201,8 +221,9 @@ MEASURES: dict[str, Measure] = {item.name: item.metadata["measure"] for item in 
 # Those that can be minimised beside the triangles.
 OBJECTIVES: dict[str, Measure] = {name: measure for name, measure in MEASURES.items() if measure.minimised}
 COUNTED = tuple(item.name for item in fields(Quality) if item.type == "int")
-# Those that rows do not say.
-OF_MESH = tuple(name for name, measure in MEASURES.items() if measure.of is None)
+# Those that rows do not say, of any model; and of models with break lines alone.
+OF_MESH = tuple(name for name, measure in MEASURES.items() if measure.of is None and not measure.of_lines)
+OF_LINES = tuple(name for name, measure in MEASURES.items() if measure.of_lines)
 
 
 def quality_of(values: Iterable[tuple[str, Any]]) -> Quality:

@@ -152,10 +152,11 @@ class OpenModel:
     def hash(self) -> str:
         """SHA-256 of geometry, weights and lines: the same for the same vertices and faces in the same file order."""
         digest = hashlib.sha256()
-        segments = None if self.lines is None else self.lines.segments
-        for array in (self.points, self.faces, self.source_index, self.weights, segments):
+        for array in (self.points, self.faces, self.source_index, self.weights):
             if array is not None:
                 digest.update(np.ascontiguousarray(array).tobytes())
+        if self.lines is not None:
+            digest.update(self.lines.hash.encode())
         return digest.hexdigest()
 
     @cached_property

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from meshsimp_pymoo.errors import InputError
+from meshsimp_pymoo.errors import InputError, meant
 from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import Choice, Lines, Pins, Real, Weights, documented, setting, settle
 from meshsimp_pymoo.surface.measures import OBJECTIVES
@@ -13,6 +13,8 @@ from meshsimp_pymoo.surface.measures import OBJECTIVES
 FOOTPRINTS = ("model", "hull")
 OUTSIDES = ("nearest", "ignore")
 PINS = ("corners", "hull", "border")
+# What names break lines that are found in the original: its outline, or (with an angle behind it) its sharp edges.
+OUTLINE, SHARP = "outline", "sharp:"
 # Least height of the triangles that free meshes come to have, as a share of their longest edge, where nothing is said;
 # and the most that can be asked for: no triangle of a square cut in two is higher.
 USUAL_RATIO, MOST_RATIO = 0.1, 0.5
@@ -105,15 +107,17 @@ class Rules:
 
     def __post_init__(self) -> None:
         settle(self)
-        is_word = isinstance(self.break_lines, str) and (
-            self.break_lines == "outline" or self.break_lines.startswith("sharp:")
-        )
         if self.break_lines is None and self.line_tolerance is not None:
-            raise InputError(f"line_tolerance is {self.line_tolerance:g}, and there are no break_lines; name them")
-        if self.break_lines is not None and self.line_tolerance is None and not is_word:
             raise InputError(
-                "break_lines need a line_tolerance: how far they may move in space [model units], such as the accuracy "
-                "they were surveyed with; 0 keeps every vertex that is not between two others on a straight line"
+                f"line_tolerance={self.line_tolerance:g} (--line-tolerance {self.line_tolerance:g}) is for break lines, "
+                "and there are none; name them by break_lines=FILE (--break-lines FILE)"
+            )
+        if self.break_lines is not None and self.line_tolerance is None and not is_word_for_lines(self.break_lines):
+            near = meant_word_for_lines(self.break_lines)
+            raise InputError(
+                f"break lines{f' of a file named {self.break_lines!r}' if near else ''}{near} need line_tolerance=L "
+                "(--line-tolerance L): how far they may move in space [model units], such as the accuracy that they "
+                "were surveyed with; 0 keeps every vertex that is not between two others on a straight line"
             )
 
     __repr__ = as_made
@@ -131,6 +135,26 @@ class Rules:
             within = "" if self.line_tolerance is None else f" within {self.line_tolerance:g}"
             said.append(f"break lines{named}{within}")
         return ", ".join(said)
+
+    @property
+    def of_the_model(self) -> Rules:
+        """What is left of these rules for a model that holds their weights and break lines already."""
+        return replace(self, weights=None, break_lines=None, line_tolerance=None)
+
+
+def is_word_for_lines(text: Any) -> bool:
+    """Tell whether break lines are named by a word, which finds them in the original, and not by a file."""
+    return isinstance(text, str) and (text == OUTLINE or text.startswith(SHARP))
+
+
+def meant_word_for_lines(text: Any) -> str:
+    """Return a question for behind a name that is no file's; empty if no word for break lines is near.
+
+    >>> meant_word_for_lines("outlin"), meant_word_for_lines("sharp30"), meant_word_for_lines("outlines.geojson")
+    (" (did you mean 'outline'?)", " (did you mean 'sharp:30'?)", '')
+    """
+    is_bare = isinstance(text, str) and not set(text) & set("./\\")
+    return meant(text, (OUTLINE, f"{SHARP}30")) if is_bare else ""
 
 
 DEFAULT = Rules()

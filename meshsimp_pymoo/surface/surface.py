@@ -21,7 +21,7 @@ from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.plane.faces import canonical_faces, is_canonical, used_rows
 from meshsimp_pymoo.reprs import brief
-from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_MESH, Quality
+from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_LINES, OF_MESH, Quality
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import on_threads
 
@@ -425,7 +425,7 @@ def measured_meshes(
         if found[row].triangles and not is_known and (until is None or time.perf_counter() < until):
             triangles = own[row]
             whole = (surface.simplify(kept[row]) if triangles is None else surface.of_faces(triangles)).quality
-            found[row] = replace(found[row], **{name: getattr(whole, name) for name in OF_MESH})
+            found[row] = replace(found[row], **{name: getattr(whole, name) for name in OF_MESH + OF_LINES})
 
     on_threads(measure, spread(len(found)), n_threads=n_threads)
     return found
