@@ -133,15 +133,27 @@ def assert_constrained_delaunay(xy, faces, segments, sites):
     """Check the definition in exact arithmetic: hull covered, forced edges there, others locally Delaunay."""
     points = whole_numbers(xy)
     forced = forced_edges(xy, segments, sites)
+    assert all(orient(*(points[i] for i in face)) > 0 for face in faces.tolist())
+    apex = apexes(faces)
+    assert sum(orient(*(points[i] for i in face)) for face in faces.tolist()) == hull_area([points[i] for i in sites])
+    assert forced <= {tuple(sorted(pair)) for pair in apex}
+    assert locally_delaunay(points, apex, forced)
+
+
+def apexes(faces):
+    """Return the third corner of the face at each side (u, v), and see that no two faces have the same side."""
     apex = {}
     for a, b, c in faces.tolist():
-        assert orient(points[a], points[b], points[c]) > 0
         for u, v, w in ((a, b, c), (b, c, a), (c, a, b)):
             assert (u, v) not in apex, "an edge is used twice in one direction"
             apex[u, v] = w
-    assert sum(orient(*(points[i] for i in face)) for face in faces.tolist()) == hull_area([points[i] for i in sites])
-    assert forced <= {tuple(sorted(pair)) for pair in apex}
-    for (u, v), w in apex.items():
-        p = apex.get((v, u))
-        if p is not None and tuple(sorted((u, v))) not in forced:
-            assert not _in_conflict(points, u, v, w, p)
+    return apex
+
+
+def locally_delaunay(points, apex, forced):
+    """Whether all edges but the forced ones are locally Delaunay, ties by position."""
+    return not any(
+        _in_conflict(points, u, v, w, apex[v, u])
+        for (u, v), w in apex.items()
+        if (v, u) in apex and tuple(sorted((u, v))) not in forced
+    )
