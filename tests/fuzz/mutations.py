@@ -188,7 +188,7 @@ def _drawings(hard: list[list[float]], soft: list[list[float]]) -> list[tuple[st
         import ezdxf
     except ImportError:
         return []
-    drawing = ezdxf.new("R12")
+    drawing = ezdxf.new("R12", units=0)  # which knows none
     space = drawing.modelspace()
     space.add_polyline3d(hard)
     space.add_line(*hard[:2])
