@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.testing import assert_array_equal
 from pyramid import FACES, POINTS, write
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.source.features import _parts
 from meshsimp_pymoo.formats.source.lines import SourceLines, build_lines
 from meshsimp_pymoo.formats.table import (
     WAYS_OUT,
@@ -367,6 +369,16 @@ def test_the_layers_of_a_geopackage_are_taken_together_and_said(tmp_path):
         found = read_lines(path)
     assert_same_lines(found, [HARD, SOFT])
     assert found.names == ("ridges feature 1 (ridges 0)", "rivers feature 1 (rivers 0)")
+
+
+@pytest.mark.parametrize("number", [1002, 0x80000002])
+def test_heights_in_well_known_binary_are_found_in_both_spellings(number):
+    pieces = struct.pack(">BII", 0, number, len(HARD)) + HARD.astype(">f8").tobytes()
+    point = struct.pack("<BI3d", 1, number - 1, 1, 2, 3)
+    others: Counter[str] = Counter()
+    found = list(_parts(struct.pack("<BII", 1, number + 5, 2) + point + pieces, others))
+    assert_same_lines(SourceLines("a", tuple(found), ("x",)), [HARD])
+    assert others == {"points": 1}
 
 
 def test_layers_in_two_reference_systems_are_refused(tmp_path):

@@ -24,8 +24,10 @@ from meshsimp_pymoo.formats.table import (
     Format,
     all_formats,
     described,
+    read_lines,
     read_source,
     register,
+    write_lines,
     write_mesh,
     written_formats,
 )
@@ -158,6 +160,9 @@ def test_a_new_format_is_one_new_file(tmp_path):
 def test_a_new_format_with_the_suffix_of_another_is_refused_at_once():
     with pytest.raises(ValueError, match=r"'ply2' and 'ply' share .*\.ply"):
         register(Format("ply2", (".ply",), "PLY", read=read_source))
+    for way in ({"read_lines": read_lines}, {"write_lines": write_lines}):
+        with pytest.raises(ValueError, match=r"'json' and 'geojson' share .*\.json"):
+            register(Format("json", (".json",), "JSON", sort="lines", **way))
     with pytest.raises(ValueError, match="of the sort 'solid'"):
         register(Format("solids", (".solid",), "solids", "solid"))
 
