@@ -109,8 +109,8 @@ class Rules:
         settle(self)
         if self.break_lines is None and self.line_tolerance is not None:
             raise InputError(
-                f"line_tolerance={self.line_tolerance:g} (--line-tolerance {self.line_tolerance:g}) is for break lines, "
-                "and there are none; name them by break_lines=FILE (--break-lines FILE)"
+                f"line_tolerance={self.line_tolerance:g} (--line-tolerance {self.line_tolerance:g}) is for break "
+                "lines, and there are none; name them by break_lines=FILE (--break-lines FILE)"
             )
         if self.break_lines is not None and self.line_tolerance is None and not is_word_for_lines(self.break_lines):
             near = meant_word_for_lines(self.break_lines)
