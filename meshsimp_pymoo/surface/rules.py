@@ -147,6 +147,11 @@ def is_word_for_lines(text: Any) -> bool:
     return isinstance(text, str) and (text == OUTLINE or text.startswith(SHARP))
 
 
+def is_file_of_lines(given: Any) -> bool:
+    """Tell whether break lines are those of a file."""
+    return isinstance(given, str) and not is_word_for_lines(given)
+
+
 def meant_word_for_lines(text: Any) -> str:
     """Return a question for behind a name that is no file's; empty if no word for break lines is near.
 
