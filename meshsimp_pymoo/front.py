@@ -69,8 +69,8 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     quality_of,
 )
-from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
@@ -1107,8 +1107,8 @@ class Front(Sequence[FrontSolution]):
             if rules.break_lines is None:
                 raise
             raise ResultError(
-                f"{where}: its break lines cannot be used ({trouble}); put them back to where they were, or simplify the "
-                "model again"
+                f"{where}: its break lines cannot be used ({trouble}); put them back to where they were, or simplify "
+                "the model again"
             ) from None
 
     def _model_file(self) -> Path | str:

@@ -360,7 +360,8 @@ class MeshProblem(ElementwiseProblem):
         """Return the simplified mesh of one chromosome (N,) in the frame of the file, with its looks and attributes.
 
         Its vertices are original ones, in double precision, in vector order; none is without a face. With break lines
-        its ``metadata`` hold them: ``break_lines`` are chains of rows of its vertices, ``break_line_names`` their names.
+        its ``metadata`` hold them: ``break_lines`` are chains of rows of its vertices, ``break_line_names`` what each
+        is called.
         """
         return mesh_of(self.surface, self.simplify(kept).faces)
 

@@ -75,14 +75,17 @@ from meshsimp_pymoo.formats.table import (
 )
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, TRIANGLES, Quality, checked_objectives
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
+from meshsimp_pymoo.surface.smallest import facts_of_lines
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
-FRONT_COLUMNS = ("solution", *(name for name in MEASURES if name not in OF_MESH), "mesh", *OF_MESH, "free")
+FRONT_COLUMNS = (
+    "solution", *(name for name, measure in MEASURES.items() if measure.of is not None), "mesh", *OF_MESH, "free",
+)  # fmt: skip
 # Behind them, only where the model has break lines: OF_LINES. Then
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
@@ -589,20 +592,10 @@ def _thinned_lines(model: Any, lines: ModelLines) -> SourceLines:
 
 
 def _facts_of_lines(surface: Surface, lines: ModelLines, folder: Path) -> dict[str, Any]:
-    """Return what is recorded of break lines: what they were, and what they ask of every mesh."""
+    """Return what is recorded of break lines, their file relative to the folder."""
     given = surface.rules.break_lines
-    smallest = surface.evaluate(surface.pinned[None])[0]
-    return {
-        **({"file": path_from(folder, given)} if is_file_of_lines(given) else {}),
-        "hash": lines.hash,
-        "tolerance": lines.tolerance,
-        "lines": len(lines.originals),
-        "vertices": sum(map(len, lines.originals)),
-        "thinned": len(lines.vertices),
-        "forced_edges": len(lines.segments),
-        "smallest": int(smallest[TRIANGLES]),
-        "found": lines.found,
-    }
+    file = {"file": path_from(folder, given)} if is_file_of_lines(given) else {}
+    return file | {"hash": lines.hash} | facts_of_lines(surface, lines)
 
 
 def package_versions(*others: str) -> dict[str, str]:
