@@ -12,7 +12,7 @@ or in YAML::
 
 Two are real terrain from the sample data that matplotlib installs. The others are made here: surfaces whose
 whole front is known (``plane``, ``roof``, ``pyramid``), smooth and rough test surfaces, a synthetic scan of a
-face, and outlines with a hole or a bay. Everything is a pure function of the parameters, the scan noise
+face, outlines with a hole or a bay, and an embankment with break lines (``load_lines``). Everything is a pure function of the parameters, the scan noise
 included.
 """
 
@@ -32,8 +32,9 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, meant, reason_of
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.source.lines import SourceLines
 
-__all__ = ["describe", "load", "names"]
+__all__ = ["describe", "load", "load_lines", "names"]
 
 
 METRES_PER_DEGREE = 111_200.0  # of latitude, at the latitudes of both terrains (36 and 49 degrees north), to 0.05 %
@@ -81,26 +82,61 @@ def load(name: str, /, **parameters: float) -> SourceMesh:
     >>> roof.points.shape, float(roof.points[:, 2].max())
     ((289, 3), 1.0)
     """
+    source, full_name = _made(name, parameters, _MODELS)
+    return replace(source, name=full_name)
+
+
+def load_lines(name: str, /, **parameters: float) -> SourceLines:
+    """Make the break lines that a built-in model has, for ``break_lines=``.
+
+    Parameters
+    ----------
+    name : str
+        That of the model, spelled as in :func:`load`: its lines fit the same parameters.
+    **parameters : int or float
+        The same parameters by keyword.
+
+    Returns
+    -------
+    SourceLines
+
+    Raises
+    ------
+    ModelError
+        If there is no such model, it has no lines, or a parameter does not exist or is out of range.
+
+    Examples
+    --------
+    >>> lines = load_lines("embankment")
+    >>> lines.names, lines.lines[0].shape
+    (('toe 1', 'crest 1', 'crest 2', 'toe 2'), (201, 3))
+    """
+    lines, full_name = _made(name, parameters, _LINES)
+    return replace(lines, name=full_name)
+
+
+def _made(name: str, parameters: dict[str, float], table: dict[str, Callable[..., Any]]) -> tuple[Any, str]:
+    """Make what a table has under a name, and spell the name with the parameters that are not the defaults."""
     base, _, spelled = name.partition(":")
-    make = _MODELS.get(base)
-    if make is None:
+    if base not in _MODELS:
         raise ModelError(_unknown(name, base))
-    known = inspect.signature(make).parameters
+    if base not in table:
+        raise ModelError(f"{name}: has no lines of its own; those that have: {', '.join(table)}")
+    known = inspect.signature(table[base]).parameters
     given = _spelled_parameters(name, base, spelled, known) | parameters
     for key, value in given.items():
         if key not in known:
             raise ModelError(f"{name}: no parameter {key!r}{meant(key, known)}; {base} takes {', '.join(known)}")
         given[key] = _number(name, key, value, known[key])
     try:
-        source = make(**given)
+        made = table[base](**given)
     except ValueError as problem:
         raise ModelError(f"{name}: {problem}") from None
     changed = {key: given[key] for key in known if key in given and given[key] != known[key].default}
-    full_name = base
     if changed:
         main = next(iter(known))
-        full_name += ":" + ",".join(f"{v}" if k == main else f"{k}={v}" for k, v in changed.items())
-    return replace(source, name=full_name)
+        base += ":" + ",".join(f"{v}" if k == main else f"{k}={v}" for k, v in changed.items())
+    return made, base
 
 
 def names() -> list[str]:
@@ -298,6 +334,94 @@ def _horseshoe(vertices: int = 900, seed: int = 1, noise: float = 0.0) -> Source
     )
 
 
+# Sizes of the embankment in metres: how far it and the land around it reach, half the width of its crest, how far its
+# sides go out for each metre up.
+BANK_LENGTH, BANK_WIDTH, HALF_CREST, BANK_SLOPE = 1000.0, 600.0, 4.0, 2.0
+
+
+def _embankment(vertices: int = 5600, stations: int = 201, seed: int = 1, noise: float = 0.1) -> SourceMesh:
+    """Return a road embankment in metres on gentle land; its toes and crests are lines, see load_lines."""
+    lines = np.concatenate(_embankment_lines(vertices, stations, seed, noise).lines)
+    outline = np.array([[0.0, 0.0], [BANK_LENGTH, 0.0], [BANK_LENGTH, BANK_WIDTH], [0.0, BANK_WIDTH]])
+    # the outline is straight, so its corners and the ends of the lines are vertices, and others lie between
+    gap = math.sqrt(BANK_LENGTH * BANK_WIDTH / vertices)
+    rim = []
+    on_sides = lines[np.isin(lines[:, 0], (0.0, BANK_LENGTH)), :2]
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        along = (b - a) / np.hypot(*(b - a))
+        n_steps = math.ceil(np.hypot(*(b - a)) / gap)
+        steps = a + np.linspace(0.0, 1.0, n_steps, endpoint=False)[:, None] * (b - a)
+        near = np.abs((steps[:, None] - on_sides) @ along).min(axis=1) < gap / 2
+        away = np.abs((steps[:, None] - on_sides) @ [along[1], -along[0]]).min(axis=1) > gap / 2
+        rim.append(steps[~near | away])
+    rim_xy = np.concatenate(rim)
+    rng = np.random.default_rng(seed)
+    start = rng.random(2)
+    n_inner = vertices - len(lines) - len(rim_xy)
+    inner = np.empty((0, 2))
+    tries = 1.2 * vertices
+    while len(inner) < n_inner:
+        k = np.arange(1, int(tries) + 1)[:, None]
+        even = np.array([BANK_LENGTH, BANK_WIDTH]) * np.mod(start + k / PLASTIC_NUMBER ** np.array([1.0, 2.0]), 1.0)
+        inner = even[~_near_points(even, np.concatenate([lines[:, :2], rim_xy]), 0.4 * gap)]
+        tries *= 1.3
+    xy = np.concatenate([rim_xy, inner[:n_inner]])
+    z = _embankment_height(*xy.T) + rng.normal(0.0, 1.0, len(xy)) * noise
+    points = np.concatenate([lines, np.column_stack([xy, z])])
+    return SourceMesh(points, _delaunay(points[:, :2]), {}, name="embankment", up="z")
+
+
+def _embankment_lines(vertices: int = 5600, stations: int = 201, seed: int = 1, noise: float = 0.1) -> SourceLines:
+    """Return the two toes and the two crests, of so many vertices each, surveyed without noise."""
+    _check_range("vertices", vertices, 1000, MAX_SCATTERED)
+    _check_range("stations", stations, 51, vertices // 6)
+    if not 0 <= noise < math.inf:
+        raise ValueError(f"noise is {noise:g}; it must be 0 or more [metres]")
+    x = np.linspace(0.0, BANK_LENGTH, stations)
+    middle, crest = _embankment_axis(x)
+    lines = []
+    for side in (-1.0, 1.0):
+        # where the side, which falls evenly, meets the land
+        out = np.full(stations, HALF_CREST)
+        for _ in range(60):
+            out = HALF_CREST + BANK_SLOPE * (crest - _land(x, middle + side * out))
+        toe = middle + side * out
+        both = [np.column_stack([x, toe, _land(x, toe)]), np.column_stack([x, middle + side * HALF_CREST, crest])]
+        lines += both if side < 0 else both[::-1]
+    return SourceLines("embankment", tuple(lines), ("toe 1", "crest 1", "crest 2", "toe 2"))
+
+
+def _embankment_axis(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where the middle of the crest is, and how high, at stations along it [m]."""
+    turn = 2.0 * math.pi * x / BANK_LENGTH
+    return 0.5 * BANK_WIDTH + 60.0 * np.sin(turn + 0.4), 60.0 + 3.0 * np.sin(1.5 * turn) + 0.004 * x
+
+
+def _land(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the height of the land without the embankment [m]."""
+    return (
+        46.0
+        + 3.0 * np.sin(x / 130.0) * np.cos(y / 170.0)
+        + 1.5 * np.cos(x / 60.0 - y / 80.0)
+        + 0.01 * x
+        - 0.008 * y
+    )
+
+
+def _embankment_height(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the height of land and embankment [m]: the higher of the land and of the bank's sides and crest."""
+    middle, crest = _embankment_axis(x)
+    return np.maximum(_land(x, y), crest - np.clip(np.abs(y - middle) - HALF_CREST, 0.0, None) / BANK_SLOPE)
+
+
+def _near_points(points: FloatArray, others: FloatArray, distance: float) -> npt.NDArray[np.bool_]:
+    """Tell which points (n, 2) lie within a distance of others (m, 2)."""
+    from scipy.spatial import cKDTree
+
+    found, _ = cKDTree(others).query(points, distance_upper_bound=distance)
+    return np.isfinite(found)
+
+
 def _face_outline(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Outline of a face seen from the front [mm]: wide at the temples, narrow at the chin."""
     x, y = np.cos(t), np.sin(t)
@@ -459,11 +583,8 @@ def _inside(points: FloatArray, polygons: list[FloatArray]) -> npt.NDArray[np.bo
 
 def _near(points: FloatArray, polygons: list[FloatArray], distance: float) -> npt.NDArray[np.bool_]:
     """Tell which points (n, 2) lie within a distance of the polygons' edges, each sampled at its thirds."""
-    from scipy.spatial import cKDTree
-
     samples = [p + (np.roll(p, -1, axis=0) - p) * t for p in polygons for t in (0.0, 1 / 3, 2 / 3)]
-    found, _ = cKDTree(np.concatenate(samples)).query(points, distance_upper_bound=distance)
-    return np.isfinite(found)
+    return _near_points(points, np.concatenate(samples), distance)
 
 
 # ------------------------------------------------------------------------------------------------ names and parameters
@@ -481,7 +602,10 @@ _MODELS: dict[str, Callable[..., SourceMesh]] = {
     "crater": _crater,
     "ring": _ring,
     "horseshoe": _horseshoe,
+    "embankment": _embankment,
 }
+# The break lines of those that have any; their parameters are the models'.
+_LINES: dict[str, Callable[..., SourceLines]] = {"embankment": _embankment_lines}
 
 
 def _spelled_parameters(name: str, base: str, spelled: str, known: Any) -> dict[str, Any]:

@@ -1,13 +1,17 @@
 """What an insertion takes away and a removal leaves open: cavities, stars, and the ears that fill a star.
 
 A vertex that comes replaces the triangles whose circle holds it (Bowyer [1]_, Watson [2]_); where one goes, its star is
-filled by Delaunay ears (Devillers [3]_), a large one by the triangulation of its ring alone.
+filled by Delaunay ears (Devillers [3]_), a large one by the triangulation of its ring alone. Where edges are forced
+(:mod:`~meshsimp_pymoo.plane.constraints`) only what a vertex sees counts.
 
 References
 ----------
 .. [1] A. Bowyer, "Computing Dirichlet tessellations", The Computer Journal 24, 1981.
 .. [2] D. F. Watson, "Computing the n-dimensional Delaunay tessellation", The Computer Journal 24, 1981.
 .. [3] O. Devillers, "On deletion in Delaunay triangulations", Int. J. Computational Geometry & Applications 12, 2002.
+.. [4] M. Heller, "Triangulation algorithms for adaptive terrain modeling", Proc. 4th Int. Symposium on Spatial Data
+       Handling, 1990.
+.. [5] C. L. Lawson, "Software for C1 surface interpolation", Mathematical Software III, 1977.
 """
 
 from __future__ import annotations
@@ -15,65 +19,14 @@ from __future__ import annotations
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
-from meshsimp_pymoo.plane.predicates import circle_sign, orient_sign
-from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, TRIANGLE, locate, triangulate
+from meshsimp_pymoo.plane.conflict import conflict, turn
+from meshsimp_pymoo.plane.constraints import Constraints, is_forced, is_wall
+from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
 
 # Ears are looked for one by one up to this many triangles in a star, in a time that grows with its square.
 MOST_EARS = 48
-
-
-@inner(inline=True)
-def turn(xy: np.ndarray, a: int, b: int, c: int, exact_area: float) -> int:
-    """Sign of the area of vertices (a, b, c)."""
-    x = xy[2 * c]
-    y = xy[2 * c + 1]
-    return orient_sign(xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, exact_area)
-
-
-@inner
-def _ghost_conflict(xy: np.ndarray, a: int, b: int, q: int, exact_area: float) -> bool:
-    """Whether q lies beyond the hull edge with exterior left of a -> b, or inside that edge."""
-    sign = turn(xy, a, b, q, exact_area)
-    if sign != 0:
-        return sign > 0
-    k = 0 if xy[2 * a] != xy[2 * b] else 1
-    low = min(xy[2 * a + k], xy[2 * b + k])
-    high = max(xy[2 * a + k], xy[2 * b + k])
-    return low < xy[2 * q + k] < high
-
-
-@inner
-def _tied_conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float) -> bool:
-    """Whether q of four cocircular points counts as inside the circle of (a, b, c): the largest index is cut off."""
-    last = max(max(a, b), max(c, q))
-    if last == q:
-        return False
-    if last == a:
-        return turn(xy, q, b, c, exact_area) > 0
-    if last == b:
-        return turn(xy, a, q, c, exact_area) > 0
-    return turn(xy, a, b, q, exact_area) > 0
-
-
-@inner(inline=True)
-def conflict(xy: np.ndarray, a: int, b: int, c: int, q: int, exact_area: float, exact_lift: float) -> bool:
-    """Whether vertex q lies inside the circle of triangle (a, b, c), any of which may be the one at infinity."""
-    if q > LAST_INDEX:
-        return False
-    if (a | b | c) > LAST_INDEX:
-        if c > LAST_INDEX:
-            return _ghost_conflict(xy, a, b, q, exact_area)
-        if a > LAST_INDEX:
-            return _ghost_conflict(xy, b, c, q, exact_area)
-        return _ghost_conflict(xy, c, a, q, exact_area)
-    x = xy[2 * q]
-    y = xy[2 * q + 1]
-    sign = circle_sign(
-        xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, xy[2 * c] - x, xy[2 * c + 1] - y, exact_lift
-    )
-    if sign != 0:
-        return sign > 0
-    return _tied_conflict(xy, a, b, c, q, exact_area)
+# Beyond an ear a side of the ring is this and its number.
+OUTSIDE = 1 << 30
 
 
 @inner
@@ -85,13 +38,16 @@ def cavity_of(
     cavity: np.ndarray,
     rim: np.ndarray,
     stack: np.ndarray,
+    lines: Constraints,
     exact_area: float,
     exact_lift: float,
 ) -> tuple[int, int]:
     """List the triangles in conflict with p, from t0 that holds it, and the halfedges outside their rim, in order.
 
-    Returns the numbers of both. Each rim entry is the twin (outside) of a cavity edge u -> v, counter-clockwise.
+    Returns the numbers of both. Each rim entry is the twin (outside) of a cavity edge u -> v, counter-clockwise. What
+    forced edges hide from p is in no conflict with it.
     """
+    lined = len(lines.at) > 0
     n_cavity = 1
     n_rim = 0
     cavity[0] = t0
@@ -103,7 +59,9 @@ def cavity_of(
         depth -= 1
         h = mesh[stack[depth] + 4]
         s = h & TRIANGLE
-        if conflict(xy, mesh[s], mesh[s + 1], mesh[s + 2], p, exact_area, exact_lift):
+        if conflict(xy, mesh[s], mesh[s + 1], mesh[s + 2], p, exact_area, exact_lift) and not (
+            lined and is_wall(xy, mesh, lines, h, p, exact_area)
+        ):
             cavity[n_cavity] = s
             n_cavity += 1
             k = h & 3
@@ -194,6 +152,171 @@ def fill(
         ears[n, k] = ring[k]
         ear_edges[n, k] = edge[k]
     return n + 1
+
+
+@inner
+def fill_beside_lines(
+    xy: np.ndarray,
+    p: int,
+    ring: np.ndarray,
+    m: int,
+    edge: np.ndarray,
+    ears: np.ndarray,
+    ear_edges: np.ndarray,
+    mesh: np.ndarray,
+    stack: np.ndarray,
+    lines: Constraints,
+    exact_area: float,
+    exact_lift: float,
+) -> int:
+    """Do what :func:`fill` does for the star of p, where forced edges hide vertices of its ring from others.
+
+    Where p lies on a segment, the edge between its neighbours there is forced. First the spokes flip [4]_ one by
+    one until none is left, which makes ears of the ring whatever their circles hold; then edges that are not forced
+    flip until all are locally Delaunay [5]_.
+
+    Parameters
+    ----------
+    mesh : (16 m,) uint32 array
+        Workspace, and ``stack`` for m entries.
+    """
+    # The neighbours of p on the segment that it lies on, and whether it is at the hull: then it may lie on an edge that
+    # comes.
+    low = -1
+    high = -1
+    may_touch = False
+    for i in range(m):
+        may_touch = may_touch or ring[i] > LAST_INDEX
+        if is_forced(lines, p, ring[i]):
+            for k in range(i):
+                if is_forced(lines, p, ring[k]) and turn(xy, ring[k], ring[i], p, exact_area) == 0:
+                    low, high = np.int64(ring[k]), np.int64(ring[i])
+                    may_touch = True
+    for i in range(m):
+        edge[i] = i
+    left = m
+    n = 0
+    i = 0
+    failures = 0
+    while left > 3:
+        before = i - 1 if i > 0 else left - 1
+        after = i + 1 if i < left - 1 else 0
+        a = ring[before]
+        b = ring[i]
+        c = ring[after]
+        good = b != low and b != high
+        if good and (a | b | c) <= LAST_INDEX:
+            good = turn(xy, a, b, c, exact_area) > 0
+            if good:
+                seen = turn(xy, a, c, p, exact_area)
+                good = seen > 0 or (seen == 0 and (may_touch or left == 4))
+        elif good:
+            good = b <= LAST_INDEX and failures >= left  # hull edges are what is left in the end
+        if not good:
+            failures += 1
+            if failures > 2 * left:
+                return 0
+            i = after
+            continue
+        failures = 0
+        _enter_ear(mesh, n, m, a, b, c, edge[before], edge[i])
+        edge[before] = m + n
+        n += 1
+        left -= 1
+        for k in range(i, left):
+            ring[k] = ring[k + 1]
+            edge[k] = edge[k + 1]
+        i = i if i < left else 0
+    _enter_ear(mesh, n, m, ring[0], ring[1], ring[2], edge[0], edge[1])
+    _join(mesh, RECORD * n + 2, m, edge[2])
+    n += 1
+    # Lawson's flips; a triangle is looked at again where one of its edges is new.
+    for k in range(n):
+        stack[k] = k
+        mesh[RECORD * k + 3] = 1
+    depth = n
+    while depth > 0:
+        depth -= 1
+        t = RECORD * np.int64(stack[depth])
+        mesh[t + 3] = 0
+        for e in range(3):
+            h = t + e
+            twin = np.int64(mesh[h + 4])
+            if twin >= OUTSIDE:
+                continue
+            s = twin & TRIANGLE
+            before = t + (e + 2) % 3
+            after = t + (e + 1) % 3
+            twin_before = s + ((twin & 3) + 2) % 3
+            twin_after = s + ((twin & 3) + 1) % 3
+            a, b, c, d = mesh[h], mesh[after], mesh[before], mesh[twin_before]
+            if (a | b | c | d) > LAST_INDEX or is_forced(lines, a, b):
+                continue
+            if not conflict(xy, a, b, c, d, exact_area, exact_lift):
+                continue
+            # (a, b, c), (b, a, d)  ->  (d, b, c), (d, c, a), in the places of a -> b and b -> a
+            beyond_ca, beyond_bc = np.int64(mesh[before + 4]), np.int64(mesh[after + 4])
+            beyond_ad, beyond_db = np.int64(mesh[twin_after + 4]), np.int64(mesh[twin_before + 4])
+            mesh[t], mesh[t + 1], mesh[t + 2] = d, b, c
+            mesh[s], mesh[s + 1], mesh[s + 2] = d, c, a
+            _link(mesh, t, beyond_db)
+            _link(mesh, t + 1, beyond_bc)
+            _link(mesh, t + 2, s)
+            _link(mesh, s + 1, beyond_ca)
+            _link(mesh, s + 2, beyond_ad)
+            for changed in (t, s):
+                if mesh[changed + 3] == 0:
+                    mesh[changed + 3] = 1
+                    stack[depth] = changed // RECORD
+                    depth += 1
+            break
+    # They make a tree, which is told from its root as ``fill_large`` does.
+    stack[0] = 0
+    told = 1
+    k = 0
+    while k < told:
+        t = np.int64(stack[k]) & TRIANGLE
+        first = 0 if k == 0 else ((np.int64(stack[k]) & 3) + 1) % 3
+        ear = m - 3 - k
+        for e in range(3):
+            h = t + (first + e) % 3
+            ears[ear, e] = mesh[h]
+            twin = np.int64(mesh[h + 4])
+            if twin >= OUTSIDE:
+                ear_edges[ear, e] = twin - OUTSIDE
+            elif k > 0 and e == 2:
+                ear_edges[ear, e] = m + ear
+            else:
+                stack[told] = twin
+                ear_edges[ear, e] = m + m - 3 - told
+                told += 1
+        k += 1
+    return n
+
+
+@inner(inline=True)
+def _link(mesh: np.ndarray, h: int, beyond: int) -> None:
+    """Let halfedge h of an ear have this one beyond, which may be a side of the ring."""
+    mesh[h + 4] = beyond
+    if beyond < OUTSIDE:
+        mesh[beyond + 4] = h
+
+
+@inner(inline=True)
+def _join(mesh: np.ndarray, h: int, m: int, side: int) -> None:
+    """Let halfedge h of an ear have beyond it what `fill` calls this side: one of the ring, or the third of an ear."""
+    _link(mesh, h, OUTSIDE + side if side < m else RECORD * (side - m) + 2)
+
+
+@inner
+def _enter_ear(mesh: np.ndarray, n: int, m: int, a: int, b: int, c: int, side_ab: int, side_bc: int) -> None:
+    """Write ear n into its record, the first two sides linked."""
+    t = RECORD * n
+    mesh[t] = a
+    mesh[t + 1] = b
+    mesh[t + 2] = c
+    _join(mesh, t, m, side_ab)
+    _join(mesh, t + 1, m, side_bc)
 
 
 @inner

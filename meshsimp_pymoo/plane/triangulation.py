@@ -38,12 +38,17 @@ LAST_INDEX = 0x7FFFFFFF
 TRIANGLE = ~7
 RECORD = 8
 SPARSE_ROUND_FROM = 5000
+# A walk of so many steps goes in circles, which it can where edges are forced: from there on it goes at random.
+MOST_STEPS = 4096
 SPARSE_STEP = 8
 
 
 @inner(inline=True)
 def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exact_area: float) -> int:
-    """Walk from triangle ``start`` to the triangle that holds (x, y), or to the ghost beyond the hull edge it sees."""
+    """Walk from triangle ``start`` to the triangle that holds (x, y), or to the ghost beyond the hull edge it sees.
+
+    Where edges are forced such a walk may go in circles [1]_; there it goes on at random.
+    """
     t = start
     if mesh[t] > LAST_INDEX:
         t = mesh[t + 5] & TRIANGLE
@@ -51,7 +56,7 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
         t = mesh[t + 6] & TRIANGLE
     elif mesh[t + 2] > LAST_INDEX:
         t = mesh[t + 4] & TRIANGLE
-    while True:
+    for _ in range(MOST_STEPS):
         a = mesh[t]
         b = mesh[t + 1]
         c = mesh[t + 2]
@@ -86,6 +91,27 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
             else:
                 return t
         t = mesh[h + 4] & TRIANGLE
+    return _locate_at_random(xy, mesh, t, x, y, exact_area)
+
+
+@inner
+def _locate_at_random(xy: np.ndarray, mesh: np.ndarray, t: int, x: float, y: float, exact_area: float) -> int:
+    """Do what :func:`locate` does, from triangle t, in any triangulation: of the sides to cross it takes any."""
+    state = np.uint64(1)
+    while (mesh[t] | mesh[t + 1] | mesh[t + 2]) <= LAST_INDEX:
+        state = state * np.uint64(6364136223846793005) + np.uint64(1442695040888963407)
+        first = np.int64((state >> np.uint64(33)) % np.uint64(3))
+        h = -1
+        for k in range(first, first + 3):
+            a = mesh[t + k % 3]
+            b = mesh[t + (k + 1) % 3]
+            if orient_sign(xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, exact_area) < 0:
+                h = t + k % 3
+                break
+        if h < 0:
+            break
+        t = np.int64(mesh[h + 4]) & TRIANGLE
+    return t
 
 
 @inner(inline=True)

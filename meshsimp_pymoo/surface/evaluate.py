@@ -22,6 +22,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.constraints import constrain, place_of
 from meshsimp_pymoo.plane.emission import emit, outline
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
@@ -93,20 +94,6 @@ def _gather(
         n += take
         m += 1 - take
     return n
-
-
-@inner
-def _place_of(sites: np.ndarray, n: int, vertex: int) -> int:
-    """Return where a vertex stands among the first n sites, which ascend; -1 if it is none of them."""
-    low = 0
-    high = n
-    while low < high:
-        middle = (low + high) >> 1
-        if sites[middle] < vertex:
-            low = middle + 1
-        else:
-            high = middle
-    return low if low < n and sites[low] == vertex else -1
 
 
 @inner
@@ -190,8 +177,10 @@ def _evaluate_one(
     n = _gather(xy, z, kept, ground.has_twins, sites, dropped, site_xy, site_z)
     first = np.empty(len(corners), np.int64)
     for k in range(len(corners)):
-        first[k] = _place_of(sites, n, corners[k])
+        first[k] = place_of(sites, n, corners[k])
     end = triangulate(site_xy, n, first, np.empty(0, np.int64), inserted, mesh, exact_area, ground.exact_lift)
+    if end > 0 and len(ground.lines.at) > 0:
+        constrain(site_xy, mesh, end, ground.lines, sites, n, site_triangle, exact_area, ground.exact_lift)
     n_triangles = emit(
         site_xy,
         mesh,

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
-from meshsimp_pymoo.plane.stars import turn
+from meshsimp_pymoo.plane.conflict import turn
 from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE
 from meshsimp_pymoo.surface.bare import forget_bare, is_segment, set_segment, settle_bare, slot
 from meshsimp_pymoo.surface.books import (

@@ -8,6 +8,7 @@ vertices.
 
 The plane outside the mesh is triangulated too, out to four corners far away, so that the same moves change the outline:
 a vertex on it goes to another one of the original's border, an edge of it flips, one collapses and another one comes.
+Forced edges do not flip, and vertices on break lines neither come nor go, so that lines stay what they are at first.
 What a triangle may be is said once: inside the footprint it is emitted and has the least height that is asked for,
 outside it is not emitted and of any shape.
 """
@@ -25,9 +26,10 @@ from meshsimp_pymoo.arrays import BoolArray, IntArray
 from meshsimp_pymoo.compiling.draws import below, unit
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.plane.conflict import turn
+from meshsimp_pymoo.plane.constraints import is_forced, is_on_line
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.plane.stars import turn
 from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE
 from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.bare import corners_of
@@ -284,6 +286,8 @@ def _flip(free: Freedom, live: Live, h: int, most: int, limit: float, state: np.
     s = np.int64(mesh[h + 4]) & TRIANGLE
     if (mesh[t] | mesh[t + 1] | mesh[t + 2] | mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
         return np.inf
+    if is_forced(free.ground.lines, mesh[h], mesh[t + ((h & 3) + 1) % 3]):
+        return np.inf
     fan = free.fan
     take_pair(live, fan, h)
     fill_from(fan, 0)
@@ -303,7 +307,7 @@ def _shift(free: Freedom, live: Live, v: int, inside: bool, most: int, limit: fl
         w = _stroll(free.indptr, free.indices, v, 1 + below(state, 3), state)
     else:
         w = _stroll(free.border_indptr, free.border_indices, v, 1 + below(state, 3), state)
-    if live.site[w]:
+    if live.site[w] or is_on_line(free.ground.lines, w):
         return -1
     fill_around(free.fan, w)
     if inside:
@@ -361,7 +365,7 @@ def _wanted_in(free: Freedom, live: Live, t: int, state: np.ndarray) -> int:
     most = -1.0
     i = np.int64(live.head[t >> 3])
     while i >= 0:
-        if i < free.n_vertices:
+        if i < free.n_vertices and not is_on_line(g.lines, i):
             if worst:
                 d = deviation_in(g.xy, g.z, a, b, c, i)
                 if d > most:
@@ -435,7 +439,7 @@ def _swap_outline(free: Freedom, live: Live, v: int, most: int, limit: float, st
     worst = -1.0
     for _ in range(TRIES):
         i = np.int64(free.border[below(state, len(free.border))])
-        if live.site[i]:
+        if live.site[i] or is_on_line(g.lines, i):
             continue
         amount = live.cost[i]
         if live.bare[i] == COVERED:

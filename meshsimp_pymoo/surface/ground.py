@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from meshsimp_pymoo.plane.constraints import NO_CONSTRAINTS, Constraints, make_constraints
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
@@ -32,6 +33,7 @@ class Ground(NamedTuple):
     start: np.ndarray
     items: np.ndarray
     faces: np.ndarray
+    lines: Constraints  # forced edges
     boxes: np.ndarray  # (2 N / RUN, 4) of the vertices in each node of the tree over runs of them, see bare
     nearest: bool  # whether an uncovered vertex costs its distance
     weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
@@ -66,6 +68,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         start=footprint.start,
         items=footprint.items,
         faces=footprint.faces,
+        lines=NO_CONSTRAINTS if model.lines is None else make_constraints(xy, model.lines.segments),
         boxes=boxes_of_runs(xy, RUN),
         nearest=rules.outside == "nearest",
         weight=weight,

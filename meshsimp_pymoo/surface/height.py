@@ -26,7 +26,7 @@ from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.pins import pinned_vertices
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
-from meshsimp_pymoo.surface.score import measured_angles, mesh_deviation, mesh_quality, mesh_samples
+from meshsimp_pymoo.surface.score import line_errors, measured_angles, mesh_deviation, mesh_quality, mesh_samples
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, checked_faces, require_rules
 from meshsimp_pymoo.workers import Reserve
 
@@ -216,8 +216,9 @@ class HeightSurface:
             If no triangle is emitted: fewer than 3 vertices, all on one line, or all triangles outside the footprint.
         """
         faces, numbers, deviation, covered, between = self._triangulated(kept, self._between)
-        angles = measured_angles(self.points[:, :2], faces)
-        quality = as_quality(numbers, self.total_weight, surface_error=between, **angles)
+        of_mesh = measured_angles(self.points[:, :2], faces)
+        of_mesh |= line_errors(self._ground, self.model.lines, self.points, faces, planar=True)
+        quality = as_quality(numbers, self.total_weight, surface_error=between, **of_mesh)
         at = slice(None) if rows is None else rows
         return Simplified(faces, quality, deviation[at], covered[at])
 
@@ -284,6 +285,7 @@ class HeightSurface:
         deviation, covered = mesh_deviation(both, vertices, faces, planar=own is not None)
         of_mesh = {"surface_error": float((between.share * deviation[n:]).sum())}
         of_mesh |= measured_angles(np.asarray(vertices, float)[:, :2], np.asarray(faces))
+        of_mesh |= line_errors(ground, self.model.lines, vertices, faces, planar=own is not None)
         deviation, covered = deviation[:n], covered[:n]
         if own is not None:
             deviation[own[covered[own]]] = 0.0
@@ -293,7 +295,10 @@ class HeightSurface:
         )
 
     def refit(self, mesh: Simplified, *, tolerance: float = TOLERANCE, until: float | None = None) -> Refitted:
-        """Move a mesh's vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`."""
+        """Move a mesh's vertices up or down to where the sum of the deviations is least; see :func:`refit_heights`.
+
+        Those on break lines stay.
+        """
         if not tolerance > 0:
             raise ValueError(
                 f"tolerance={tolerance} is not positive; give a small share of the error such as {TOLERANCE}"
@@ -316,8 +321,16 @@ class HeightSurface:
         )
         A.sum_duplicates()
         original = model.points[rows, 2]
+        on_line = self._ground.lines.at
         heights, bound = least_error(
-            A, model.points[counts, 2], weights[counts], samples.gap[counts], original, tolerance=tolerance, until=until
+            A,
+            model.points[counts, 2],
+            weights[counts],
+            samples.gap[counts],
+            original,
+            tolerance=tolerance,
+            until=until,
+            held=on_line[rows] >= 0 if len(on_line) else None,
         )
         raised = own + (heights - original)[:, None] * (model.rotation[2] / model.scale)
         error = self.score(raised, compact).quality.error

@@ -54,6 +54,13 @@ class ModelLines:
         return np.unique(np.concatenate(self.chains))
 
     @cached_property
+    def shares(self) -> FloatArray:
+        """What each vertex of the originals, joined, stands for: half of both pieces beside it, as a share of all."""
+        halves = [np.linalg.norm(np.diff(line, axis=0), axis=1) / 2.0 for line in self.originals]
+        length = np.concatenate([np.r_[half, 0.0] + np.r_[0.0, half] for half in halves])
+        return np.asarray(length / length.sum())
+
+    @cached_property
     def hash(self) -> str:
         """SHA-256 of all that decides meshes and line errors."""
         digest = hashlib.sha256()

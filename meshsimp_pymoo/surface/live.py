@@ -17,7 +17,9 @@ import numpy as np
 from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
-from meshsimp_pymoo.plane.stars import MOST_EARS, cavity_of, fill, fill_large, triangles_around, turn
+from meshsimp_pymoo.plane.conflict import turn
+from meshsimp_pymoo.plane.constraints import constrain
+from meshsimp_pymoo.plane.stars import cavity_of, triangles_around
 from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
 from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.bare import clear_bare, forget_bare, is_segment, note_bare, set_segment, settle_bare
@@ -49,7 +51,7 @@ from meshsimp_pymoo.surface.books import (
 from meshsimp_pymoo.surface.costs import counts, deviation_in, enter_peak, is_inside, is_thin, noted_cost, weighed_cost
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.moves import answers
-from meshsimp_pymoo.surface.trial import is_solid, tried
+from meshsimp_pymoo.surface.trial import ears_of, is_solid, tried
 
 # Where an operation makes more triangles than this, the vertices to be placed walk to theirs.
 MOST_LOOKED_THROUGH = 48
@@ -386,7 +388,9 @@ def _insert(g: Ground, live: Live, p: int, half: bool) -> None:
     mesh = live.mesh
     count = live.tally
     t0 = live.place[p]
-    n_cavity, n_rim = cavity_of(g.xy, mesh, t0, p, live.cavity, live.rim, live.stack, g.exact_area, g.exact_lift)
+    n_cavity, n_rim = cavity_of(
+        g.xy, mesh, t0, p, live.cavity, live.rim, live.stack, g.lines, g.exact_area, g.exact_lift
+    )
     collect(live, live.cavity, n_cavity)
     # p itself leaves the pool: it is a site now.
     n = 0
@@ -430,24 +434,7 @@ def _remove(g: Ground, live: Live, p: int, half: bool) -> bool:
     m = triangles_around(mesh, live.place[p], p, live.cavity, live.rim, live.ring)
     if count[N_SITES] <= 3:
         return False
-    if m <= MOST_EARS:
-        n_ears = fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
-    else:
-        n_ears = fill_large(
-            g.xy,
-            p,
-            live.ring,
-            m,
-            live.ears,
-            live.ear_edges,
-            live.star_mesh,
-            live.star_inserted,
-            live.star_side,
-            live.star_order,
-            live.stack,
-            g.exact_area,
-            g.exact_lift,
-        )
+    n_ears = ears_of(g, live, p, m)
     if n_ears == 0 or not is_solid(mesh, live.ears, n_ears, live.rim, m):
         return False
     collect(live, live.cavity, m)
@@ -555,6 +542,8 @@ def _build(
     end = triangulate(site_xy, len(sites), first, np.empty(0, np.int64), inserted, mesh, g.exact_area, g.exact_lift)
     if end == 0:
         return False
+    if len(g.lines.at) > 0:
+        constrain(site_xy, mesh, end, g.lines, sites, len(sites), live.rim, g.exact_area, g.exact_lift)
     count[:] = 0
     live.amount[:] = 0.0
     count[END] = end

@@ -51,6 +51,7 @@ def least_error(
     *,
     tolerance: float = TOLERANCE,
     until: float | None = None,
+    held: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Minimise the sum of w sqrt(gap^2 + (A h - z)^2) over h; see the module's docstring.
 
@@ -66,6 +67,8 @@ def least_error(
         The search ends where the sum is at most this share above the proved bound.
     until : float, optional
         Or where ``time.perf_counter()`` is beyond this, with what is found by then.
+    held : (V,) bool array, optional
+        Heights that stay as they are; none by default.
 
     Returns
     -------
@@ -81,7 +84,13 @@ def least_error(
     if unit == 0.0:
         return start, 0.0
     r, g, z = r / unit, gap / unit, (z - level) / unit
+    moved = np.ones(len(start), bool) if held is None else ~held
+    if not moved.any():
+        return start, float((w * np.hypot(g, r)).sum()) * unit
     h = (start - level) / unit
+    if held is not None:  # their shares of the heights are known
+        z = z - A[:, held] @ h[held]
+        A, h = A[:, moved], h[moved]
     At = A.T.tocsr()
     y = np.zeros(len(z))
     least, best = float(w.sum()), h
@@ -122,7 +131,9 @@ def least_error(
         if least - bound <= tolerance * least or (until is not None and time.perf_counter() > until):
             break
         epsilon = min(epsilon, max(SMOOTHING * (value - proved) / float(w.sum()), 1e-12))
-    return best * unit + level, bound * unit
+    heights = start.copy()
+    heights[moved] = best * unit + level
+    return heights, bound * unit
 
 
 def smoothed(r: np.ndarray, g: np.ndarray, w: np.ndarray, epsilon: float) -> float:

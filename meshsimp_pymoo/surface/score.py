@@ -14,6 +14,7 @@ from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE
 from meshsimp_pymoo.surface.ground import Ground
+from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -156,6 +157,29 @@ def _look_at_mesh(
     else:
         deviation[bare] = 0.0
     return deviation, covered, recorded
+
+
+def line_errors(
+    ground: Ground, lines: ModelLines | None, vertices: FloatArray, faces: IntArray, *, planar: bool = False
+) -> dict[str, float]:
+    """Return how far any mesh is from break lines as they were given; nothing without lines.
+
+    At each of their vertices: the deviation, as of a vertex of the model there. The mean is weighted by the length of
+    line that each stands for, half of both pieces beside it, in space.
+
+    Parameters
+    ----------
+    ground, vertices, faces, planar
+        As in :func:`mesh_deviation`.
+    lines : ModelLines, optional
+        Of the model.
+    """
+    if lines is None:
+        return {}
+    places = np.concatenate(lines.originals)
+    samples = ground._replace(xy=np.ascontiguousarray(places[:, :2] / ground.unit).ravel(), z=places[:, 2].copy())
+    deviation, _ = mesh_deviation(samples, vertices, faces, planar=planar)
+    return {"line_max_error": float(deviation.max()), "line_mean_error": float((lines.shares * deviation).sum())}
 
 
 # Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are

@@ -10,7 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
-from meshsimp_pymoo.plane.stars import cavity_of, conflict, fill, triangles_around
+from meshsimp_pymoo.plane.conflict import conflict, turn
+from meshsimp_pymoo.plane.constraints import is_on_line
+from meshsimp_pymoo.plane.stars import MOST_EARS, cavity_of, fill, fill_beside_lines, fill_large, triangles_around
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, TRIANGLE
 from meshsimp_pymoo.surface.bare import (
     corners_of,
@@ -135,11 +137,15 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
                 mesh[t + e + 4] = h
                 mesh[h + 4] = t + e
     if among:
+        lined = len(g.lines.at) > 0
         for k in range(n_ears):
             t0 = gone[k]
-            if conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
+            if lined:  # beside a forced edge another one may be in conflict, too
+                if _holds(g.xy, mesh, t0, w, g.exact_area):
+                    break
+            elif conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
                 break
-    n_cavity, n_rim = cavity_of(g.xy, mesh, t0, w, live.cavity, rim, live.stack, g.exact_area, g.exact_lift)
+    n_cavity, n_rim = cavity_of(g.xy, mesh, t0, w, live.cavity, rim, live.stack, g.lines, g.exact_area, g.exact_lift)
     for k in range(n_rim):
         h = rim[k]
         live.ring[k] = mesh[(h & TRIANGLE) + ((h & 3) + 1) % 3]
@@ -149,6 +155,60 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
     for k in range(n_star):
         mesh[saved[8 * MOST_TOUCHED + k] + 4] = saved[9 * MOST_TOUCHED + k]
     return n_cavity, n_rim
+
+
+@inner
+def _holds(xy: np.ndarray, mesh: np.ndarray, t: int, w: int, exact_area: float) -> bool:
+    """Whether vertex w lies in triangle t, or is seen from the edge of ghost t."""
+    for e in range(3):
+        a, b = mesh[t + e], mesh[t + (e + 1) % 3]
+        if (a | b) <= LAST_INDEX:
+            side = turn(xy, a, b, w, exact_area)
+            if side < 0 or (side == 0 and mesh[t + (e + 2) % 3] > LAST_INDEX):
+                return False
+    return True
+
+
+@inner(inline=True)
+def ears_of(g: Ground, live: Live, p: int, m: int) -> int:
+    """Fill the star of p, whose m triangles, rim and ring are listed, by ears; return their number, or 0: none do."""
+    if len(g.lines.at) == 0 or (m <= MOST_EARS and not is_on_line(g.lines, p)):
+        if m <= MOST_EARS:
+            n = fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
+        else:
+            n = fill_large(
+                g.xy,
+                p,
+                live.ring,
+                m,
+                live.ears,
+                live.ear_edges,
+                live.star_mesh,
+                live.star_inserted,
+                live.star_side,
+                live.star_order,
+                live.stack,
+                g.exact_area,
+                g.exact_lift,
+            )
+        # Ears whose circles are empty are those that are wanted; where there are none, forced edges may hide vertices.
+        if n > 0 or len(g.lines.at) == 0:
+            return n
+        triangles_around(live.mesh, live.place[p], p, live.cavity, live.rim, live.ring)
+    return fill_beside_lines(
+        g.xy,
+        p,
+        live.ring,
+        m,
+        live.edge,
+        live.ears,
+        live.ear_edges,
+        live.star_mesh,
+        live.stack,
+        g.lines,
+        g.exact_area,
+        g.exact_lift,
+    )
 
 
 @inner(inline=True)
@@ -201,7 +261,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
                 at_outline = True
             n_emitted += bits & EMITTED
             change -= subtotal[t >> 3]
-        n_ears = fill(xy, live.ring, n_star, live.edge, ears, live.ear_edges, g.exact_area, g.exact_lift)
+        n_ears = ears_of(g, live, v, n_star)
         if n_ears == 0:
             return unknown
         if at_outline and (live.tally[N_SITES] <= 3 or not is_solid(mesh, ears, n_ears, live.rim, n_star)):

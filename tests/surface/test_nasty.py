@@ -26,9 +26,7 @@ LOOK, STRETCH = 20, 40
 
 def walk(live, moves, rng):
     """Make random moves towards one size after another; yield after some of them what was tried and what came of it."""
-    model = live.model
-    fixed = np.zeros(model.n_vertices, bool)
-    fixed[model.corners] = True
+    fixed = live.surface.pinned
     wished = 0.5
     for step in range(moves):
         if step % STRETCH == 0:

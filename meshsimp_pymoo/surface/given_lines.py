@@ -1,0 +1,169 @@
+"""What break lines are asked for: files and arrays in the frame of the model's file, or words that find them in it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.source.lines import SourceLines
+from meshsimp_pymoo.plane.faces import edge_table
+from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.orient import area_vectors
+from meshsimp_pymoo.surface.places import highest
+from meshsimp_pymoo.surface.polylines import chained
+from meshsimp_pymoo.surface.rules import OUTLINE, SHARP
+from meshsimp_pymoo.surface.units import reference_system
+
+_PARAMETER = re.compile(r'\bPARAMETER\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)')
+_NUMBER = re.compile(r'(?:AUTHORITY\s*\[\s*"EPSG"\s*,\s*"?(\d+)"?\s*\]|ID\s*\[\s*"EPSG"\s*,\s*(\d+)\s*\])\s*\]\s*$')
+_IS_COMPOUND = re.compile(r"\s*COMP(?:D_CS|OUNDCRS)\b")
+_IS_PROJECTED = re.compile(r"\bPROJ(?:CS|CRS|ECTEDCRS)\s*\[")
+
+
+def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
+    """Return lines of a file or of arrays, once it is clear that they are in the frame of the model's file.
+
+    Where only one of both says which reference system it has, the lines are taken to have the model's.
+
+    Parameters
+    ----------
+    model : OpenModel
+    given : path, SourceLines, or list of (n, 2) or (n, 3) arrays
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be read, the reference systems differ, these are no lines, or the lines have no heights and
+        the model's are not along the file's z.
+    """
+    if isinstance(given, (str, os.PathLike)):
+        from meshsimp_pymoo.formats.table import read_lines
+
+        given = read_lines(given)
+    elif not isinstance(given, SourceLines):
+        arrays = [np.asarray(line, float) for line in given]
+        given = SourceLines("break_lines", tuple(arrays), tuple(f"line {k + 1}" for k in range(len(arrays))))
+    for line, name in zip(given.lines, given.names, strict=True):
+        if line.ndim != 2 or line.shape[1] not in (2, 3) or len(line) < 2:
+            raise ModelError(
+                f"{given.name}: {name} has shape {line.shape}; give two or more positions, (n, 2) or (n, 3)"
+            )
+        wrong = np.flatnonzero(~np.isfinite(line).all(axis=1))
+        if len(wrong):
+            raise ModelError(
+                f"{given.name}: {name}: {len(wrong)} of {len(line)} positions are not finite (first: position "
+                f"{wrong[0]}, {line[wrong[0]].tolist()}); leave them out"
+            )
+    if not given.lines:
+        raise ModelError(f"{given.name}: holds no lines; give one or more")
+    if systems_differ(given.georeference, model.georeference):
+        raise ModelError(
+            f"{given.name}: is in {reference_system(given.georeference)}, and {model.name} in "
+            f"{reference_system(model.georeference)}; convert the lines, as by ogr2ogr -t_srs"
+        )
+    n_soft = sum(line.shape[1] == 2 for line in given.lines)
+    if n_soft and not (model.rotation[2] == (0.0, 0.0, 1.0)).all():
+        raise ModelError(
+            f"{given.name}: {n_soft} of {len(given.lines)} lines have no heights, and the heights of {model.name} are "
+            f"along {model.up.round(6).tolist()}, not along the file's z; give x, y and z of each vertex"
+        )
+    return given
+
+
+def systems_differ(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
+    """Tell whether two georeferences are known to be of different reference systems.
+
+    Where both name their number in the EPSG register it decides; else whether they are projected, and the numbers that
+    define the projections, whatever these are called.
+
+    Examples
+    --------
+    >>> utm = 'PROJCS["WGS_1984_UTM_Zone_{}N",...,PARAMETER["Central_Meridian",{}],PARAMETER["Scale_Factor",0.9996]]'
+    >>> systems_differ({"crs": utm.format(33, 15.0)}, {"crs": utm.format(33, 15)})
+    False
+    >>> systems_differ({"crs": utm.format(33, 15.0)}, {"crs": utm.format(32, 9)})
+    True
+    >>> systems_differ({"epsg": 32633}, {"epsg": 25833}), systems_differ({"epsg": 32633}, {})
+    (True, False)
+    """
+    numbers = [_number(georeference) for georeference in (first, second)]
+    if all(numbers):
+        return numbers[0] != numbers[1]
+    texts = [str(georeference.get("crs") or "") for georeference in (first, second)]
+    if not all(texts):
+        return False
+    facts = [
+        (bool(_IS_PROJECTED.search(text)), sorted(float(number) for number in _PARAMETER.findall(text) if float(number)))
+        for text in texts
+    ]
+    return facts[0] != facts[1]
+
+
+def _number(georeference: Mapping[str, Any]) -> int | None:
+    if georeference.get("epsg"):
+        return int(georeference["epsg"])
+    text = str(georeference.get("crs") or "")
+    found = None if _IS_COMPOUND.match(text) else _NUMBER.search(text)
+    return int(found[1] or found[2]) if found else None
+
+
+def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:
+    """Return lines of the model's own vertices, as rows, that a word names: its outline, or its sharp edges.
+
+    Where several vertices share a place, the highest stands for them.
+
+    Raises
+    ------
+    ModelError
+        If the word's angle is none, or the model has no such edges.
+    """
+    if word == OUTLINE:
+        rows = chained(_border(model))
+        if not rows:
+            raise ModelError(f"{model.name}: has no outline to take for break lines; leave break_lines={word!r} out")
+        return rows
+    try:
+        degrees = float(word.removeprefix(SHARP))
+    except ValueError:
+        degrees = np.nan
+    if not 0.0 < degrees < 180.0:
+        raise ModelError(f"break_lines={word!r}: no angle; give degrees between 0 and 180, as in 'sharp:30'")
+    rows = chained(sharp_edges(model, degrees))
+    if not rows:
+        raise ModelError(
+            f"break_lines={word!r}: no two faces of {model.name} meet at more than {degrees:g} degrees; give fewer"
+        )
+    return rows
+
+
+def _border(model: OpenModel) -> IntArray:
+    """Return the edges (E, 2) of one face only, as seen from above."""
+    faces = highest(model.xy)[model.faces]
+    table = edge_table(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+    return table.ends[table.n_triangles == 1]
+
+
+def sharp_edges(model: OpenModel, degrees: float) -> IntArray:
+    """Return the edges (E, 2) of two original faces whose normals differ by more than so many degrees.
+
+    Those that are upright are a place in the plane, and left out.
+    """
+    table = edge_table(model.faces)
+    pairs = table.first[table.n_triangles == 2]
+    faces = np.column_stack([table.order[pairs], table.order[pairs + 1]]) % len(model.faces)
+    angle = _angles(area_vectors(model.points, model.faces), faces)
+    edges = highest(model.xy)[table.ends[table.n_triangles == 2][angle > degrees]]
+    return edges[edges[:, 0] != edges[:, 1]]
+
+
+def _angles(normals: FloatArray, pairs: IntArray) -> FloatArray:
+    """Return the angles between the normals (T, 3) of pairs (E, 2) of faces [degrees]; 0 where one has no area."""
+    one, other = normals[pairs[:, 0]], normals[pairs[:, 1]]
+    sine, cosine = np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1)
+    return np.degrees(np.arctan2(sine, cosine))
