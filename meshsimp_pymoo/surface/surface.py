@@ -479,7 +479,7 @@ def mesh_lines(surface: Surface, faces: IntArray) -> tuple[tuple[IntArray, ...],
     used = np.zeros(surface.n_vertices, bool)
     used[np.asarray(faces)] = True
     parts, names = [], []
-    for chain, name in zip(lines.chains, lines.names, strict=True):
+    for chain, name in zip(surface.line_chains(used), lines.names, strict=True):  # type: ignore[attr-defined]
         ends = np.flatnonzero(np.diff(used[chain], prepend=False, append=False))
         for first, last in zip(ends[::2], ends[1::2], strict=True):
             if last - first >= 2:
