@@ -21,7 +21,6 @@ from meshsimp_pymoo.cli.terminal import (
     in_numbers,
     in_unit,
     is_interrupted,
-    lines_in_words,
     place_for_matplotlib,
     say,
     stop_if_interrupted,
@@ -36,6 +35,7 @@ from meshsimp_pymoo.front import Front, FrontSolution
 from meshsimp_pymoo.search.checkpoint import difference
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
+from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import known_units, reference_system
 

@@ -458,23 +458,6 @@ def in_numbers(quality: Quality) -> dict[str, float | None]:
     return {name: value for name, value in known.items() if value is not None or name not in OF_LINES}
 
 
-def lines_in_words(facts: Mapping[str, Any], unit: str = LENGTH) -> str:
-    """Return what break lines are and ask of every mesh, by what is recorded of them.
-
-    >>> facts = {"lines": 4, "vertices": 804, "thinned": 243, "tolerance": 0.3, "forced_edges": 239, "smallest": 500}
-    >>> print(lines_in_words(facts, "m"))
-    4 lines, 804 vertices thinned to 243 within 0.3 m; every mesh keeps their 239 edges, the smallest has 500 triangles
-    """
-    lines, vertices, thinned, edges, smallest = (
-        facts[name] for name in ("lines", "vertices", "thinned", "forced_edges", "smallest")
-    )
-    return (
-        f"{lines:,} line{'s' * (lines != 1)}, {vertices:,} vertices thinned to {thinned:,} within "
-        f"{facts['tolerance']:.4g}{in_unit(unit)}; every mesh keeps their {edges:,} edge{'s' * (edges != 1)}, the "
-        f"smallest has {smallest:,} triangle{'s' * (smallest != 1)}"
-    )
-
-
 def in_unit(unit: str) -> str:
     """Return what follows a number of this unit: nothing where it is not known."""
     return "" if unit == LENGTH else f" {unit}"

@@ -64,7 +64,7 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
 
     import numpy as np
 
-    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, lines_in_words, say, tell
+    from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.formats.source.classes import classes_in_words
     from meshsimp_pymoo.formats.source.missing import suspects
@@ -73,7 +73,7 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
     from meshsimp_pymoo.surface.model import build_model
     from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
     from meshsimp_pymoo.surface.places import count_places
-    from meshsimp_pymoo.surface.smallest import facts_of_lines
+    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
     from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source, mended = mended_source(model, options)
@@ -144,6 +144,7 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
     doubt = f"usable, but see the warning: {odd[0][1]:,} heights of {odd[0][0]:.9g}" if odd else ""
     if rules.break_lines is not None and not refusal:
         lined = HeightSurface(build_model(source, up=options.up), rules)
+        assert lined.model.lines is not None
         content["lines"] = facts_of_lines(lined, lined.model.lines)
         rows["break lines"] = lines_in_words(content["lines"], length_unit(source.georeference))
     rows["verdict"] = "refused" if refusal else doubt or "usable: an open height field"
