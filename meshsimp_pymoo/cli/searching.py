@@ -208,12 +208,12 @@ def _lines_forbid(problem: MeshProblem, wish: Wish) -> bool:
     if wish.triangles >= smallest:
         return False
     tolerance = tolerance_for(surface, wish.triangles) if surface.rules.break_lines is not None else None
-    way_out = "whatever their tolerance; leave some of them out"
+    way_out = f"no tolerance allows {wish.triangles:,}: leave some of the lines out"
     if tolerance is not None:
-        way_out = f"within {problem.model.lines.tolerance:g}; --line-tolerance {tolerance:g} would allow it"
+        way_out = f"--line-tolerance {tolerance:g} would allow {wish.triangles:,}"
     say(
-        f"--triangles {wish.triangles}: the break lines allow no mesh of {problem.model.name} of fewer than "
-        f"{smallest:,} triangles {way_out}"
+        f"--triangles {wish.triangles}: with break lines within {problem.model.lines.tolerance:g} the smallest mesh of "
+        f"{problem.model.name} has {smallest:,} triangles; {way_out}"
     )
     return surface.rules.footprint == "hull" or problem.model.footprint.side == 0
 

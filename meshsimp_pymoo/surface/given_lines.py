@@ -45,6 +45,9 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
     if isinstance(given, (str, os.PathLike)):
         from meshsimp_pymoo.formats.table import read_lines
 
+        word = meant_word_for_lines(given)
+        if word and not Path(given).exists():
+            raise ModelError(f"{given}: no such file of break lines{word}; check the path")
         given = read_lines(given)
     elif not isinstance(given, SourceLines):
         arrays = [np.asarray(line, float) for line in given]
