@@ -12,8 +12,8 @@ or in YAML::
 
 Two are real terrain from the sample data that matplotlib installs. The others are made here: surfaces whose
 whole front is known (``plane``, ``roof``, ``pyramid``), smooth and rough test surfaces, a synthetic scan of a
-face, outlines with a hole or a bay, and an embankment with break lines (``load_lines``). Everything is a pure function of the parameters, the scan noise
-included.
+face, outlines with a hole or a bay, and an embankment with break lines (``load_lines``). Everything is a pure
+function of the parameters, the scan noise included.
 """
 
 from __future__ import annotations
@@ -399,13 +399,7 @@ def _embankment_axis(x: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _land(x: FloatArray, y: FloatArray) -> FloatArray:
     """Return the height of the land without the embankment [m]."""
-    return (
-        46.0
-        + 3.0 * np.sin(x / 130.0) * np.cos(y / 170.0)
-        + 1.5 * np.cos(x / 60.0 - y / 80.0)
-        + 0.01 * x
-        - 0.008 * y
-    )
+    return 46.0 + 3.0 * np.sin(x / 130.0) * np.cos(y / 170.0) + 1.5 * np.cos(x / 60.0 - y / 80.0) + 0.01 * x - 0.008 * y
 
 
 def _embankment_height(x: FloatArray, y: FloatArray) -> FloatArray:

@@ -150,6 +150,16 @@ def _scores() -> None:
     surface.score(surface.points, surface.faces[:2])
 
 
+def _lining() -> None:
+    from meshsimp_pymoo.surface.lining import lined_model
+
+    # a line without heights that turns, so that it is cut, draped and thinned around another, which is met
+    bent = [[-0.5, 0.1], [0.3, 0.6], [0.4, 0.6], [0.9, 0.1]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # says what is cut off
+        lined_model(_square().model, [bent, [[0.35, 0.3], [0.35, 0.5]]], 0.5)
+
+
 def _folds() -> None:
     import numpy as np
 
@@ -208,6 +218,14 @@ PARTS = (
         _tiles, 2.5, False,
     ),
     Part("scores", ("surface.score:_cover", "surface.score:_measure_outside"), _scores, 1.5, False),
+    Part(
+        "break lines",
+        (
+            "plane.segments:_in_faces", "plane.segments:_sweep", "plane.segments:_near", "plane.segments:_meeting",
+            "plane.segments:_enclosed", "surface.polylines:_thin",
+        ),
+        _lining, 4.0, False,
+    ),
     Part("folded scans", ("surface.overlap:_mark_hidden", "surface.orient:_seen_sides"), _folds, 3.0, False),
     Part("files", ("formats.source.rows:_scan_bytes", "formats.source.rows:_scan_numbers"), _files, 1.0, False),
 )  # fmt: skip

@@ -1,7 +1,7 @@
 """Segments in the plane: what of them lies in faces, which points lie on them, which of them meet, and what they pass.
 
-All candidates come from trees of boxes (`plane.nearest`); what is exact is asked of the exact predicates, so points have
-coordinates that are multiples of 2**-52 in [0, 1].
+All candidates come from trees of boxes (`plane.nearest`). What is exact is asked of the exact predicates, so points
+have coordinates that are multiples of 2**-52 in [0, 1].
 """
 
 from __future__ import annotations
@@ -229,11 +229,12 @@ def along_faces(
     starts = np.searchsorted(pairs[:, 0], np.arange(len(segments) + 1))
     close = 2.0 * reach / np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
     most = 2 * len(pairs)
-    found = np.empty(most, np.int64), np.empty(most), np.empty(most), np.empty(most, np.bool_)
-    n = _sweep(starts, spans, heights, close, *found)
-    segment, at, height, goes_on = (values[:n] for values in found)
+    segment, at, height = np.empty(most, np.int64), np.empty(most), np.empty(most)
+    goes_on = np.empty(most, np.bool_)
+    n = _sweep(starts, spans, heights, close, segment, at, height, goes_on)
+    segment, at = segment[:n], at[:n]
     at = np.where(at <= close[segment], 0.0, np.where(at >= 1.0 - close[segment], 1.0, at))
-    return segment, at, height, goes_on
+    return segment, at, height[:n], goes_on[:n]
 
 
 def _height_in(corners: FloatArray, z: FloatArray, places: FloatArray) -> FloatArray:

@@ -102,11 +102,9 @@ def systems_differ(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
     texts = [str(georeference.get("crs") or "") for georeference in (first, second)]
     if not all(texts):
         return False
-    facts = [
-        (bool(_IS_PROJECTED.search(text)), sorted(float(number) for number in _PARAMETER.findall(text) if float(number)))
-        for text in texts
-    ]
-    return facts[0] != facts[1]
+    kinds = [bool(_IS_PROJECTED.search(text)) for text in texts]
+    defined = [sorted(filter(None, map(float, _PARAMETER.findall(text)))) for text in texts]
+    return kinds[0] != kinds[1] or defined[0] != defined[1]
 
 
 def _number(georeference: Mapping[str, Any]) -> int | None:

@@ -34,7 +34,7 @@ from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.polylines import Runs, cut_into_runs, farthest_between, thinned
-from meshsimp_pymoo.surface.rules import is_word_for_lines
+from meshsimp_pymoo.surface.rules import OUTLINE, is_word_for_lines
 
 # What is so near to each other is at one place, as a share of the model's diagonal in the plane; and at one height, as
 # a share of its diagonal in space: more than rounding makes of a file's coordinates, less than any survey knows.
@@ -92,15 +92,10 @@ class Polylines:
         part = self.part[chosen]
         counts = np.bincount(part, minlength=len(self.line))
         long = counts >= 2
-        chosen = np.flatnonzero(chosen)[long[part]]
+        at = np.flatnonzero(chosen)[long[part]]
         number = np.cumsum(long) - 1
         return Polylines(
-            self.xy[chosen],
-            self.z[chosen],
-            self.source[chosen],
-            self.given[chosen],
-            number[self.part[chosen]],
-            self.line[long],
+            self.xy[at], self.z[at], self.source[at], self.given[at], number[self.part[at]], self.line[long]
         )
 
     def between(self, piece: IntArray, t: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -175,9 +170,8 @@ def lined_model(model: OpenModel, break_lines: Any, tolerance: float | None) -> 
         tolerance = USUAL_TOLERANCE * model.diagonal
     if tolerance is None or not 0.0 <= tolerance < np.inf:
         raise InputError(f"line_tolerance is {tolerance}; give how far break lines may move in space, 0 or more")
-    return _Lining(model, float(tolerance)).of_word(break_lines) if is_word else (
-        _Lining(model, float(tolerance)).of_lines(break_lines)
-    )
+    lining = _Lining(model, float(tolerance))
+    return lining.of_word(break_lines) if is_word else lining.of_lines(break_lines)
 
 
 class _Lining:
@@ -193,6 +187,7 @@ class _Lining:
         self.found: dict[str, int] = {}
         self.what = ""
         self.names: tuple[str, ...] = ()
+        self.way_out = "give the crossing as a vertex of both, at one height, or leave one of them out"
 
     # ------------------------------------------------------------------------------------------------ the two ways in
 
@@ -205,14 +200,14 @@ class _Lining:
         given = np.full((len(at), 3), np.nan)
         source = np.full(len(at), GIVEN)
         lines = Polylines(self.model.xy[at], self.model.points[at, 2], source, given, part, np.arange(len(rows)))
-        return self._lined(self._met(lines, "give a larger angle" if word != "outline" else "mend the outline"))
+        self.way_out = "mend the outline, or give lines" if word == OUTLINE else "give a larger angle, or lines"
+        return self._lined(self._met(lines))
 
     def of_lines(self, break_lines: Any) -> OpenModel:
         lines = self._read(break_lines)
         lines = self._distinct(self._snapped(lines), first=True)
         lines = self._distinct(self._snapped(self._cut(lines)))
-        way_out = "give the crossing as a vertex of both, at one height, or leave one of them out"
-        return self._lined(self._draped(self._met(lines, way_out)))
+        return self._lined(self._draped(self._met(lines)))
 
     def _read(self, break_lines: Any) -> Polylines:
         """Bring lines into the model's frame."""
@@ -348,7 +343,7 @@ class _Lining:
 
     # ------------------------------------------------------------------------------------------------- where lines meet
 
-    def _met(self, lines: Polylines, way_out: str) -> Polylines:
+    def _met(self, lines: Polylines) -> Polylines:
         """Make vertices of one line on another vertices of both; refuse lines that cross otherwise."""
         places, node = _distinct_places(lines.xy)
         pieces, ends, number = _segments(lines, node)
@@ -371,10 +366,10 @@ class _Lining:
         if len(pairs):
             lines_of = np.full(len(ends), -1)
             lines_of[number[::-1]] = lines.of_lines(pieces)[::-1]
-            raise ModelError(self._crossing(places, ends[pairs], np.sort(lines_of[pairs], axis=1), way_out))
+            raise ModelError(self._crossing(places, ends[pairs], np.sort(lines_of[pairs], axis=1)))
         return lines
 
-    def _crossing(self, places: FloatArray, ends: IntArray, lines: IntArray, way_out: str) -> str:
+    def _crossing(self, places: FloatArray, ends: IntArray, lines: IntArray) -> str:
         """Say which lines (M, 2) cross in pairs of segments (M, 2, 2): the first two."""
         k = np.lexsort((lines[:, 1], lines[:, 0]))[0]
         first, second = (self.names[line] for line in lines[k])
@@ -385,7 +380,7 @@ class _Lining:
         x, y = self._in_file(np.array([[*((a + t * u) * self.model.unit), 0.0]]))[0, :2]
         what = f"{first} crosses itself" if lines[k, 0] == lines[k, 1] else f"{first} and {second} cross"
         more = f" (and there are {len(lines) - 1} more crossings)" if len(lines) > 1 else ""
-        return f"{self.what}: {what} at {x:.9g}, {y:.9g}{more}; {way_out}"
+        return f"{self.what}: {what} at {x:.9g}, {y:.9g}{more}; {self.way_out}"
 
     # ----------------------------------------------------------------------------------------------------- the heights
 
@@ -482,7 +477,9 @@ class _Lining:
     def _thinned(self, runs: Runs, places: FloatArray, points: FloatArray) -> list[IntArray]:
         """Return which vertices of each run stay: few of them, and none so that lines cross or pass each other."""
         along = [points[run] for run in runs.runs]
-        kept = [np.flatnonzero(stays) for stays in thinned(along, max(self.tolerance, self.height_reach))]
+        kept: list[IntArray] = [
+            np.flatnonzero(stays) for stays in thinned(along, max(self.tolerance, self.height_reach))
+        ]
         n_put_back = 0
         while True:
             run = np.repeat(np.arange(len(kept)), [len(at) - 1 for at in kept])
@@ -499,11 +496,11 @@ class _Lining:
                 break
             back: set[tuple[int, int]] = set()
             for segments in pairs:
-                far = [(*farthest_between(along[run[s]], low[s], high[s]), run[s]) for s in segments if high[s] - low[s] > 1]
+                longer = segments[high[segments] - low[segments] > 1]
+                far = [(*farthest_between(along[run[s]], low[s], high[s]), run[s]) for s in longer]
                 if not far:
-                    lines = np.array([[self._line_of(runs, k) for k in run[segments]]])
-                    way_out = "give the crossing as a vertex of both, at one height, or leave one of them out"
-                    raise ModelError(self._crossing(places, ends[segments][None], np.sort(lines), way_out))
+                    crossing = np.array([[self._line_of(runs, k) for k in run[segments]]])
+                    raise ModelError(self._crossing(places, ends[segments][None], np.sort(crossing)))
                 most = max(away for _, away, _ in far)
                 back |= {(k, at) for at, away, k in far if away == most}
             for k, at in back:

@@ -6,6 +6,7 @@ lines do, and a run is thinned the same way in whichever direction it is listed.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,7 +67,7 @@ class Runs:
     parts: list[list[tuple[int, bool]]]
 
     def joined(self, kept: list[IntArray]) -> list[IntArray]:
-        """Return the polylines with the runs thinned to those of their vertices (positions in the run) that are kept."""
+        """Return the polylines with each run thinned to those of its vertices, as positions in it, that are kept."""
         thinned = [run[at] for run, at in zip(self.runs, kept, strict=True)]
         lines = []
         for parts in self.parts:
@@ -104,7 +105,7 @@ def cut_into_runs(lines: list[IntArray], corners: IntArray) -> Runs:
     for line in lines:
         cuts = np.flatnonzero(stays[line])
         passed = []
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+        for a, b in itertools.pairwise(cuts):
             run = line[a : b + 1]
             # as it would be listed from its lesser end, or a closed one towards its lesser neighbour
             forward = bool((run[0], run[1]) <= (run[-1], run[-2]))
