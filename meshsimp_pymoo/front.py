@@ -1098,7 +1098,7 @@ class Front(Sequence[FrontSolution]):
         """Make the surface of a model; a file of break lines is looked for beside the results first."""
         file = ((self.run.get("model") or {}).get("lines") or {}).get("file")
         if is_file_of_lines(rules.break_lines) and self.folder is not None and isinstance(file, str):
-            beside = self.folder.resolve() / file
+            beside = (self.folder / file).resolve()
             if beside.is_file():
                 rules = replace(rules, break_lines=str(beside))
         try:

@@ -26,14 +26,15 @@ def smallest_mesh(surface: Surface) -> int:
 
 def facts_of_lines(surface: Surface, lines: ModelLines) -> dict[str, Any]:
     """Return what break lines of a surface were, what is left of them, and what they ask of every mesh, by name."""
+    found = dict(lines.found)
     return {
         "tolerance": lines.tolerance,
-        "lines": len(lines.originals),
-        "vertices": sum(map(len, lines.originals)),
+        "lines": int(found.pop("lines")),
+        "vertices": int(found.pop("line_vertices")),
         "thinned": len(lines.vertices),
         "forced_edges": len(lines.segments),
         "smallest": smallest_mesh(surface),
-        "found": {name: int(count) for name, count in lines.found.items()},
+        "found": {name: int(count) for name, count in found.items()},
     }
 
 
