@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.orient import area_vectors
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.polylines import chained
-from meshsimp_pymoo.surface.rules import OUTLINE, SHARP
+from meshsimp_pymoo.surface.rules import OUTLINE, SHARP, meant_word_for_lines
 from meshsimp_pymoo.surface.units import reference_system
 
 _PARAMETER = re.compile(r'\bPARAMETER\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)')
@@ -45,6 +46,9 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
     if isinstance(given, (str, os.PathLike)):
         from meshsimp_pymoo.formats.table import read_lines
 
+        word = meant_word_for_lines(given)
+        if word and not Path(given).exists():
+            raise ModelError(f"{given}: no such file of break lines{word}; check the path")
         given = read_lines(given)
     elif not isinstance(given, SourceLines):
         arrays = [np.asarray(line, float) for line in given]

@@ -64,7 +64,7 @@ class HeightSurface:
     def __init__(self, model: OpenModel, rules: Rules = DEFAULT) -> None:
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
         if rules.break_lines is not None:
-            self.model = lined_model(self.model, rules.break_lines, rules.line_tolerance)
+            self.model = lined_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
         is_small = self.n_vertices < LARGE
