@@ -1,17 +1,20 @@
 """What an insertion takes away and a removal leaves open: cavities, stars, and the ears that fill a star.
 
 A vertex that comes replaces the triangles whose circle holds it (Bowyer [1]_, Watson [2]_); where one goes, its star is
-filled by Delaunay ears (Devillers [3]_), a large one by the triangulation of its ring alone. Where edges are forced
-(:mod:`~meshsimp_pymoo.plane.constraints`) only what a vertex sees counts.
+filled by Delaunay ears (Devillers [3]_), a large one by the triangulation of its ring alone.
+
+Where edges are forced (:mod:`~meshsimp_pymoo.plane.constraints`) a vertex that comes replaces what it sees. A star is
+filled as ever: the circle of a triangle that fills it holds the vertex p that went. If it held a vertex q of the ring
+that is hidden from the triangle, what hides it would end at a vertex of the ring between the two as p sees them. That
+one lies between p, q and a point of the triangle, so inside the circle as these do: it would be no corner of the
+triangle, and either seen from it or hidden by a nearer one. So circles that are empty of what is seen are empty of all.
+Only where p lies on a segment, whose edge comes, each side of it is a star of its own.
 
 References
 ----------
 .. [1] A. Bowyer, "Computing Dirichlet tessellations", The Computer Journal 24, 1981.
 .. [2] D. F. Watson, "Computing the n-dimensional Delaunay tessellation", The Computer Journal 24, 1981.
 .. [3] O. Devillers, "On deletion in Delaunay triangulations", Int. J. Computational Geometry & Applications 12, 2002.
-.. [4] M. Heller, "Triangulation algorithms for adaptive terrain modeling", Proc. 4th Int. Symposium on Spatial Data
-       Handling, 1990.
-.. [5] C. L. Lawson, "Software for C1 surface interpolation", Mathematical Software III, 1977.
 """
 
 from __future__ import annotations
@@ -21,12 +24,10 @@ import numpy as np
 from meshsimp_pymoo.compiling.functions import inner
 from meshsimp_pymoo.plane.conflict import conflict, turn
 from meshsimp_pymoo.plane.constraints import Constraints, is_forced, is_wall
-from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, TRIANGLE, locate, triangulate
 
 # Ears are looked for one by one up to this many triangles in a star, in a time that grows with its square.
 MOST_EARS = 48
-# Beyond an ear a side of the ring is this and its number.
-OUTSIDE = 1 << 30
 
 
 @inner
@@ -96,6 +97,7 @@ def fill(
     xy: np.ndarray,
     ring: np.ndarray,
     m: int,
+    spared: int,
     edge: np.ndarray,
     ears: np.ndarray,
     ear_edges: np.ndarray,
@@ -105,13 +107,14 @@ def fill(
     """Triangulate the polygon ``ring`` (destroyed) by Delaunay ears; return their number, m - 2, or 0 if there is none.
 
     Side i of the polygon has the number i, the third side of ear k the number m + k; ``ear_edges`` says which sides an
-    ear has, in the order of its vertices.
+    ear has, in the order of its vertices. With ``spared`` 1 instead of 0 the first and last vertex are no tips of ears,
+    so the last ear has the side between them for its third.
     """
     for i in range(m):
         edge[i] = i
     left = m
     n = 0
-    i = 0
+    i = spared
     failures = 0
     while left > 3:
         before = i - 1 if i > 0 else left - 1
@@ -132,7 +135,7 @@ def fill(
             failures += 1
             if failures > left:
                 return 0
-            i = after
+            i = i + 1 if i < left - 1 - spared else spared
             continue
         failures = 0
         ears[n, 0] = a
@@ -147,7 +150,7 @@ def fill(
         for k in range(i, left):
             ring[k] = ring[k + 1]
             edge[k] = edge[k + 1]
-        i = i if i < left else 0
+        i = i if i < left - spared else spared
     for k in range(3):
         ears[n, k] = ring[k]
         ear_edges[n, k] = edge[k]
@@ -155,168 +158,55 @@ def fill(
 
 
 @inner
-def fill_beside_lines(
-    xy: np.ndarray,
-    p: int,
-    ring: np.ndarray,
-    m: int,
-    edge: np.ndarray,
-    ears: np.ndarray,
-    ear_edges: np.ndarray,
-    mesh: np.ndarray,
-    stack: np.ndarray,
-    lines: Constraints,
-    exact_area: float,
-    exact_lift: float,
-) -> int:
-    """Do what :func:`fill` does for the star of p, where forced edges hide vertices of its ring from others.
-
-    Where p lies on a segment, the edge between its neighbours there is forced. First the spokes flip [4]_ one by
-    one until none is left, which makes ears of the ring whatever their circles hold; then edges that are not forced
-    flip until all are locally Delaunay [5]_.
-
-    Parameters
-    ----------
-    mesh : (16 m,) uint32 array
-        Workspace, and ``stack`` for m entries.
-    """
-    # The neighbours of p on the segment that it lies on, and whether it is at the hull: then it may lie on an edge that
-    # comes.
-    low = -1
-    high = -1
-    may_touch = False
+def along_line(
+    xy: np.ndarray, lines: Constraints, p: int, ring: np.ndarray, m: int, exact_area: float
+) -> tuple[int, int]:
+    """Return which two vertices of the ring of p are its neighbours on the segment that it lies on; -1: it ends all."""
     for i in range(m):
-        may_touch = may_touch or ring[i] > LAST_INDEX
         if is_forced(lines, p, ring[i]):
             for k in range(i):
                 if is_forced(lines, p, ring[k]) and turn(xy, ring[k], ring[i], p, exact_area) == 0:
-                    low, high = np.int64(ring[k]), np.int64(ring[i])
-                    may_touch = True
-    for i in range(m):
-        edge[i] = i
-    left = m
-    n = 0
-    i = 0
-    failures = 0
-    while left > 3:
-        before = i - 1 if i > 0 else left - 1
-        after = i + 1 if i < left - 1 else 0
-        a = ring[before]
-        b = ring[i]
-        c = ring[after]
-        good = b != low and b != high
-        if good and (a | b | c) <= LAST_INDEX:
-            good = turn(xy, a, b, c, exact_area) > 0
-            if good:
-                seen = turn(xy, a, c, p, exact_area)
-                good = seen > 0 or (seen == 0 and (may_touch or left == 4))
-        elif good:
-            good = b <= LAST_INDEX and failures >= left  # hull edges are what is left in the end
-        if not good:
-            failures += 1
-            if failures > 2 * left:
-                return 0
-            i = after
-            continue
-        failures = 0
-        _enter_ear(mesh, n, m, a, b, c, edge[before], edge[i])
-        edge[before] = m + n
-        n += 1
-        left -= 1
-        for k in range(i, left):
-            ring[k] = ring[k + 1]
-            edge[k] = edge[k + 1]
-        i = i if i < left else 0
-    _enter_ear(mesh, n, m, ring[0], ring[1], ring[2], edge[0], edge[1])
-    _join(mesh, RECORD * n + 2, m, edge[2])
-    n += 1
-    # Lawson's flips; a triangle is looked at again where one of its edges is new.
-    for k in range(n):
-        stack[k] = k
-        mesh[RECORD * k + 3] = 1
-    depth = n
-    while depth > 0:
-        depth -= 1
-        t = RECORD * np.int64(stack[depth])
-        mesh[t + 3] = 0
-        for e in range(3):
-            h = t + e
-            twin = np.int64(mesh[h + 4])
-            if twin >= OUTSIDE:
-                continue
-            s = twin & TRIANGLE
-            before = t + (e + 2) % 3
-            after = t + (e + 1) % 3
-            twin_before = s + ((twin & 3) + 2) % 3
-            twin_after = s + ((twin & 3) + 1) % 3
-            a, b, c, d = mesh[h], mesh[after], mesh[before], mesh[twin_before]
-            if (a | b | c | d) > LAST_INDEX or is_forced(lines, a, b):
-                continue
-            if not conflict(xy, a, b, c, d, exact_area, exact_lift):
-                continue
-            # (a, b, c), (b, a, d)  ->  (d, b, c), (d, c, a), in the places of a -> b and b -> a
-            beyond_ca, beyond_bc = np.int64(mesh[before + 4]), np.int64(mesh[after + 4])
-            beyond_ad, beyond_db = np.int64(mesh[twin_after + 4]), np.int64(mesh[twin_before + 4])
-            mesh[t], mesh[t + 1], mesh[t + 2] = d, b, c
-            mesh[s], mesh[s + 1], mesh[s + 2] = d, c, a
-            _link(mesh, t, beyond_db)
-            _link(mesh, t + 1, beyond_bc)
-            _link(mesh, t + 2, s)
-            _link(mesh, s + 1, beyond_ca)
-            _link(mesh, s + 2, beyond_ad)
-            for changed in (t, s):
-                if mesh[changed + 3] == 0:
-                    mesh[changed + 3] = 1
-                    stack[depth] = changed // RECORD
-                    depth += 1
-            break
-    # They make a tree, which is told from its root as ``fill_large`` does.
-    stack[0] = 0
-    told = 1
-    k = 0
-    while k < told:
-        t = np.int64(stack[k]) & TRIANGLE
-        first = 0 if k == 0 else ((np.int64(stack[k]) & 3) + 1) % 3
-        ear = m - 3 - k
-        for e in range(3):
-            h = t + (first + e) % 3
-            ears[ear, e] = mesh[h]
-            twin = np.int64(mesh[h + 4])
-            if twin >= OUTSIDE:
-                ear_edges[ear, e] = twin - OUTSIDE
-            elif k > 0 and e == 2:
-                ear_edges[ear, e] = m + ear
-            else:
-                stack[told] = twin
-                ear_edges[ear, e] = m + m - 3 - told
-                told += 1
-        k += 1
-    return n
-
-
-@inner(inline=True)
-def _link(mesh: np.ndarray, h: int, beyond: int) -> None:
-    """Let halfedge h of an ear have this one beyond, which may be a side of the ring."""
-    mesh[h + 4] = beyond
-    if beyond < OUTSIDE:
-        mesh[beyond + 4] = h
-
-
-@inner(inline=True)
-def _join(mesh: np.ndarray, h: int, m: int, side: int) -> None:
-    """Let halfedge h of an ear have beyond it what `fill` calls this side: one of the ring, or the third of an ear."""
-    _link(mesh, h, OUTSIDE + side if side < m else RECORD * (side - m) + 2)
+                    return k, i
+    return -1, -1
 
 
 @inner
-def _enter_ear(mesh: np.ndarray, n: int, m: int, a: int, b: int, c: int, side_ab: int, side_bc: int) -> None:
-    """Write ear n into its record, the first two sides linked."""
-    t = RECORD * n
-    mesh[t] = a
-    mesh[t + 1] = b
-    mesh[t + 2] = c
-    _join(mesh, t, m, side_ab)
-    _join(mesh, t + 1, m, side_bc)
+def fill_on_line(
+    xy: np.ndarray,
+    ring: np.ndarray,
+    m: int,
+    low: int,
+    high: int,
+    half: np.ndarray,
+    edge: np.ndarray,
+    ears: np.ndarray,
+    ear_edges: np.ndarray,
+    exact_area: float,
+    exact_lift: float,
+) -> int:
+    """Do what :func:`fill` does for the star of a vertex between two of its ring on a segment, these of it.
+
+    The edge between them is forced then, so either side of it is filled alone. ``half`` has room for m vertices.
+    """
+    n = 0
+    for first, last in ((low, high), (high, low)):
+        count = (last - first + m) % m + 1
+        for i in range(count):
+            half[i] = ring[(first + i) % m]
+        more = fill(xy, half, count, 1, edge, ears[n:], ear_edges[n:], exact_area, exact_lift)
+        if more == 0:
+            return 0
+        for k in range(n, n + more):
+            for e in range(3):
+                side = ear_edges[k, e]
+                if side < count - 1:
+                    ear_edges[k, e] = (first + side) % m
+                elif side == count - 1:  # the edge between both halves, the third of the first one's last ear
+                    ear_edges[k, e] = m + (n if n > 0 else more) - 1
+                else:
+                    ear_edges[k, e] = m + n + side - count
+        n += more
+    return n
 
 
 @inner

@@ -307,7 +307,7 @@ def _shift(free: Freedom, live: Live, v: int, inside: bool, most: int, limit: fl
         w = _stroll(free.indptr, free.indices, v, 1 + below(state, 3), state)
     else:
         w = _stroll(free.border_indptr, free.border_indices, v, 1 + below(state, 3), state)
-    if live.site[w] or is_on_line(free.ground.lines, w):
+    if live.site[w]:
         return -1
     fill_around(free.fan, w)
     if inside:

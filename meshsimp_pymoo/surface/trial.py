@@ -12,7 +12,15 @@ import numpy as np
 from meshsimp_pymoo.compiling.functions import inner
 from meshsimp_pymoo.plane.conflict import conflict, turn
 from meshsimp_pymoo.plane.constraints import is_on_line
-from meshsimp_pymoo.plane.stars import MOST_EARS, cavity_of, fill, fill_beside_lines, fill_large, triangles_around
+from meshsimp_pymoo.plane.stars import (
+    MOST_EARS,
+    along_line,
+    cavity_of,
+    fill,
+    fill_large,
+    fill_on_line,
+    triangles_around,
+)
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, TRIANGLE
 from meshsimp_pymoo.surface.bare import (
     corners_of,
@@ -108,8 +116,8 @@ def _holder(forms: np.ndarray, n: int, best: int, x: float, y: float) -> tuple[i
 
 
 @inner(inline=True)
-def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[int, int]:
-    """List the triangles in conflict with w once the ears have replaced the star; as :func:`cavity_of`.
+def _replaced(live: Live, n_star: int, n_ears: int, v: int, w: int, g: Ground) -> tuple[int, int]:
+    """List the triangles in conflict with w once the ears have replaced the star of v; as :func:`cavity_of`.
 
     The ears stand in the star's records (``gone``) only meanwhile. ``ring`` gets the rim's vertices.
     """
@@ -137,10 +145,10 @@ def _replaced(live: Live, n_star: int, n_ears: int, w: int, g: Ground) -> tuple[
                 mesh[t + e + 4] = h
                 mesh[h + 4] = t + e
     if among:
-        lined = len(g.lines.at) > 0
+        on_line = v >= 0 and is_on_line(g.lines, v)
         for k in range(n_ears):
             t0 = gone[k]
-            if lined:  # beside a forced edge another one may be in conflict, too
+            if on_line:  # one beyond the edge that comes may be in conflict, too
                 if _holds(g.xy, mesh, t0, w, g.exact_area):
                     break
             elif conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
@@ -172,40 +180,25 @@ def _holds(xy: np.ndarray, mesh: np.ndarray, t: int, w: int, exact_area: float) 
 @inner(inline=True)
 def ears_of(g: Ground, live: Live, p: int, m: int) -> int:
     """Fill the star of p, whose m triangles, rim and ring are listed, by ears; return their number, or 0: none do."""
-    if len(g.lines.at) == 0 or (m <= MOST_EARS and not is_on_line(g.lines, p)):
-        if m <= MOST_EARS:
-            n = fill(g.xy, live.ring, m, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
-        else:
-            n = fill_large(
-                g.xy,
-                p,
-                live.ring,
-                m,
-                live.ears,
-                live.ear_edges,
-                live.star_mesh,
-                live.star_inserted,
-                live.star_side,
-                live.star_order,
-                live.stack,
-                g.exact_area,
-                g.exact_lift,
-            )
-        # Ears whose circles are empty are those that are wanted; where there are none, forced edges may hide vertices.
-        if n > 0 or len(g.lines.at) == 0:
-            return n
-        triangles_around(live.mesh, live.place[p], p, live.cavity, live.rim, live.ring)
-    return fill_beside_lines(
+    if is_on_line(g.lines, p):
+        low, high = along_line(g.xy, g.lines, p, live.ring, m, g.exact_area)
+        if low >= 0:
+            scratch = live.stack, live.edge, live.ears, live.ear_edges
+            return fill_on_line(g.xy, live.ring, m, low, high, *scratch, g.exact_area, g.exact_lift)
+    if m <= MOST_EARS:
+        return fill(g.xy, live.ring, m, 0, live.edge, live.ears, live.ear_edges, g.exact_area, g.exact_lift)
+    return fill_large(
         g.xy,
         p,
         live.ring,
         m,
-        live.edge,
         live.ears,
         live.ear_edges,
         live.star_mesh,
+        live.star_inserted,
+        live.star_side,
+        live.star_order,
         live.stack,
-        g.lines,
         g.exact_area,
         g.exact_lift,
     )
@@ -270,7 +263,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
     n_cavity = 0
     n_rim = 0
     if w >= 0:
-        n_cavity, n_rim = _replaced(live, n_star, n_ears, w, g)
+        n_cavity, n_rim = _replaced(live, n_star, n_ears, v, w, g)
         if n_star + n_cavity > 2 * MOST_TOUCHED or n_ears + n_rim > 2 * MOST_TOUCHED:
             return unknown
         for k in range(n_cavity):

@@ -55,6 +55,35 @@ def test_what_is_tried_beside_lines_is_what_is_done_and_as_from_scratch(name, mo
                 assert live.error == pytest.approx(wanted, rel=1e-9, abs=rounding)
 
 
+def near(lined, v, n):
+    """The n vertices nearest to vertex v in the plane that are not at its place."""
+    away = np.hypot(*(lined.model.xy - lined.model.xy[v]).T)
+    order = np.argsort(away, kind="stable")
+    return order[away[order] > 0.0][:n]
+
+
+@tried("rounds", 2)
+def test_vertices_that_leave_a_line_for_a_place_nearby_are_as_from_scratch(rounds):
+    lined = lined_rows()
+    rng = np.random.default_rng(4)
+    on_line = np.flatnonzero((lined.ground().lines.at >= 0) & ~lined.pinned)
+    for _ in range(rounds):
+        live = LiveTriangulation(lined, lined.pinned | (rng.random(lined.n_vertices) < 0.4))
+        for v in on_line:
+            if not live.kept[v]:
+                live.insert(int(v))
+            for w in near(lined, v, 12):
+                if live.kept[w]:
+                    continue
+                before = live.error, live.triangles
+                change, triangles = live.try_move(int(v), int(w))
+                live.move(int(v), int(w))
+                assert triangles == live.triangles - before[1]
+                assert change == pytest.approx(live.error - before[0], rel=1e-9, abs=1e-11 * lined.n_vertices)
+                np.testing.assert_array_equal(live.faces, lined.triangles(live.kept))
+                live.move(int(w), int(v))
+
+
 def forced_edges_of(lined, faces):
     """Whether all edges of the lines are edges of a mesh, cut at its vertices."""
     used = np.zeros(lined.n_vertices, bool)
@@ -71,6 +100,18 @@ def lined_terrain(n_lines=12, **rules):
     return surface(with_segments(model, segments), **rules)
 
 
+def lined_rows(**rules):
+    """The same grid with lines along a side and two rows: all their vertices lie on them."""
+    model = build_model(load("jacksboro:9"))
+    y = np.unique(model.xy[:, 1])
+    segments = []
+    for level in y[[0, len(y) // 3, len(y) // 2]]:
+        row = np.flatnonzero(model.xy[:, 1] == level)
+        row = row[np.argsort(model.xy[row, 0])]
+        segments += [(row[0], row[len(row) // 2]), (row[len(row) // 2], row[-1])]
+    return surface(with_segments(model, segments), **rules)
+
+
 @pytest.mark.parametrize("share", [0.1, 0.3])
 def test_chains_of_lines_are_edges_of_every_mesh(share):
     lined = lined_terrain()
@@ -82,8 +123,9 @@ def test_chains_of_lines_are_edges_of_every_mesh(share):
 
 
 @pytest.mark.parametrize("centroids", [False, True])
-def test_free_meshes_keep_the_lines_and_what_lies_on_them(centroids):
-    lined = lined_terrain()
+@pytest.mark.parametrize("make", [lined_terrain, lined_rows])
+def test_free_meshes_keep_the_lines_and_what_lies_on_them(make, centroids):
+    lined = make()
     kept = lined.pinned | (np.random.default_rng(2).random(lined.n_vertices) < 0.3)
     start = lined.triangles(kept)
     before = [chain.tolist() for chain in lined.line_chains(kept)]
@@ -98,8 +140,9 @@ def test_free_meshes_keep_the_lines_and_what_lies_on_them(centroids):
 
 
 @pytest.mark.parametrize("triangulation", ["delaunay", "free"])
-def test_searched_fronts_keep_the_lines(triangulation):
-    lined = lined_terrain()
+@pytest.mark.parametrize("make", [lined_terrain, lined_rows])
+def test_searched_fronts_keep_the_lines(make, triangulation):
+    lined = make()
     result = minimize(MeshProblem(lined), memetic(12, triangulation=triangulation), Moves(20_000), seed=1)
     free = [mesh for mesh in result.opt.get("free", to_numpy=False) if mesh is not None]
     assert len(free) > 5 if triangulation == "free" else not free
