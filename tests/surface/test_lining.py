@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from samples import holey_grid, stepped_model, surface
-from test_places import walled
+from test_places import skirted, walled
 
 from meshsimp_pymoo.datasets import load, load_lines
 from meshsimp_pymoo.errors import InputError, ModelError, ModelWarning
@@ -100,10 +100,11 @@ def test_thinning_keeps_to_its_tolerance():
     assert 0.1 < away.max() <= 0.2
 
 
-def test_a_line_with_heights_of_its_own_carries_the_surface_at_a_samples_place():
-    model = lined_model(FLAT, [[[2, 2, 5], [6, 2, 7]]], 0)
+@pytest.mark.parametrize("up", [1, -1])
+def test_a_line_with_heights_of_its_own_carries_the_surface_at_a_samples_place(up):
+    model = lined_model(FLAT, [[[2, 2, 5 * up], [6, 2, 7 * up]]], 0)
     assert model.n_vertices == 83
-    assert chains(model) == [[[2, 2, 5], [6, 2, 7]]]
+    assert chains(model) == [[[2, 2, 5 * up], [6, 2, 7 * up]]]
     lined = HeightSurface(model)
     everything = lined.simplify(np.ones(83, bool))
     assert set(model.lines.vertices) <= set(everything.faces.ravel())
@@ -148,6 +149,23 @@ def test_what_two_lines_share_is_one_set_of_edges():
     assert len(model.lines.segments) == 3
 
 
+def test_where_a_line_without_heights_runs_along_one_with_heights_it_has_these():
+    soft, hard = [[1, 2.5], [7, 2.5]], [[5.25, 2.5, 3], [3.25, 2.5, 3]]
+    model = lined_model(ROUGH, [soft, hard], 0)
+    of_soft, of_hard = chains(model)
+    low = of_soft.index([3.25, 2.5, 3])
+    assert of_hard == of_soft[low : low + len(of_hard)][::-1]
+    assert len(of_soft) > len(of_hard) == 2
+
+
+def test_feet_of_walls_stay_what_they_are():
+    walls = stepped_model(skirted())
+    model = lined_model(walls, [[[1.3, -1.4, 30], [5.6, -7.2, 30]]], 0)
+    assert_array_equal(np.sort(model.source_index[model.feet]), np.sort(walls.source_index[walls.feet]))
+    assert (model.weights[model.feet] == 0).all()
+    assert model.total_weight == walls.total_weight
+
+
 def test_lines_that_cross_are_refused_by_name_and_place():
     lines = SourceLines("kerbs.obj", tuple(np.array(x) for x in CROSSING), ("line 1", "line 7"))
     with pytest.raises(
@@ -186,6 +204,9 @@ def test_what_lies_outside_is_cut_off_at_the_outline():
     assert_allclose(sum(lengths), np.ptp(holey.points[:, 0]) - 8)
     assert model.lines.names == ("line 1", "line 1")
     assert model.lines.found["lines_cut"] == model.lines.found["lines_left_out"] == 1
+    with pytest.warns(ModelWarning):
+        back = lined_model(holey, [across[::-1], away], 0)
+    assert chains(back) == [chain[::-1] for chain in chains(model)[::-1]]
     # heights are those of the line where it was cut
     for chain in chains(model):
         for x, _, z in chain:
@@ -205,6 +226,11 @@ def test_a_line_along_the_outline_is_whole():
         warnings.simplefilter("error")
         model = lined_model(FLAT, [rim], 0)
     assert [place[:2] for place in chains(model)[0]] == rim
+    # and the model's corners stay, however much it is thinned
+    assert (
+        lined_model(FLAT, [rim], 100).hash
+        == dataclasses.replace(model, lines=dataclasses.replace(model.lines, tolerance=100.0)).hash
+    )
 
 
 def test_repeated_vertices_and_lines_of_one_place_are_left_out_and_said():
@@ -227,6 +253,12 @@ def test_thinned_lines_that_come_to_cross_get_vertices_back_until_they_do_not():
     assert model.lines.found["put_back_line_vertices"] > 0
     assert len(model.lines.vertices) > sum(alone)
     assert_no_crossing(model)
+
+
+def test_of_two_that_cross_the_one_that_was_thinned_more_gets_its_vertex_back():
+    around, upright = [[1, 2.5], [4, 3.5], [7, 2.5]], [[4, 3.3], [4.05, 2], [4, 1]]
+    model = lined_model(FLAT, [around, upright], 2)
+    assert [len(chain) for chain in model.lines.chains] == [3, 2]
 
 
 def test_a_line_is_not_thinned_across_another():
