@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from meshsimp_pymoo.arrays import FloatArray, IntArray
     from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.formats.source.lines import SourceLines
 
 # Elements that are no part of a surface of triangles, and what they are called.
 LEFT_BEHIND = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "free-form surfaces"}
@@ -59,9 +60,38 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
         attributes["uv"] = np.pad(uv, ((0, len(table) - len(uv)), (0, 0)))
     others = [LEFT_BEHIND[key] for line in lines if (key := line.partition(" ")[0]) in LEFT_BEHIND]
     for what in sorted(set(others)):
-        warn_of(f"{name}: its {others.count(what)} {what} are no faces and stay behind")
+        way = "; --break-lines takes them" * (what == "lines")
+        warn_of(f"{name}: its {others.count(what)} {what} are no faces and stay behind{way}")
     material = _material(path, lines, face_at, name, placed="uv" in attributes)
     return build_source(table[:, :3], fans(corners - 1, counts), attributes, name, material=material)
+
+
+def _read_lines(path: Path, name: str) -> SourceLines:
+    """Read the elements ``l``: polylines through vertices of the file, by the first index of each."""
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.lines import build_lines, spelled_name
+    from meshsimp_pymoo.formats.source.numbers import even_table, parse_numbers, text_lines, whole
+
+    lines = text_lines(path)
+    is_vertex = np.array([line.startswith(("v ", "v\t")) for line in lines])
+    table, _ = even_table([lines[i][2:] for i in np.flatnonzero(is_vertex)], name, "vertex", 3)
+    before = np.cumsum(is_vertex)
+    line_at = [i for i, line in enumerate(lines) if line.startswith(("l ", "l\t"))]
+    if not line_at:
+        raise ModelError(f"{name}: has no line 'l' of an OBJ, which lists the vertices of a polyline; export its lines")
+    found = []
+    for number, i in enumerate(line_at, start=1):
+        index = whole(parse_numbers(re.sub(r"/\S*", "", lines[i][2:]), name), name, "the index of a line")
+        row = np.where(index < 0, before[i] + index, index - 1)  # -1 is the last vertex before it; 0 is none
+        wrong = (row < 0) | (row >= len(table))
+        if wrong.any():
+            raise ModelError(
+                f"{name}: its line {number} names the vertex {index[np.argmax(wrong)]}, which does not exist (of "
+                f"{len(table)}, from 1); the file is damaged, export it again"
+            )
+        found.append(table[row, :3])
+    return build_lines(name, found, [spelled_name("line", number) for number in range(1, len(found) + 1)])
 
 
 def _uv(lines: list[str], face_at: list[int], corners: IntArray, counts: IntArray, name: str) -> FloatArray | None:
@@ -172,6 +202,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
     corner = "{0}" if mesh.uv is None else "{0}/{0}"
     named = [corner.format(k) for k in range(1, len(rows) + 1)]
     lines += [f"f {named[a]} {named[b]} {named[c]}" for a, b, c in np.asarray(mesh.faces).tolist()]
+    lines += ["l " + " ".join(str(k + 1) for k in line.tolist()) for line in mesh.lines]
     path.write_bytes(("\n".join(heading + lines) + "\n").encode("utf-8"))
 
 
@@ -188,4 +219,16 @@ def _word(text: str) -> str:
     return "_".join(text.replace("#", "_").split()) or "material"
 
 
-register(Format("obj", (".obj",), "OBJ", bare_points=True, read=_read, write=_write, keeps=("color", "uv")))
+register(
+    Format(
+        "obj",
+        (".obj",),
+        "OBJ",
+        bare_points=True,
+        read=_read,
+        write=_write,
+        keeps=("color", "uv"),
+        read_lines=_read_lines,
+        holds_lines=True,
+    )
+)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from meshsimp_pymoo.formats.table import Format, register
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
     from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.formats.source.lines import SourceLines
     from meshsimp_pymoo.formats.source.rows import PlyElement
 
 # A header lists properties, one line each; a real one takes a few hundred bytes, scanners' comments a few thousand.
@@ -36,6 +37,8 @@ TYPES_WRITTEN = {
     "i4": "int", "u4": "uint", "f4": "float", "f8": "double",
 }  # fmt: skip
 CHANNELS = ("red", "green", "blue", "alpha")
+# Lines are rows of this element, which join two vertices each.
+EDGE, EDGE_ENDS = "edge", ("vertex1", "vertex2")
 WIDER = {"b1": "u1", "f2": "f4", "i8": "f8", "u8": "f8"}
 
 
@@ -51,20 +54,11 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     from meshsimp_pymoo.formats.source import build_source
     from meshsimp_pymoo.formats.source.numbers import without_mark
     from meshsimp_pymoo.formats.source.points import bare_cloud
-    from meshsimp_pymoo.formats.source.rows import binary_columns, text_columns
 
     data = without_mark(path.read_bytes())
     elements, order, start = _header(data, name)
-    named = {element.name: element for element in elements}
-    if "vertex" not in named:
-        raise ModelError(f"{name}: declares no element 'vertex' (but {sorted(named)}); export it as a triangle mesh")
-    last = max(i for i, element in enumerate(elements) if element.name in ("vertex", *SURFACES))
-    columns = (text_columns if order == "" else binary_columns)(data, start, elements[: last + 1], name)
+    columns, points = _columns(data, elements, order, start, SURFACES, name)
     vertex = columns["vertex"]
-    scalars = {key for key, value in vertex.items() if isinstance(value, np.ndarray) and value.ndim == 1}
-    if missing := sorted(set("xyz") - scalars):
-        raise ModelError(f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again")
-    points = np.column_stack([vertex[axis].astype(np.float64) for axis in "xyz"])
     attributes = _attributes(vertex, name)
     _say_left_behind(elements, columns.get("face", {}), name)
     where = _georeference(data[:start])
@@ -78,6 +72,58 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
     return build_source(points, faces, attributes, name, georeference=where, material=material)
 
 
+def _read_lines(path: Path, name: str) -> SourceLines:
+    """Read the element ``edge``, whose rows join ``vertex1`` and ``vertex2``, as chains."""
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.lines import build_lines, spelled_name
+    from meshsimp_pymoo.formats.source.numbers import without_mark
+    from meshsimp_pymoo.plane.chains import chains
+
+    data = without_mark(path.read_bytes())
+    elements, order, start = _header(data, name)
+    columns, points = _columns(data, elements, order, start, (EDGE,), name)
+    edge = columns.get(EDGE, {})
+    ends = [edge[key] for key in EDGE_ENDS if isinstance(edge.get(key), np.ndarray) and edge[key].ndim == 1]
+    if len(ends) < len(EDGE_ENDS):
+        others = sorted(element.name for element in elements)
+        raise ModelError(
+            f"{name}: has no element {EDGE!r} with {' and '.join(EDGE_ENDS)} (but {others}); export its edges, or give "
+            "the lines in another file"
+        )
+    edges = np.column_stack([_integers(values, name) for values in ends])
+    wrong = ((edges < 0) | (edges >= len(points))).any(axis=1)
+    if wrong.any():
+        first = int(np.argmax(wrong))
+        raise ModelError(
+            f"{name}: {wrong.sum()} of {len(edges)} edges name vertices that do not exist (first: edge {first}, "
+            f"{tuple(edges[first].tolist())}, of {len(points)} vertices); the file is damaged, export it again"
+        )
+    lines = [points[chain] for chain in chains(edges)]
+    names = [spelled_name("line", number) for number in range(1, len(lines) + 1)]
+    return build_lines(name, lines, names, _georeference(data[:start]))
+
+
+def _columns(
+    data: bytes, elements: list[PlyElement], order: str, start: int, wanted: Container[str], name: str
+) -> tuple[dict[str, dict[str, Any]], FloatArray]:
+    """Return the columns of the elements up to the last one that is wanted, and the vertices (V, 3)."""
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.rows import binary_columns, text_columns
+
+    named = [element.name for element in elements]
+    if "vertex" not in named:
+        raise ModelError(f"{name}: declares no element 'vertex' (but {sorted(named)}); export it as a triangle mesh")
+    last = max(i for i, key in enumerate(named) if key == "vertex" or key in wanted)
+    columns = (text_columns if order == "" else binary_columns)(data, start, elements[: last + 1], name)
+    vertex = columns["vertex"]
+    scalars = {key for key, value in vertex.items() if isinstance(value, np.ndarray) and value.ndim == 1}
+    if missing := sorted(set("xyz") - scalars):
+        raise ModelError(f"{name}: its vertices have no {', '.join(missing)} (but {sorted(vertex)}); export it again")
+    return columns, np.column_stack([vertex[axis].astype(np.float64) for axis in "xyz"])
+
+
 def _say_left_behind(elements: list[PlyElement], face: dict[str, Any], name: str) -> None:
     """Say what of a file is no part of a surface as it is read here."""
     others = [
@@ -89,7 +135,8 @@ def _say_left_behind(elements: list[PlyElement], face: dict[str, Any], name: str
     count = next((element.count for element in elements if element.name == "face"), 0)
     others += [f"{key!r} of {count} faces" for key in face if count and key not in known]
     if others:
-        warn_of(f"{name}: {', '.join(others)[:200]} are not read and stay behind")
+        way = "; --break-lines takes edges" * any(element.name == EDGE and element.count for element in elements)
+        warn_of(f"{name}: {', '.join(others)[:200]} are not read and stay behind{way}")
 
 
 def _uv_of_faces(face: dict[str, Any], count: int, name: str) -> FloatArray | None:
@@ -374,6 +421,9 @@ def _write(path: Path, mesh: OutMesh) -> None:
     properties = [
         f"property {TYPES_WRITTEN[c.dtype.str[1:]]} {name}" for name, (_, c) in zip(names, columns, strict=True)
     ]
+    ends = [np.sort(np.column_stack([line[:-1], line[1:]]), axis=1) for line in mesh.lines]
+    edges = np.unique(np.concatenate(ends), axis=0).astype("<i4") if ends else np.empty((0, 2), "<i4")
+    edge_header = [f"element {EDGE} {len(edges)}", *(f"property int {end}" for end in EDGE_ENDS)] if len(edges) else []
     header = [
         "ply",
         "format binary_little_endian 1.0",
@@ -383,18 +433,18 @@ def _write(path: Path, mesh: OutMesh) -> None:
         *properties,
         f"element face {len(mesh.faces)}",
         "property list uchar int vertex_indices",
+        *edge_header,
         "end_header\n",
     ]
-    path.write_bytes("\n".join(header).encode("utf-8") + record.tobytes() + triangles.tobytes())
+    path.write_bytes("\n".join(header).encode("utf-8") + record.tobytes() + triangles.tobytes() + edges.tobytes())
 
 
 def _georeference(header: bytes) -> dict[str, Any]:
     """Return the coordinate reference system that a comment of a header names: an EPSG number, or WKT."""
+    from meshsimp_pymoo.formats.source.metric import stated_system
+
     found = re.search(rb"^comment crs:?[ \t]+(.+?)\s*$", header, re.MULTILINE | re.IGNORECASE)
-    text = found[1].decode("utf-8", errors="replace") if found else ""
-    if number := re.fullmatch(r"(?:urn:ogc:def:crs:)?EPSG:[\w.]*?:?(\d{4,5})", text, re.IGNORECASE):
-        return {"epsg": int(number[1])}
-    return {"crs": text} if "[" in text else {}
+    return stated_system(found[1].decode("utf-8", errors="replace")) if found else {}
 
 
 def _image_comments(folder: Path, mesh: OutMesh) -> list[str]:
@@ -415,4 +465,16 @@ def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
 # What connects vertices, and the triangles that it means.
 SURFACES = {"face": _polygons, "tristrips": _strips, "range_grid": _range_cells}
 
-register(Format("ply", (".ply",), "PLY", bare_points=True, read=_read, write=_write, keeps=None))
+register(
+    Format(
+        "ply",
+        (".ply",),
+        "PLY",
+        bare_points=True,
+        read=_read,
+        write=_write,
+        keeps=None,
+        read_lines=_read_lines,
+        holds_lines=True,
+    )
+)

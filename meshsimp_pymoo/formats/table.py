@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -34,9 +34,12 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
     from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.formats.source.heights import Grid, PlacedHeights
+    from meshsimp_pymoo.formats.source.lines import SourceLines
 
 # The sorts of models, as messages call them; a setting may describe some of them alone, or a format.
 SORTS = {"mesh": "meshes", "grid": "height grids", "cloud": "point clouds"}
+# The sort of a format that holds no models, but lines for them.
+LINES = "lines"
 
 # What to do with files of formats that are not read.
 WAYS_OUT = (
@@ -97,7 +100,7 @@ class Format(NamedTuple):
     title : str
         What people call it.
     sort : str
-        What it holds: "mesh", "grid" or "cloud".
+        What it holds: "mesh", "grid" or "cloud", or "lines" alone.
     bare_points : bool
         Whether its files may hold points without faces, which are read as a point cloud.
     read : callable, optional
@@ -122,6 +125,12 @@ class Format(NamedTuple):
         ``open_heights(path, name, options)`` opens a height grid that is read by windows.
     count_samples : callable, optional
         ``count_samples(path, name)`` returns the number of samples of a height grid from its header alone, or None.
+    read_lines : callable, optional
+        ``read_lines(path, name)`` returns the polylines that a file holds, beside a model or alone.
+    write_lines : callable, optional
+        ``write_lines(path, lines)`` writes polylines alone.
+    holds_lines : bool
+        Whether ``write`` writes the break lines of a mesh, too.
     """
 
     name: str
@@ -139,6 +148,9 @@ class Format(NamedTuple):
     refuse: Callable[[Held], None] | None = None
     open_heights: Callable[[Path, str, Options], PlacedHeights] | None = None
     count_samples: Callable[[Path, str], int | None] | None = None
+    read_lines: Callable[[Path, str], SourceLines] | None = None
+    write_lines: Callable[[Path, SourceLines], None] | None = None
+    holds_lines: bool = False
 
     @property
     def suffix(self) -> str:
@@ -167,16 +179,22 @@ def register(kind: Format) -> None:
     Raises
     ------
     ValueError
-        If another format has its name, or reads or writes one of its suffixes.
+        If another format has its name, or reads or writes models or lines of one of its suffixes, too.
     """
     for other in _TABLE.values():
         both = set(kind.suffixes) & set(other.suffixes)
-        clash = both and ((kind.read and other.read) or (kind.write and other.write))
-        if kind.name == other.name or clash:
+        ways = zip(_ways(kind), _ways(other), strict=True)
+        if kind.name == other.name or (both and any(one and another for one, another in ways)):
             raise ValueError(f"the formats {kind.name!r} and {other.name!r} share a name or {sorted(both)}")
-    if kind.sort not in SORTS:
-        raise ValueError(f"the format {kind.name!r} is of the sort {kind.sort!r}; it must be one of {', '.join(SORTS)}")
+    if kind.sort not in (*SORTS, LINES):
+        known = ", ".join((*SORTS, LINES))
+        raise ValueError(f"the format {kind.name!r} is of the sort {kind.sort!r}; it must be one of {known}")
     _TABLE[kind.name] = kind
+
+
+def _ways(kind: Format) -> tuple[object, ...]:
+    """Return what a suffix means to a format; each of it can be of one format only."""
+    return kind.read, kind.write, kind.read_lines, kind.write_lines
 
 
 def ways_to_read(load: Callable[..., Grid]) -> dict[str, Any]:
@@ -255,8 +273,9 @@ def format_of_input(path: str | os.PathLike[str]) -> Format | None:
     for kind in known:
         if suffix in kind.suffixes:
             return kind
+    is_of_another = any(suffix in kind.suffixes for kind in all_formats())  # which writes it, or reads lines alone
     for kind in known:
-        if suffix and kind.further is not None and suffix in kind.further():
+        if suffix and not is_of_another and kind.further is not None and suffix in kind.further():
             return kind
     return None
 
@@ -270,6 +289,11 @@ def read_suffixes(sort: str, *, further: bool = True) -> list[str]:
         if further and kind.sort == sort and kind.further is not None:
             found |= set(kind.further()) - set(stated)
     return sorted(found)
+
+
+def line_suffixes() -> list[str]:
+    """Return the suffixes of files whose lines are read, with the dot."""
+    return sorted({suffix for kind in all_formats() if kind.read_lines is not None for suffix in kind.suffixes})
 
 
 # ------------------------------------------------------------------------------------------------------------ reading
@@ -317,15 +341,52 @@ def read_source(path: str | os.PathLike[str], options: Options = DEFAULT) -> Sou
     return source if source.sort == "cloud" else source.in_frame(options.scale)
 
 
+def read_lines(path: str | os.PathLike[str]) -> SourceLines:
+    """Read polylines; the suffix tells in which format they are.
+
+    Parameters
+    ----------
+    path : str or path-like
+        A file in one of the formats of this folder that hold lines, alone or beside a model; its suffix is one of
+        :func:`line_suffixes`.
+
+    Returns
+    -------
+    SourceLines
+
+    Raises
+    ------
+    ModelError
+        One line with the file, the cause and the way out.
+
+    Warns
+    -----
+    ModelWarning
+        Of what the file holds beside lines and is left out, with its count.
+    """
+    path = Path(path)
+    name = str(path)
+    _check_file(path, name)
+    suffix = path.suffix.lower()
+    for kind in all_formats():
+        if kind.read_lines is not None and suffix in kind.suffixes:
+            with guarded(kind, name):
+                return kind.read_lines(path, name)
+    known = ", ".join(line_suffixes())
+    raise ModelError(f"{name}: no lines are read from {suffix!r}; known are {known}: convert it (by ogr2ogr, say)")
+
+
 def _way_out(path: Path) -> str:
     """Return what to do with a file whose suffix is that of no format."""
     from meshsimp_pymoo.files import as_argument
 
+    suffix, file = path.suffix.lower(), as_argument(path)
+    lines = f"; its lines can be break lines of a model: --break-lines {file}" if suffix in line_suffixes() else ""
     for suffixes, advice in WAYS_OUT:
-        if path.suffix.lower() in suffixes.split():
-            return advice.format(file=as_argument(path))
+        if suffix in suffixes.split():
+            return advice.format(file=file) + lines
     known = [f"{' '.join(read_suffixes(sort))} for {title}" for sort, title in SORTS.items()]
-    return f"known are {listed(known)}"
+    return f"known are {listed(known)}{lines}"
 
 
 def listed(words: Iterable[str], link: str = "and") -> str:
@@ -372,11 +433,11 @@ def refuse_foreign(name: str, options: Options, *models: str) -> None:
 def _check_file(path: Path, name: str) -> None:
     try:
         if path.is_dir():
-            raise ModelError(f"{name}: is a folder; name the mesh file in it")
+            raise ModelError(f"{name}: is a folder; name the file in it")
         if not path.exists():
             raise ModelError(f"{name}: no such file; check the path")
         if not path.is_file():
-            raise ModelError(f"{name}: is not a regular file; save the model to one")
+            raise ModelError(f"{name}: is not a regular file; save it to one")
         if path.stat().st_size == 0:
             raise ModelError(f"{name}: is empty (0 bytes); export it again")
     except ModelError:
@@ -422,6 +483,8 @@ def write_mesh(
     name: str = "surface",
     up: npt.ArrayLike | None = None,
     material: Material | None = None,
+    lines: Sequence[IntArray] = (),
+    line_names: Sequence[str] = (),
 ) -> None:
     """Write a mesh in the format of the path's suffix, the same bytes for the same mesh.
 
@@ -455,6 +518,11 @@ def write_mesh(
     material : Material, optional
         Of PLY, OBJ and GLB: what all faces look like. OBJ and PLY name an image, and OBJ a library, in files that are
         put beside, with a checksum of their content in their names.
+    lines : sequence of (m,) int arrays, optional
+        Break lines: chains of edges of the mesh, as rows of `vertices`. OBJ has them as its lines ``l``, PLY as its
+        element ``edge`` (``vertex1``, ``vertex2``), LandXML as the ``Breaklines`` of the surface; others leave them.
+    line_names : sequence of str, optional
+        Of LandXML: what each line is called.
 
     Raises
     ------
@@ -475,8 +543,27 @@ def write_mesh(
         name,
         None if up is None else np.asarray(up, dtype=np.float64),
         material,
+        tuple(lines),
+        tuple(line_names),
     )
     kind.write(Path(path), mesh)
+
+
+def write_lines(path: str | os.PathLike[str], lines: SourceLines) -> None:
+    """Write polylines alone in the format of the path's suffix, the same bytes for the same lines.
+
+    Raises
+    ------
+    ValueError
+        If no lines are written in a file of this suffix.
+    """
+    suffix = Path(path).suffix.lower()
+    known = {its: kind for kind in all_formats() if kind.write_lines is not None for its in kind.suffixes}
+    if suffix not in known:
+        raise ValueError(f"{path}: no lines are written in such a file; write one of {', '.join(known)}")
+    write = known[suffix].write_lines
+    assert write is not None
+    write(Path(path), lines)
 
 
 def shared_frame(

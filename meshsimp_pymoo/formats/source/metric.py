@@ -30,6 +30,19 @@ _PROJECTED = re.compile(r"\bPROJ(?:CS|CRS|ECTEDCRS)\s*\[")
 _GEOGRAPHIC = re.compile(r"\bGEOG(?:CS|CRS|RAPHICCRS)\s*\[|\bGEOD(?:ETIC)?CRS\s*\[.*\bCS\s*\[\s*ellipsoidal", re.DOTALL)
 
 
+def stated_system(text: str) -> dict[str, Any]:
+    """Return the georeference that a text means which names a coordinate reference system; empty: none that is known.
+
+    >>> stated_system("EPSG:25832"), stated_system("urn:ogc:def:crs:EPSG::25832"), stated_system("local")
+    ({'epsg': 25832}, {'epsg': 25832}, {})
+    """
+    if number := re.fullmatch(r"(?:urn:ogc:def:crs:)?EPSG:[\w.]*?:?(\d{4,5})", text, re.IGNORECASE):
+        return {"epsg": int(number[1])}
+    if re.fullmatch(r"(?:urn:ogc:def:crs:)?OGC:(?:1\.3:)?:?CRS84", text, re.IGNORECASE):  # WGS 84, longitude first
+        return {"epsg": 4326, "unit": "degree"}
+    return {"crs": text} if "[" in text else {}
+
+
 def metres_per_radian(latitude: float, ellipsoid: tuple[float, float] = WGS84) -> tuple[float, float]:
     """Return how many metres a radian of longitude and one of latitude measure on an ellipsoid.
 
