@@ -186,7 +186,7 @@ def test_a_line_that_crosses_itself_is_refused():
 
 
 def test_lines_that_cross_outside_the_model_do_not_matter():
-    with pytest.warns(ModelWarning, match=r"parts of 2 lines and the whole of 0 lie outside"):
+    with pytest.warns(ModelWarning, match=r"of 2 lines, parts of 2 and the whole of 0 lie outside"):
         model = lined_model(FLAT, [[[4, 2], [12, 4]], [[4, 4], [12, 2]]], 0.1)
     assert_allclose([chain[-1] for chain in chains(model)], [[8, 3, 0], [8, 3, 0]], atol=1e-9)
 
@@ -197,7 +197,7 @@ def test_what_lies_outside_is_cut_off_at_the_outline():
     across = [[low[0] - 5, -13.0, 3.0], [high[0] + 5, -13.0, 8.0]]
     away = [[high[0] + 1, 0.0], [high[0] + 2, 1.0]]
     with pytest.warns(
-        ModelWarning, match=r"parts of 1 lines and the whole of 1 lie outside holey .*: [\d.]+% of the le"
+        ModelWarning, match=r"of 2 lines, parts of 1 and the whole of 1 lie outside holey .*: [\d.]+% of the le"
     ):
         model = lined_model(holey, [across, away], 0)
     lengths = [np.ptp(line[:, 0]) for line in model.lines.originals]
