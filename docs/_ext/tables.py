@@ -66,13 +66,13 @@ def yes(value: object) -> str:
 # ---------------------------------------------------------------------------------------------------------- the tables
 
 
-@table("formats", "suffix", "what", "read as", "`--format`", "keeps, when written", "needs")
+@table("formats", "suffix", "what", "read as", "`--format`", "keeps, when written", "break lines", "needs")
 def formats() -> Rows:
-    """Return a row for each format of files: meshes, grids, clouds."""
-    from meshsimp_pymoo.formats.table import SORTS, all_formats
+    """Return a row for each format of files: meshes, grids, clouds, lines."""
+    from meshsimp_pymoo.formats.table import LINES, SORTS, all_formats
 
     spelled = {"color": "colours", "uv": "texture"}
-    for kind in sorted(all_formats(), key=lambda kind: [*SORTS].index(kind.sort)):
+    for kind in sorted(all_formats(), key=lambda kind: [*SORTS, LINES].index(kind.sort)):
         read = f"{kind.sort}{', or cloud' * kind.bare_points}" if kind.read else ""
         kept = ""
         if kind.write:
@@ -89,6 +89,7 @@ def formats() -> Rows:
             read,
             code(kind.name) if kind.write else "",
             kept,
+            ", ".join(["read"] * bool(kind.read_lines) + ["written"] * bool(kind.holds_lines or kind.write_lines)),
             code(f"[{kind.extra}]") if kind.extra else "",
         )
 

@@ -83,8 +83,8 @@ def _read_lines(path: Path, name: str) -> SourceLines:
     found = []
     for number, i in enumerate(line_at, start=1):
         index = whole(parse_numbers(re.sub(r"/\S*", "", lines[i][2:]), name), name, "the index of a line")
-        row = np.where(index < 0, before[i] + index, index - 1)  # -1 is the last vertex before it
-        wrong = (index == 0) | (row < 0) | (row >= len(table))
+        row = np.where(index < 0, before[i] + index, index - 1)  # -1 is the last vertex before it; 0 is none
+        wrong = (row < 0) | (row >= len(table))
         if wrong.any():
             raise ModelError(
                 f"{name}: its line {number} names the vertex {index[np.argmax(wrong)]}, which does not exist (of "

@@ -273,8 +273,9 @@ def format_of_input(path: str | os.PathLike[str]) -> Format | None:
     for kind in known:
         if suffix in kind.suffixes:
             return kind
+    is_of_another = any(suffix in kind.suffixes for kind in all_formats())  # which writes it, or reads lines alone
     for kind in known:
-        if suffix and kind.further is not None and suffix in kind.further():
+        if suffix and not is_of_another and kind.further is not None and suffix in kind.further():
             return kind
     return None
 

@@ -146,7 +146,7 @@ def test_what_an_obj_holds_beside_the_surface_is_said_with_its_number(textures):
         read_source(write(textures, "a.obj", textured(extra="l 1 2\nl 2 3\np 1\nusemtl rock\n")))
     words = [str(warning.message).partition("a.obj: ")[2] for warning in said]
     assert words == [
-        "its 2 lines are no faces and stay behind",
+        "its 2 lines are no faces and stay behind; --break-lines takes them",
         "its 1 points are no faces and stay behind",
         "2 further images of its material stay behind (map_bump, map_ks)",
     ]

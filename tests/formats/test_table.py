@@ -24,8 +24,10 @@ from meshsimp_pymoo.formats.table import (
     Format,
     all_formats,
     described,
+    read_lines,
     read_source,
     register,
+    write_lines,
     write_mesh,
     written_formats,
 )
@@ -158,6 +160,9 @@ def test_a_new_format_is_one_new_file(tmp_path):
 def test_a_new_format_with_the_suffix_of_another_is_refused_at_once():
     with pytest.raises(ValueError, match=r"'ply2' and 'ply' share .*\.ply"):
         register(Format("ply2", (".ply",), "PLY", read=read_source))
+    for way in ({"read_lines": read_lines}, {"write_lines": write_lines}):
+        with pytest.raises(ValueError, match=r"'json' and 'geojson' share .*\.json"):
+            register(Format("json", (".json",), "JSON", sort="lines", **way))
     with pytest.raises(ValueError, match="of the sort 'solid'"):
         register(Format("solids", (".solid",), "solids", "solid"))
 
@@ -281,6 +286,9 @@ def test_archives_are_not_unpacked(tmp_path, suffix):
         ("a.hdr", "name that one"),
         ("points.xlsx", "save the table as .csv"),
         ("contours.shp", "gdal_grid"),
+        ("contours.shp", "can be break lines of a model: --break-lines FOLDER/contours.shp"),
+        ("plan.dxf", "--break-lines FOLDER/plan.dxf"),
+        ("tin.xml", "--break-lines FOLDER/tin.xml"),
     ],
 )
 def test_what_is_not_read_is_told_the_way_out(tmp_path, name, advice):
@@ -292,7 +300,7 @@ def test_what_is_not_read_is_told_the_way_out(tmp_path, name, advice):
 def test_no_suffix_is_both_read_and_sent_elsewhere():
     elsewhere = [suffix for suffixes, _ in WAYS_OUT for suffix in suffixes.split()]
     assert len(set(elsewhere)) == len(elsewhere)
-    assert not set(elsewhere) & {suffix for kind in all_formats() for suffix in kind.suffixes}
+    assert not set(elsewhere) & {suffix for kind in all_formats() if kind.read for suffix in kind.suffixes}
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import numpy as np
 # A hill of 5 x 6 samples, not square, far enough from 0 that shifts matter.
 ROWS, COLUMNS = 5, 6
 PLACE = (10.0, 0.0, 500_000.0, 0.0, -10.0, 5_400_000.0)
-KINDS = ("files", "configs", "results", "expanding")
+KINDS = ("files", "lines", "configs", "results", "expanding")
 
 # What readers get wrong: ends of ranges, signs, no numbers, numbers that overflow a product.
 WORDS = (
@@ -118,6 +118,93 @@ def good_files() -> tuple[tuple[str, bytes], ...]:
         *_las(points),
     ]
     return tuple((suffix, text.encode() if isinstance(text, str) else bytes(text)) for suffix, text in kinds)
+
+
+@cache
+def good_lines() -> tuple[tuple[str, bytes], ...]:
+    """Return (suffix, content) of one good file or more of every kind whose lines are read."""
+    hard, soft = [[1.5, 2.5, 3.0], [4.0, 5.25, 6.0], [7.0, 8.0, 9.5]], [[0.0, 0.0], [1.0, 2.0]]
+    found = [(suffix, text.encode()) for suffix, text in _line_texts(hard, soft)]
+    edges = np.array([[0, 1], [1, 2]], "<i4").tobytes()
+    head = (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
+        "property double z\nelement edge 2\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+    )
+    found.append(("ply", head.encode() + np.array(hard, "<f8").tobytes() + edges))
+    return (*found, *_features(hard, soft), *_drawings(hard, soft))
+
+
+def _line_texts(hard: list[list[float]], soft: list[list[float]]) -> list[tuple[str, str]]:
+    geometries: list[dict[str, Any]] = [
+        {"type": "LineString", "coordinates": soft},
+        {"type": "MultiLineString", "coordinates": [hard, soft]},
+        {"type": "Polygon", "coordinates": [[*hard, hard[0]]]},
+    ]
+    features: list[dict[str, Any]] = [
+        {"type": "Feature", "id": k, "properties": {"name": f"n{k}"}, "geometry": geometry}
+        for k, geometry in enumerate([*geometries, {"type": "GeometryCollection", "geometries": geometries}])
+    ]
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}
+    rows = " ".join(f"{y!r} {x!r} {z!r}" for x, y, z in hard)
+    xml = (
+        '<?xml version="1.0" encoding="UTF-8"?><LandXML xmlns="http://www.landxml.org/schema/LandXML-1.2"><Units>'
+        '<Metric linearUnit="meter"/></Units><CoordinateSystem epsgCode="25832"/><Surfaces><Surface name="a">'
+        f'<SourceData><Breaklines><Breakline name="b"><PntList3D>{rows}</PntList3D></Breakline><Breakline>'
+        "<PntList2D>0 0 1 2</PntList2D></Breakline></Breaklines></SourceData></Surface></Surfaces></LandXML>"
+    )
+    obj = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in hard) + "f 1 2 3\nl 1 2 3\nl -1 -3\n"
+    return [
+        ("geojson", json.dumps({"type": "FeatureCollection", "crs": crs, "features": features})),
+        ("obj", obj),
+        ("xml", xml),
+    ]
+
+
+def _features(hard: list[list[float]], soft: list[list[float]]) -> list[tuple[str, bytes]]:
+    try:
+        from pyogrio.raw import write
+    except ImportError:
+        return []
+    geometry = [
+        struct.pack("<BII", 1, number, len(line)) + np.array(line, "<f8").tobytes()
+        for number, line in ((1002, hard), (2, soft))
+    ]
+    content = io.BytesIO()
+    write(
+        content,
+        np.array([*geometry, None], object)[:2],
+        [np.array(["a", "b"], object)],
+        ["name"],
+        geometry_type="Unknown",
+        crs="EPSG:25832",
+        driver="GPKG",
+        layer="a",
+    )
+    return [("gpkg", content.getvalue())]
+
+
+def _drawings(hard: list[list[float]], soft: list[list[float]]) -> list[tuple[str, bytes]]:
+    try:
+        import ezdxf
+    except ImportError:
+        return []
+    drawing = ezdxf.new("R12", units=0)  # which knows none
+    space = drawing.modelspace()
+    space.add_polyline3d(hard)
+    space.add_line(*hard[:2])
+    space.add_polyline2d([(*soft[0], 0.5), soft[1]], format="xyb")
+    text = io.StringIO()
+    drawing.write(text)
+    # without the tables, of which there is far more than of lines
+    entities = text.getvalue().partition("  2\nENTITIES\n")[2]
+    return [("dxf", f"  0\nSECTION\n  2\nENTITIES\n{entities}".encode())]
+
+
+def line_case(rng: np.random.Generator) -> tuple[str, bytes]:
+    """Return the suffix and content of a damaged file of lines."""
+    files = good_lines()
+    suffix, content = files[rng.integers(len(files))]
+    return suffix, mutated(rng, content, files[rng.integers(len(files))][1])
 
 
 def _ply(points: np.ndarray, faces: np.ndarray, order: str, *, mixed: bool = False) -> bytes:

@@ -75,7 +75,13 @@ def check_cases(kind: str, cases: int, tmp_path: Path, request: pytest.FixtureRe
 
 
 def test_damage_is_the_same_for_the_same_seed():
-    for make in (mutations.file_case, mutations.config_case, mutations.result_case, expanding.expanding_case):
+    for make in (
+        mutations.file_case,
+        mutations.line_case,
+        mutations.config_case,
+        mutations.result_case,
+        expanding.expanding_case,
+    ):
         one, two, other = (make(np.random.default_rng([1, number])) for number in (5, 5, 6))
         assert one == two
         assert one != other

@@ -30,7 +30,7 @@ import mutations
 
 from meshsimp_pymoo.comparison.config import ConfigError, read_experiment_file
 from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
-from meshsimp_pymoo.formats.table import read_source
+from meshsimp_pymoo.formats.table import read_lines, read_source
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.storage import read_front
 from meshsimp_pymoo.surface.model import build_model
@@ -55,6 +55,15 @@ def read_file(folder: Path, suffix: str, content: bytes) -> None:
         raise AssertionError(f"the objectives are {F.tolist()}")
 
 
+def read_polylines(folder: Path, suffix: str, content: bytes) -> None:
+    """Read a file of lines, which must be finite."""
+    path = folder / f"a.{suffix}"
+    path.write_bytes(content)
+    found = read_lines(path)
+    if not found.lines or not all(len(line) > 1 and np.isfinite(line).all() for line in found.lines):
+        raise AssertionError(f"the lines are {found.lines}")
+
+
 def read_config(folder: Path, content: bytes) -> None:
     """Read a configuration."""
     path = folder / "a.yaml"
@@ -75,6 +84,9 @@ def attempt(kind: str, rng: np.random.Generator | None, folder: Path) -> None:
         cases = mutations.good_files() if rng is None else [mutations.file_case(rng)]
         for suffix, content in cases:
             read_file(folder, suffix, content)
+    elif kind == "lines":
+        for suffix, content in mutations.good_lines() if rng is None else [mutations.line_case(rng)]:
+            read_polylines(folder, suffix, content)
     elif kind == "expanding":
         for suffix, content in mutations.good_files() if rng is None else [expanding.expanding_case(rng)]:
             read_file(folder, suffix, content)

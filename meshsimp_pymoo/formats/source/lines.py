@@ -78,7 +78,7 @@ def build_lines(
         points = np.array(line, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] not in (2, 3):
             raise ModelError(f"{name}: {called} has the shape {points.shape}; give (n, 2) or (n, 3)")
-        wrong = ~(np.isfinite(points) & (np.abs(points) <= COORDINATE_LIMIT)).all(axis=1)
+        wrong = ~(np.abs(points) <= COORDINATE_LIMIT).all(axis=1)  # NaN is in no range
         if wrong.any():
             first = int(np.argmax(wrong))
             where = ", ".join(f"{value:g}" for value in points[first])
