@@ -187,6 +187,7 @@ class _Lining:
         self.found: dict[str, int] = {}
         self.what = ""
         self.names: tuple[str, ...] = ()
+        self.turned = np.zeros(0, bool)
         self.way_out = "give the crossing as a vertex of both, at one height, or leave one of them out"
 
     # ------------------------------------------------------------------------------------------------ the two ways in
@@ -196,6 +197,7 @@ class _Lining:
         self.what, self.names = f"break_lines={word!r}", tuple(f"line {k + 1}" for k in range(len(rows)))
         at = np.concatenate(rows)
         part = np.repeat(np.arange(len(rows)), [len(line) for line in rows])
+        self.turned = np.zeros(len(rows), bool)
         self.found |= {"lines": len(rows), "line_vertices": len(at)}
         given = np.full((len(at), 3), np.nan)
         source = np.full(len(at), GIVEN)
@@ -214,11 +216,14 @@ class _Lining:
         model = self.model
         source = lines_in_file_frame(model, break_lines)
         self.what, self.names = source.name, source.names
-        lengths = [len(line) for line in source.lines]
+        # all are gone along in the one direction that does not depend on how they are listed
+        self.turned = np.array([_is_turned(line) for line in source.lines])
+        along = [line[::-1] if turned else line for line, turned in zip(source.lines, self.turned, strict=True)]
+        lengths = [len(line) for line in along]
         part = np.repeat(np.arange(len(lengths)), lengths)
-        hard = np.array([line.shape[1] == 3 for line in source.lines])[part]
+        hard = np.array([line.shape[1] == 3 for line in along])[part]
         given = np.full((len(part), 3), np.nan)
-        for end, line in zip(np.cumsum(lengths), source.lines, strict=True):
+        for end, line in zip(np.cumsum(lengths), along, strict=True):
             given[end - len(line) : end, : line.shape[1]] = line
         # what has no height is seen from above, whatever height it is given
         local = model.to_local(np.where(np.isnan(given), 0.0, given))
@@ -407,7 +412,8 @@ class _Lining:
         known = np.isfinite(away) & (lines.source >= DRAPED)
         z = lines.z.copy()
         z[known] = model.points[self.first[place[known]], 2]
-        return dataclasses.replace(lines, z=z)
+        # these vertices are also of the lines with heights of their own that run along with them
+        return self._met(dataclasses.replace(lines, z=z))
 
     # ------------------------------------------------------------------------------------------------------ the result
 
@@ -443,13 +449,17 @@ class _Lining:
         rows[new] = row_of_new
         old_added = row[model.lines.added] if model.lines is not None else row_of_new[:0]
         originals = np.split(np.column_stack([lines.xy * model.unit, lines.z]), cuts)
+        # as they are listed: the parts of a line that was turned the last first
+        turned = self.turned[lines.line]
+        parts = np.lexsort((np.where(turned, -1, 1) * np.arange(len(turned)), lines.line))
+        ways = np.where(turned, -1, 1)
         self.found |= {"kept_line_vertices": len(used), "added_line_vertices": len(new)}
         return dataclasses.replace(
             lined,
             lines=ModelLines(
-                originals=tuple(originals),
-                chains=tuple(rows[chain] for chain in chains),
-                names=tuple(self.names[line] for line in lines.line),
+                originals=tuple(originals[k][:: ways[k]] for k in parts),
+                chains=tuple(rows[chains[k]][:: ways[k]] for k in parts),
+                names=tuple(self.names[lines.line[k]] for k in parts),
                 tolerance=self.tolerance,
                 added=np.sort(np.concatenate([old_added, row_of_new])),
                 found={what: n for what, n in self.found.items() if n},
@@ -545,6 +555,12 @@ class _Lining:
             feet=np.sort(row[model.feet]),
         )
         return lined, row[n:], row[:n]
+
+
+def _is_turned(line: FloatArray) -> bool:
+    """Tell whether a line (n, 2 or 3) leads from its greater end to the lesser, or if closed, first to the greater."""
+    ends = [(tuple(line[k]), tuple(line[step])) for k, step in ((0, 1), (-1, -2))]
+    return ends[1] < ends[0]
 
 
 def _rounded(xy: FloatArray) -> FloatArray:

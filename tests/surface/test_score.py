@@ -41,7 +41,7 @@ def test_a_mesh_of_the_model_s_own_vertices_is_measured_as_any_tool_s_mesh(model
         delaunay, free = own.simplify(kept), freed(own, kept, better=False)
         assert free.faces.tolist() != delaunay.faces.tolist()
         assert free.quality.triangles == delaunay.quality.triangles
-        numbers = {"rel": 1e-9, "abs": 1e-9 * model.diagonal}
+        numbers = {"rel": 1e-9, "abs": 1e-9 * model.diagonal, "nan_ok": True}  # no lines
         for faces, said in ((delaunay.faces, delaunay.quality), (free.faces, free.quality)):
             found, scored = own.of_faces(faces), own.score(model.file_points, faces)
             assert asdict(found.quality) == pytest.approx(asdict(said), **numbers)
