@@ -18,7 +18,7 @@ import operator
 import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -59,6 +59,7 @@ from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
     MEASURES,
+    OF_LINES,
     REGIONS,
     SQUARES,
     TRIANGLES,
@@ -68,8 +69,9 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     quality_of,
 )
+from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
-from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
+from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
     Refitted,
@@ -78,6 +80,7 @@ from meshsimp_pymoo.surface.surface import (
     free_faces,
     freedom_of,
     measured_meshes,
+    mesh_lines,
 )
 from meshsimp_pymoo.surface.units import length_unit
 from meshsimp_pymoo.surface.weld import pieces
@@ -160,6 +163,11 @@ class FrontSolution(_Numbers):
         """The triangles (M, 3) as rows of the model's vertices."""
         surface, own = self.front.surface, self.front.faces[self.solution]
         return surface.triangles(self.kept | surface.pinned) if own is None else own
+
+    @cached_property
+    def lines(self) -> tuple[IntArray, ...]:
+        """The break lines of its mesh, chains of its edges, as rows of the model's vertices; none without lines."""
+        return mesh_lines(self.front.surface, self.faces)[0]
 
     @property
     def attributes(self) -> dict[str, npt.NDArray[Any]]:
@@ -526,8 +534,9 @@ class Front(Sequence[FrontSolution]):
             If a file is missing or damaged, or ``model`` is another one.
         """
         stored = read_front(folder)
-        columns = [stored.quality[name].tolist() for name in MEASURES]
-        quality = [quality_of(zip(MEASURES, row, strict=True)) for row in zip(*columns, strict=True)]
+        known = [name for name in MEASURES if name in stored.quality]
+        columns = [stored.quality[name].tolist() for name in known]
+        quality = [quality_of(zip(known, row, strict=True)) for row in zip(*columns, strict=True)]
         front = cls(
             quality,
             stored.kept,
@@ -630,6 +639,14 @@ class Front(Sequence[FrontSolution]):
         """Whether its meshes may name files beside them: a library of materials, an image."""
         recorded = self.run.get("model")
         return bool(recorded.get("material")) if recorded else self.model.material is not None
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether the model has break lines."""
+        recorded = self.run.get("model")
+        if recorded:
+            return bool(recorded.get("lines"))
+        return getattr(self.model, "lines", None) is not None
 
     @property
     def unit(self) -> str:
@@ -980,6 +997,8 @@ class Front(Sequence[FrontSolution]):
         except ImportError:
             raise ImportError(f"to_frame() needs pandas: {way_to_install('pandas')}") from None
         frame = pandas.DataFrame([asdict(q) for q in self.quality])
+        if not self.has_lines:
+            frame = frame.drop(columns=list(OF_LINES))
         frame["free"] = [int(own is not None) for own in self.faces]
         return frame.rename_axis(index="solution")
 
@@ -1007,7 +1026,7 @@ class Front(Sequence[FrontSolution]):
         rows = sorted({*even_selection(len(self), SHOWN_ROWS), at})
         picture = base64.b64encode(self._repr_png_()).decode()
         # what a mesh consists of, its error at the vertices and between them, and what it can be chosen by
-        also = ("error", "surface_error")
+        also = ("error", "surface_error", "line_max_error")
         shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name in also]
         shown = [name for name in shown if not all(np.isnan(getattr(q, name)) for q in self.quality)]
         names = sorted(shown, key=lambda name: MEASURES[name].is_error)
@@ -1046,6 +1065,8 @@ class Front(Sequence[FrontSolution]):
             options, rules, _ = self._recorded()
             if hasattr(source, "rules"):
                 mine, stored = plain(source.rules), plain(rules)
+                if is_file_of_lines(source.rules.break_lines) and is_file_of_lines(rules.break_lines):
+                    mine["break_lines"] = stored["break_lines"]  # by what is in it
                 if mine != stored:
                     differ = ", ".join(
                         f"{name}={in_short(stored[name])}" for name in stored if stored[name] != mine[name]
@@ -1056,20 +1077,39 @@ class Front(Sequence[FrontSolution]):
             elif isinstance(self._kept, Nested):
                 surface = GridSurface(open_grid(source, applicable(source, options)), rules)
             else:
-                surface = HeightSurface(open_model(source, applicable(source, options)), rules)
+                found = open_model(source, applicable(source, options))
+                surface = self._with_lines(found, rules, where)
         except ModelError as trouble:
             if model is not None:
                 raise
             raise ResultError(f"{where}: its model cannot be read ({trouble}); {way_out}") from None
         if surface.model.hash != facts.get("hash"):
+            with_lines = f" with the break lines of {in_short(rules.break_lines)}" if self.has_lines else ""
             raise ResultError(
-                f"{where}: is the front of another model than {surface.model.name} is now"
-                + ("" if model is not None else " (the file has changed since)")
+                f"{where}: is the front of another model than {surface.model.name}{with_lines} is now"
+                + ("" if model is not None else f" ({'a' if with_lines else 'the'} file has changed since)")
                 + f", of {facts.get('vertices')} vertices, not {surface.n_vertices}"
                 * (facts.get("vertices") != surface.n_vertices)
                 + f"; {way_out}"
             )
         return surface
+
+    def _with_lines(self, model: OpenModel, rules: Rules, where: Any) -> HeightSurface:
+        """Make the surface of a model; a file of break lines is looked for beside the results first."""
+        file = ((self.run.get("model") or {}).get("lines") or {}).get("file")
+        if is_file_of_lines(rules.break_lines) and self.folder is not None and isinstance(file, str):
+            beside = (self.folder / file).resolve()
+            if beside.is_file():
+                rules = replace(rules, break_lines=str(beside))
+        try:
+            return HeightSurface(model, rules)
+        except ModelError as trouble:
+            if rules.break_lines is None:
+                raise
+            raise ResultError(
+                f"{where}: its break lines cannot be used ({trouble}); put them back to where they were, or simplify "
+                "the model again"
+            ) from None
 
     def _model_file(self) -> Path | str:
         """Return where the record says the model is: beside the results, as it was called, or built in."""

@@ -21,6 +21,7 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.formats.source.scenes import textured
 from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import by_name, documentation, settings_of, taken
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -40,7 +41,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.surface import Simplified, Surface, mesh_arrays
+from meshsimp_pymoo.surface.surface import Simplified, Surface, mesh_arrays, mesh_lines
 
 if TYPE_CHECKING:
     import trimesh
@@ -358,7 +359,9 @@ class MeshProblem(ElementwiseProblem):
     def mesh(self, kept: npt.NDArray[Any]) -> trimesh.Trimesh:
         """Return the simplified mesh of one chromosome (N,) in the frame of the file, with its looks and attributes.
 
-        Its vertices are original ones, in double precision, in vector order; none is without a face.
+        Its vertices are original ones, in double precision, in vector order; none is without a face. With break lines
+        its ``metadata`` hold them: ``break_lines`` are chains of rows of its vertices, ``break_line_names`` what each
+        is called.
         """
         return mesh_of(self.surface, self.simplify(kept).faces)
 
@@ -400,6 +403,11 @@ def mesh_of(surface: Surface, faces: IntArray) -> trimesh.Trimesh:
         mesh.visual = textured(attributes, model.material, mesh.visual)
     looks = {"color"} | ({"uv"} if mesh.visual.kind == "texture" else set())
     mesh.vertex_attributes.update({name: values for name, values in attributes.items() if name not in looks})
+    chains, names = mesh_lines(surface, faces)
+    if chains:
+        used, _ = used_rows(np.asarray(faces))
+        mesh.metadata["break_lines"] = [np.searchsorted(used, chain) for chain in chains]
+        mesh.metadata["break_line_names"] = list(names)
     return mesh
 
 

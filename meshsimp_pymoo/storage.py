@@ -7,6 +7,8 @@
     OUT/chosen.ply     the solution that was asked for, if one was
     OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
                        the columns REFIT_COLUMNS too
+    OUT/break_lines.geojson  the thinned break lines, which every mesh has as chains of edges, if the model has lines;
+                       front.csv then has the columns OF_LINES too
     OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
     OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); faces (M, 3), the triangles of
                        all free meshes, of which solution s has those from face_start[s] to face_start[s + 1],
@@ -60,6 +62,7 @@ from meshsimp_pymoo.files import (
 )
 from meshsimp_pymoo.formats.material import is_put_beside
 from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.source.lines import SourceLines
 from meshsimp_pymoo.formats.table import (
     Format,
     Rounding,
@@ -67,21 +70,28 @@ from meshsimp_pymoo.formats.table import (
     format_to_write,
     shared_frame,
     warn_of_left_behind,
+    write_lines,
     write_mesh,
 )
-from meshsimp_pymoo.plane.faces import is_canonical
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_MESH, Quality, checked_objectives
+from meshsimp_pymoo.plane.faces import is_canonical, used_rows
+from meshsimp_pymoo.surface.lines import ModelLines
+from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
-from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, require_rules
+from meshsimp_pymoo.surface.rules import is_file_of_lines
+from meshsimp_pymoo.surface.smallest import facts_of_lines
+from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
-FRONT_COLUMNS = ("solution", *(name for name in MEASURES if name not in OF_MESH), "mesh", *OF_MESH, "free")
+FRONT_COLUMNS = (
+    "solution", *(name for name, measure in MEASURES.items() if measure.of is not None), "mesh", *OF_MESH, "free",
+)  # fmt: skip
+# Behind them, only where the model has break lines: OF_LINES. Then
 REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", *COUNTED, "free")
-MAY_BE_EMPTY = (*OF_MESH, "refitted_error")
+MAY_BE_EMPTY = (*OF_MESH, *OF_LINES, "refitted_error")
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 # What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
 SECONDS_A_CORNER = 5e-7
@@ -89,10 +99,11 @@ MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer 
 PICTURES = ("front.png", "report.html")  # made once all else is in place
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 TILES = "tiles"  # finished tiles of one
+LINES = "break_lines.geojson"  # the thinned break lines
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
-    TILES, "series.csv",
+    TILES, "series.csv", LINES,
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh")
@@ -336,38 +347,43 @@ def write_front(
                 continue
             assert faces is not None
             triangles = faces(int(row))
-            arrays = mesh_arrays(model, triangles)
-            rounding.add(OutMesh(*arrays, **look), surface.view.scale)
+            arrays, shown = mesh_arrays(model, triangles), look | _lines_as_written(surface, triangles)
+            rounding.add(OutMesh(*arrays, **shown), surface.view.scale)
             if solution in with_mesh:
                 path = f"meshes/{solution:0{digits}}_{quality[row].triangles}{kind.suffix}"
-                write_mesh(partial / path, *arrays, **look)
+                write_mesh(partial / path, *arrays, **shown)
             if row == chosen and cut is not None:
                 (partial / "chosen").mkdir()
                 for name, part in cut(triangles):
                     write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
             elif row == chosen:
-                write_mesh(partial / f"chosen{kind.suffix}", *arrays, **look)
+                write_mesh(partial / f"chosen{kind.suffix}", *arrays, **shown)
             better = None if refit is None else refit(int(row))
             if better is not None:
                 raised = (better.vertices, *arrays[1:])
-                rounding.add(OutMesh(*raised, **look), surface.view.scale)
+                rounding.add(OutMesh(*raised, **shown), surface.view.scale)
                 fitted = [spelled_value("error", better.error), path.replace("meshes/", "refitted/")]
                 if solution in with_mesh:
-                    write_mesh(partial / fitted[1], *raised, **look)
+                    write_mesh(partial / fitted[1], *raised, **shown)
                 if row == chosen:
-                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **look)
+                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **shown)
             files[solution] = path, fitted
             pace = max(pace, (time.perf_counter() - begun) / size)
+        lines = getattr(model, "lines", None)  # which a model of another kind need not have
+        own_lines = () if lines is None else OF_LINES
         rows = []
         for solution, row in enumerate(order):
             path, fitted = files.get(solution, ("", ["", ""]))
             cells = {name: spelled_value(name, getattr(quality[row], name)) for name in MEASURES}
             cells |= {"solution": str(solution), "mesh": path, "free": str(int(own[row] is not None))}
-            rows.append([cells[column] for column in FRONT_COLUMNS] + (fitted if refit is not None else []))
+            rows.append([cells[column] for column in FRONT_COLUMNS + own_lines] + fitted * (refit is not None))
         rounding.warn(model.name, surface.diagonal)
         if with_mesh or chosen is not None:
             warn_of_left_behind(kind, model.name, model.attributes)
-        write_csv(partial / "front.csv", FRONT_COLUMNS + (REFIT_COLUMNS if refit is not None else ()), rows)
+        columns = FRONT_COLUMNS + own_lines + REFIT_COLUMNS * (refit is not None)
+        write_csv(partial / "front.csv", columns, rows)
+        if lines is not None:
+            write_lines(partial / LINES, _thinned_lines(model, lines))
         if series:
             write_csv(partial / "series.csv", SERIES_COLUMNS, list(_series_rows(series)))
         if isinstance(kept, Nested):
@@ -394,6 +410,7 @@ def write_front(
                 **({"georeference": model.georeference} if model.georeference else {}),
                 **({"material": True} if model.material is not None else {}),
                 **({"rows": shape[0], "columns": shape[1]} if shape is not None else {}),
+                **({} if lines is None else {"lines": _facts_of_lines(surface, lines, target)}),
             },
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),
@@ -492,7 +509,7 @@ def read_record(path: Path, count: int) -> dict[str, Any]:
     else:
         wrong += [f"model.{key}" for key in ("name", "hash") if not isinstance(model.get(key), str)]
         wrong += ["model.file"] * (not isinstance(model.get("file") or "", str))
-        wrong += ["model.georeference"] * (not isinstance(model.get("georeference") or {}, dict))
+        wrong += [f"model.{key}" for key in ("georeference", "lines") if not isinstance(model.get(key) or {}, dict)]
     if chosen is not None and not (type(chosen) is int and 0 <= chosen < count):
         wrong.append("chosen")
     wrong += ["wish"] * (not _is_wish(run.get("wish") or {}))
@@ -540,7 +557,8 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     """
     kind, model = format_of_output(path), surface.model
     kind.check(model)
-    arrays, look, rounding = mesh_arrays(model, faces), _look(kind, surface), Rounding(kind)
+    arrays, rounding = mesh_arrays(model, faces), Rounding(kind)
+    look = _look(kind, surface) | _lines_as_written(surface, faces)
     rounding.add(OutMesh(*arrays, **look), surface.view.scale)
     rounding.warn(model.name, surface.diagonal)
     warn_of_left_behind(kind, model.name, model.attributes)
@@ -558,6 +576,26 @@ def _look(kind: Format, surface: Surface) -> dict[str, Any]:
         up=up,
         material=model.material,
     )
+
+
+def _lines_as_written(surface: Surface, faces: IntArray) -> dict[str, Any]:
+    """Return the break lines of a mesh as `write_mesh` takes them, as rows of the vertices that it uses."""
+    chains, names = mesh_lines(surface, faces)
+    used, _ = used_rows(np.asarray(faces))
+    return {"lines": tuple(np.searchsorted(used, chain) for chain in chains), "line_names": names} if chains else {}
+
+
+def _thinned_lines(model: Any, lines: ModelLines) -> SourceLines:
+    """Return what thinning left of break lines, in the frame of the model's file."""
+    vertices = tuple(model.file_points[chain] for chain in lines.chains)
+    return SourceLines(model.name, vertices, lines.names, model.georeference)
+
+
+def _facts_of_lines(surface: Surface, lines: ModelLines, folder: Path) -> dict[str, Any]:
+    """Return what is recorded of break lines, their file relative to the folder."""
+    given = surface.rules.break_lines
+    file = {"file": path_from(folder, given)} if is_file_of_lines(given) else {}
+    return file | {"hash": lines.hash} | facts_of_lines(surface, lines)
 
 
 def package_versions(*others: str) -> dict[str, str]:
@@ -659,7 +697,9 @@ def _read_series(path: Path) -> dict[str, FloatArray]:
 
 def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, ...], tuple[str, ...]]:
     """Return the columns of a front's CSV file as arrays, the names of its meshes and of the refitted ones."""
-    header, rows = _csv_rows(path, FRONT_COLUMNS, FRONT_COLUMNS + REFIT_COLUMNS)
+    header, rows = _csv_rows(
+        path, *(FRONT_COLUMNS + lines + refit for lines in ((), OF_LINES) for refit in ((), REFIT_COLUMNS))
+    )
     columns: dict[str, npt.NDArray[Any]] = {}
     for at, column in enumerate(header):
         if column in ("mesh", "refitted_mesh"):

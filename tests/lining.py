@@ -130,7 +130,7 @@ def _in_conflict(points, u, v, w, p):
 
 
 def assert_constrained_delaunay(xy, faces, segments, sites):
-    """Check the definition in exact arithmetic: the hull is covered, forced edges are there, others locally Delaunay."""
+    """Check the definition in exact arithmetic: hull covered, forced edges there, others locally Delaunay."""
     points = whole_numbers(xy)
     forced = forced_edges(xy, segments, sites)
     apex = {}

@@ -127,9 +127,6 @@ PLAIN = [
     (Pins(PINS), [7, "hull", [0.5, 1.5]], [7, "hull", [0.5, 1.5]]),
 ]
 WRONG_PLAIN = [
-    (Lines(), "sharp:30", "sharp:30"),
-    (Lines(), Path("a") / "b.geojson", str(Path("a") / "b.geojson")),
-    (Lines(), [[[0, 1.5], [2, 3]], [[0, 0, 0], [1, 1, 1]]], [[[0, 1.5], [2, 3]], [[0, 0, 0], [1, 1, 1]]]),
     (Choice(("hull", "model")), "Hull", r"did you mean 'hull'\?"),
     (Choice(("hull", "model")), None, "expected one of hull, model"),
     (Choice(("front",)), 3, "^expected front$"),

@@ -182,13 +182,13 @@ def measures() -> Rows:
 def front_columns() -> Rows:
     """Return a row for each column of a front's CSV file."""
     from meshsimp_pymoo.storage import FRONT_COLUMNS, INT_COLUMNS, REFIT_COLUMNS
-    from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, OF_MESH
+    from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, OF_LINES, OF_MESH
 
     meanings = attributes(quality()) | OTHER_COLUMNS
-    for name in FRONT_COLUMNS + REFIT_COLUMNS:
+    for name in FRONT_COLUMNS + OF_LINES + REFIT_COLUMNS:
         kind = "text" if name.endswith("mesh") else "int" if name in INT_COLUMNS else "float"
         unit = MEASURES[name].unit if name in MEASURES else LENGTH if name.endswith("error") else ""
-        empty = " Empty where it was not measured." if name in OF_MESH else ""
+        empty = " Empty where it was not measured." if name in OF_MESH + OF_LINES else ""
         yield code(name), kind, unit, meanings[name] + empty
 
 

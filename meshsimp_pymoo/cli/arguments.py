@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from meshsimp_pymoo.errors import UsageError
-from meshsimp_pymoo.formats.table import read_suffixes, written_formats
+from meshsimp_pymoo.formats.table import line_suffixes, read_suffixes, written_formats
 from meshsimp_pymoo.settings import Choice, Real, Whole, defaults_of, settings_of
 from meshsimp_pymoo.surface.measures import MEASURES
 
@@ -27,7 +27,8 @@ def models() -> str:
     of_mesh, of_grid, of_cloud = (", ".join(read_suffixes(sort, further=False)) for sort in ("mesh", "grid", "cloud"))
     text = (
         f"MODEL is a mesh ({of_mesh}, ...), a height grid ({of_grid}), a point cloud ({of_cloud}) or a built-in model "
-        "such as jacksboro:11, face:5000 or roof; `meshsimp info` lists the built-in ones."
+        "such as jacksboro:11, face:5000 or roof; `meshsimp info` lists the built-in ones. Break lines are read from "
+        f"{', '.join(line_suffixes())}."
     )
     return textwrap.fill(text, 80) + "\n"
 

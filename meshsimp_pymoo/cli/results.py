@@ -35,6 +35,7 @@ from meshsimp_pymoo.front import Front, FrontSolution
 from meshsimp_pymoo.search.checkpoint import difference
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
+from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import known_units, reference_system
 
@@ -154,6 +155,7 @@ def _summary(front: Front, output: Output) -> dict[str, Any]:
             "triangles": len(model.faces),
             "hash": model.hash,
             **known_units(model.georeference),
+            **({"lines": front.run["model"]["lines"]} if front.has_lines else {}),
         },
         "front": str(output.folder / "front.csv"),
         "solutions": len(front),
@@ -187,6 +189,8 @@ def _tell(front: Front, output: Output, wish: Wish) -> None:
         f"front: {len(front)} solutions{free}, {few.triangles:,} to {many.triangles:,} triangles, "
         f"mean error {few.mean_error:.4g} to {many.mean_error:.4g}{in_unit(unit)} ({', '.join(effort)})"
     )
+    if front.has_lines:
+        tell(f"break lines: {lines_in_words(run['model']['lines'], unit)}")
     if run.get("wish"):
         tell(f"searched: around {in_words(run['wish'])}; the rest of the front is what came along")
     if chosen is not None:

@@ -24,6 +24,7 @@ from meshsimp_pymoo.cli.results import WAIT_SECONDS, hand_over, hand_over_stored
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
     INTERRUPTED,
+    TARGET_MISSED,
     WRITING,
     Stages,
     answering,
@@ -64,7 +65,9 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.smallest import smallest_mesh, tolerance_for
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.warming import FREE, SEARCH, WISH
 
@@ -122,6 +125,8 @@ def _simplify(request: Request, shown: Stages) -> int:
         compiled.finish()
         request = replace(request, wish=request.wish.among(lambda: len(problem.model.faces)))
         _refuse_impossible(problem, request.wish, quiet=output.quiet)
+        if _lines_forbid(problem, request.wish):
+            return TARGET_MISSED
     if search.time is not None:
         seconds = _search_seconds(request, search.time)
         shown.expect("freeing", (1.0 - SUBSETS_SHARE) * seconds if request.is_freed else 0.0)
@@ -188,6 +193,29 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
         # some lie one above the other, or their mesh leaves some uncovered: another subset may be more accurate
         said = listed([f"{MEASURES[name].label} {values[name]:.4g}" for name in missed], "and")
         say(f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest")
+
+
+def _lines_forbid(problem: MeshProblem, wish: Wish) -> bool:
+    """Say, where a mesh is wished for that is smaller than break lines allow, which tolerance would; tell whether so.
+
+    Where bays stay open, a mesh of more vertices may have fewer triangles; then it is said, and searched all the same.
+    """
+    surface = problem.surface
+    if wish.triangles is None or problem.model.lines is None:
+        return False
+    assert isinstance(surface, HeightSurface)
+    smallest = smallest_mesh(surface)
+    if wish.triangles >= smallest:
+        return False
+    tolerance = tolerance_for(surface, wish.triangles) if surface.rules.break_lines is not None else None
+    way_out = f"no tolerance allows {wish.triangles:,}: leave some of the lines out"
+    if tolerance is not None:
+        way_out = f"--line-tolerance {tolerance:g} would allow {wish.triangles:,}"
+    say(
+        f"--triangles {wish.triangles}: with break lines within {problem.model.lines.tolerance:g} the smallest mesh of "
+        f"{problem.model.name} has {smallest:,} triangles; {way_out}"
+    )
+    return surface.rules.footprint == "hull" or problem.model.footprint.side == 0
 
 
 # ----------------------------------------------------------------------------------------------------------- the search

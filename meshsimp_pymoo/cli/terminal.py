@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ResultError, printable, reason_of
-from meshsimp_pymoo.surface.measures import LENGTH, MEASURES
+from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, OF_LINES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -450,8 +450,12 @@ def described(quality: Quality, unit: str = LENGTH) -> str:
 
 
 def in_numbers(quality: Quality) -> dict[str, float | None]:
-    """Return the numbers of a mesh by name, as JSON holds them: what is not known is null."""
-    return {name: None if math.isnan(value) else value for name, value in asdict(quality).items()}
+    """Return the numbers of a mesh by name, as JSON holds them: what is not known is null.
+
+    Those of break lines are left out where there are none.
+    """
+    known = {name: None if math.isnan(value) else value for name, value in asdict(quality).items()}
+    return {name: value for name, value in known.items() if value is not None or name not in OF_LINES}
 
 
 def in_unit(unit: str) -> str:

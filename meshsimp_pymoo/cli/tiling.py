@@ -165,6 +165,16 @@ def _has_pieces(out: Path) -> bool:
 
 
 def _refuse_unknown(request: Request) -> None:
+    if request.rules.break_lines is not None:
+        if request.tiling.tile is None:  # nobody asked for tiles
+            raise UsageError(
+                f"--break-lines does not go with tiles, and {request.model} does not fit into the memory in one piece; "
+                "take a part of it (--window COLUMN,ROW,COLUMNS,ROWS)"
+            )
+        raise UsageError(
+            "--break-lines does not go with tiles, which do not know them; simplify in one piece (--tile none), or a "
+            "part of it (--window COLUMN,ROW,COLUMNS,ROWS)"
+        )
     rules = replace(request.rules, measure=request.measure or Rules().measure)
     for part in (request.search, rules, request.options, request.free, request.output):
         for item in fields(part):

@@ -67,7 +67,7 @@ from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_o
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.model import OpenModel
-from meshsimp_pymoo.surface.rules import Rules, is_word_for_lines, meant_word_for_lines
+from meshsimp_pymoo.surface.rules import Rules, is_file_of_lines, meant_word_for_lines
 
 if TYPE_CHECKING:
     from pymoo.core.algorithm import Algorithm
@@ -730,7 +730,7 @@ def _opened(entry: _Problem, file: _File, models: Path) -> ProblemConfig:
     where = _model_path(entry.model, models, file.folder)
     lines = options.get("break_lines")
     found = options
-    if isinstance(lines, str) and not is_word_for_lines(lines):
+    if is_file_of_lines(lines):
         found = options | {"break_lines": _lines_path(lines, models)}
     with _blaming():
         problem = MeshProblem(where, **found, n_threads=1)

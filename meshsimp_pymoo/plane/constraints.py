@@ -184,8 +184,8 @@ def _force(
         else:
             n_right += 1
             h = s + (e + 2) % 3
-    # The polygons: on the left of the edge from a to b, and on the left of that from b to a, each listed from the first of
-    # these vertices to the second. Side i leads from vertex i to the next; ``within`` are the halfedges there that go.
+    # The polygons on the left of the edge from a to b and of that from b to a, each listed from the first of these
+    # vertices to the second. Side i leads from vertex i to the next; ``within`` are the halfedges there that go.
     left = np.empty(n_left + 2, np.int64)
     right = np.empty(n_right + 2, np.int64)
     within = np.empty(n_left + n_right + 2, np.int64)

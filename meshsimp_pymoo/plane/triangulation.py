@@ -38,17 +38,12 @@ LAST_INDEX = 0x7FFFFFFF
 TRIANGLE = ~7
 RECORD = 8
 SPARSE_ROUND_FROM = 5000
-# A walk of so many steps goes in circles, which it can where edges are forced: from there on it goes at random.
-MOST_STEPS = 4096
 SPARSE_STEP = 8
 
 
 @inner(inline=True)
 def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exact_area: float) -> int:
-    """Walk from triangle ``start`` to the triangle that holds (x, y), or to the ghost beyond the hull edge it sees.
-
-    Where edges are forced such a walk may go in circles [1]_; there it goes on at random.
-    """
+    """Walk from triangle ``start`` to the triangle that holds (x, y), or to the ghost beyond the hull edge it sees."""
     t = start
     if mesh[t] > LAST_INDEX:
         t = mesh[t + 5] & TRIANGLE
@@ -56,7 +51,7 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
         t = mesh[t + 6] & TRIANGLE
     elif mesh[t + 2] > LAST_INDEX:
         t = mesh[t + 4] & TRIANGLE
-    for _ in range(MOST_STEPS):
+    while True:
         a = mesh[t]
         b = mesh[t + 1]
         c = mesh[t + 2]
@@ -91,12 +86,19 @@ def locate(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exa
             else:
                 return t
         t = mesh[h + 4] & TRIANGLE
-    return _locate_at_random(xy, mesh, t, x, y, exact_area)
 
 
 @inner
-def _locate_at_random(xy: np.ndarray, mesh: np.ndarray, t: int, x: float, y: float, exact_area: float) -> int:
-    """Do what :func:`locate` does, from triangle t, in any triangulation: of the sides to cross it takes any."""
+def locate_at_random(xy: np.ndarray, mesh: np.ndarray, start: int, x: float, y: float, exact_area: float) -> int:
+    """Do what :func:`locate` does, in any triangulation: of the sides to be crossed it takes any.
+
+    Where edges are forced the other walk may go in circles [1]_; this one ends with a probability of 1.
+    """
+    t = start
+    for k in range(3):
+        if mesh[t + k] > LAST_INDEX:
+            t = np.int64(mesh[t + (k + 1) % 3 + 4]) & TRIANGLE
+            break
     state = np.uint64(1)
     while (mesh[t] | mesh[t + 1] | mesh[t + 2]) <= LAST_INDEX:
         state = state * np.uint64(6364136223846793005) + np.uint64(1442695040888963407)

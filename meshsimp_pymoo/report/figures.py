@@ -23,7 +23,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import printable
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
-from meshsimp_pymoo.surface.surface import Surface, require_rules
+from meshsimp_pymoo.surface.surface import Surface, mesh_lines, require_rules
 from meshsimp_pymoo.surface.units import length_unit, reference_system
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ AMBIENT = 0.22  # brightness of what faces away from the light
 CLAY = (0.90, 0.84, 0.77)  # colour of a mesh that has none of its own
 LINE, MARK = "#2b5c8a", "#c8452f"
 BESIDE, BESIDE_LINES = "#8b9099", ("-", "--", ":", "-.")  # other fronts, behind the one that counts
+BREAK_LINE = "#00574b"  # dark on clay and on the pale end of the error, whatever colours people see
 UNCOVERED = "#0072B2"  # vertices that no triangle covers, on the yellow to black of the error
 PANELS = 3  # meshes beside a front
 LONGEST_NAME = 40  # characters of a model's name in a title: a longer one would leave no room for the axes
@@ -199,8 +200,9 @@ def plot_mesh(
     colour: npt.ArrayLike | None = None,
     edges: bool | None = None,
     exaggeration: float = 1.0,
+    lines: bool | Sequence[npt.ArrayLike] = True,
 ) -> Axes:
-    """Draw a mesh as a shaded relief.
+    """Draw a mesh as a shaded relief, its break lines on it.
 
     Parameters
     ----------
@@ -220,6 +222,9 @@ def plot_mesh(
         Whether to outline the triangles; by default only in small meshes.
     exaggeration : float
         Factor on the heights.
+    lines : bool or sequence of (n, 3) arrays
+        Whether to draw the break lines that a problem, a surface, a model or a solution has; or the lines to draw, in
+        the frame of the points. They are drawn in front of everything.
 
     Returns
     -------
@@ -228,6 +233,7 @@ def plot_mesh(
     """
     from matplotlib.collections import PolyCollection
 
+    drawn = _lines_of(mesh, kept) if lines is True else lines or ()
     points, faces, own = _shape(mesh, kept)
     used, compact = np.unique(faces, return_inverse=True)
     points, faces = points[used], compact.reshape(-1, 3)
@@ -261,6 +267,7 @@ def plot_mesh(
         ),
         autolim=False,
     )
+    _draw_lines(ax, [_turned(np.asarray(line) * [1.0, 1.0, exaggeration], elevation, turn) for line in drawn])
     _frame(ax, seen)
     return ax
 
@@ -274,7 +281,7 @@ def plot_error(
     largest: float | None = None,
     bar: bool = True,
 ) -> Axes:
-    """Draw the deviation of a simplified surface at every vertex of the model as a map.
+    """Draw the deviation of a simplified surface at every vertex of the model as a map, break lines on it.
 
     Parameters
     ----------
@@ -318,6 +325,7 @@ def plot_error(
     if covered is not None:
         bare = ~np.asarray(covered, dtype=bool)
         ax.plot(x[bare], y[bare], ".", color=UNCOVERED, markersize=2.5)
+    _draw_lines(ax, _lines_of(surface), halo=True)
     _frame(ax, np.column_stack([x, y]))
     if bar:
         shown = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02, extend="max" if greatest > end else "neither")
@@ -386,10 +394,12 @@ def front_figure(
     front.set_title(f"{short_name(model.name)}: {size}" + f"\n{system}" * bool(system), loc="left")
 
     panels = right.subplots(*((1, 4) if tall else (2, 2))).ravel()
-    _plot_rows(surface, original_mesh(surface)[1], panels[0])
-    panels[0].set_title(f"original\n{len(model.faces):,} triangles", fontsize=10)
+    lines = _lines_of(surface)
+    _plot_rows(surface, original_mesh(surface)[1], panels[0], lines)
+    named = "original with its break lines" if lines else "original"
+    panels[0].set_title(f"{named}\n{len(model.faces):,} triangles", fontsize=10)
     for letter, panel, (row, faces) in zip("abc", panels[1:], meshes, strict=False):
-        _plot_rows(surface, faces, panel)
+        _plot_rows(surface, faces, panel, [surface.points[chain] for chain in mesh_lines(surface, faces)[0]])
         error = f"mean error {F[row, 0] / surface.total_weight:.3g}"
         if measure != "error":
             error = f"{MEASURES[measure].label} {F[row, 0]:.3g}"
@@ -551,9 +561,35 @@ def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray,
     )
 
 
-def _plot_rows(surface: Surface, faces: IntArray, ax: Axes) -> None:
+def _plot_rows(surface: Surface, faces: IntArray, ax: Axes, lines: Sequence[npt.ArrayLike]) -> None:
     points, faces, colour = _rows_of(surface, faces)
-    plot_mesh((points, faces), ax, colour=colour, exaggeration=surface.view.exaggeration)
+    plot_mesh((points, faces), ax, colour=colour, exaggeration=surface.view.exaggeration, lines=lines)
+
+
+def _lines_of(mesh: Any, kept: npt.ArrayLike | None = None) -> list[FloatArray]:
+    """Return the break lines of whatever is a mesh, (n, 3) each: as given of an original, as chains of edges else."""
+    if hasattr(mesh, "front"):
+        return [mesh.points[chain] for chain in mesh.lines]
+    surface = getattr(mesh, "surface", mesh)
+    if kept is not None and hasattr(surface, "view"):
+        faces = surface.triangles(np.asarray(kept) | surface.pinned)
+        return [surface.points[chain] for chain in mesh_lines(surface, faces)[0]]
+    found = getattr(getattr(surface, "model", surface), "lines", None)
+    return [] if found is None else list(found.originals)
+
+
+def _draw_lines(ax: Axes, lines: Sequence[FloatArray], *, halo: bool = False) -> None:
+    """Draw lines (n, 2) or more as seen; with a halo, where what is below may be as dark."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.patheffects import Normal, Stroke
+
+    if not lines:
+        return
+    around = [Stroke(linewidth=2.6, foreground="white"), Normal()] if halo else None
+    seen = [line[:, :2] for line in lines]
+    ax.add_collection(
+        LineCollection(seen, colors=BREAK_LINE, linewidths=1.1, capstyle="round", path_effects=around), autolim=False
+    )
 
 
 def _rows_of(surface: Surface, faces: IntArray) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:

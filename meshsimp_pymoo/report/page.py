@@ -28,6 +28,8 @@ from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import StoredFront
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.smallest import lines_in_words
+from meshsimp_pymoo.surface.surface import mesh_lines
 from meshsimp_pymoo.surface.units import length_unit, reference_system
 
 if TYPE_CHECKING:
@@ -50,6 +52,8 @@ TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES = 4.0, 1.2, 26.0
 LEVELS, UNCOVERED_LEVEL = 254, 255
 # The colours of the error end where this share of the knee's vertices are below: a few spikes do not pale all the rest.
 SCALE_QUANTILE = 0.98
+# Of break lines with more vertices than these together, what thinning left of them is drawn on the original.
+DRAWN_LINE_VERTICES = 10_000
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
 RECORDED = ("algorithm", "seed", "generations", "evaluations", "moves", "interrupted")
 # A setting of more values than these (one weight a vertex) is counted on the page, not listed.
@@ -68,8 +72,8 @@ class _Embedded:
     original : dict
         The triangles of the drawn original, as rows of ``vertices``.
     solutions : list
-        Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, and the largest
-        of these; None where its mesh is left out.
+        Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
+        of these, and its break lines as edges, rows of ``vertices``, if there are any; None where its mesh is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -128,7 +132,8 @@ def simplification_page(
     original = original_mesh(surface)
     whole = bool(original[0].all())  # else the largest mesh would take the place of many
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
-    held = _embedded(surface, kept, front, original, order, knee, limit)
+    lines = _original_lines(surface)
+    held = _embedded(surface, kept, front, original, order, knee, limit - (len(lines["data"]) if lines else 0))
     missing = sum(solution is None for solution in held.solutions)
     numbers = dict(front.quality)
     if front.refitted_error is not None:
@@ -144,7 +149,7 @@ def simplification_page(
         "folder": printable(as_argument(folder)),
         "measure": measure,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
-        "measures": [{"name": name, **spoken(measure, unit)} for name, measure in MEASURES.items()],
+        "measures": [{"name": name, **spoken(measure, unit)} for name, measure in MEASURES.items() if name in columns],
         "columns": columns,
         "meshes": _mesh_files(front, chosen),
         "refitted_meshes": front.refitted_meshes,
@@ -163,6 +168,7 @@ def simplification_page(
         "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
         "paint": None if paint is None else embedded_array(paint) | {"channels": paint.shape[1]},
         "faces": held.original,
+        "lines": lines,
         "solutions": held.solutions,
         "colours": magma(),
         "uncovered_colour": [int(UNCOVERED[k : k + 2], 16) for k in (1, 3, 5)],
@@ -185,8 +191,11 @@ def simplification_page(
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,
+        lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",
         further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
-        errors={name: MEASURES[name].label for name in _errors() if any(one is not None for one in columns[name])},
+        errors={
+            name: MEASURES[name].label for name in _errors() if any(one is not None for one in columns.get(name, ()))
+        },
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
@@ -242,8 +251,14 @@ def _embedded(
         levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
         levels[~mesh.covered] = UNCOVERED_LEVEL
         triangles, deviation = embedded_faces(place[mesh.faces]), embedded_array(levels)
-        solutions[row] = {"faces": triangles, "deviation": deviation, "largest": largest}
+        held: dict[str, Any] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
+        chains, _ = mesh_lines(surface, mesh.faces)
+        if chains:
+            edges = np.concatenate([np.column_stack([chain[:-1], chain[1:]]) for chain in chains])
+            held["lines"] = embedded_array(place[edges].astype(np.uint32))
+            sizes[row] += len(held["lines"]["data"])
+        solutions[row] = held
     faces = embedded_faces(place[original])
     room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
     while sizes and sum(sizes.values()) > room:
@@ -253,6 +268,19 @@ def _embedded(
     at_knee = found[knee] if knee in found else _checked(surface, kept, front, knee, measured)
     end = float(np.quantile(at_knee.deviation, SCALE_QUANTILE)) or float(front.quality["max_error"].max()) or 1.0
     return _Embedded(vertices, faces, solutions, end, n_drawn)
+
+
+def _original_lines(surface: Surface) -> dict[str, str] | None:
+    """Return the break lines as they were given, as pairs of ends in the frame that the page draws in."""
+    model: Any = surface.model
+    lines = getattr(model, "lines", None)  # which a surface of another kind need not have
+    if lines is None:
+        return None
+    parts = lines.originals
+    if sum(map(len, parts)) > DRAWN_LINE_VERTICES:
+        parts = [model.points[chain] for chain in lines.chains]
+    pairs = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in parts])
+    return embedded_array(pairs + model.offset)
 
 
 def _checked(

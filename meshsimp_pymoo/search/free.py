@@ -650,7 +650,7 @@ def _thinned(
         mesh.freedom,
         mesh.books,
         surface.n_vertices,
-        surface.pinned,
+        mesh.held,
         sizes,
         share,
         stop,

@@ -26,7 +26,7 @@ from meshsimp_pymoo.plane.constraints import constrain, place_of
 from meshsimp_pymoo.plane.emission import emit, outline
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.nearest import build_tree, nearest_segment
-from meshsimp_pymoo.plane.triangulation import RECORD, height_on, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import RECORD, height_on, locate, locate_at_random, triangulate
 from meshsimp_pymoo.surface.centroids import Between
 from meshsimp_pymoo.surface.ground import Ground
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, REGIONS, SQUARES, TRIANGLES, UNCOVERED, VERTICES
@@ -157,6 +157,72 @@ def _measure_bare(
             covered[i] = is_covered
 
 
+@inner(inline=True)
+def _measure_covered(
+    ground: Ground,
+    workspace: tuple,  # type: ignore[type-arg]
+    n: int,
+    row: np.ndarray,
+    deviation: np.ndarray,
+    covered: np.ndarray,
+    lined: bool,
+) -> tuple[float, float, float, int]:
+    """Return sum, sum of squares and maximum of the costs of the dropped vertices in emitted triangles of n sites.
+
+    The last is the number of the others, which are listed in the workspace.
+    """
+    xy = ground.xy
+    z = ground.z
+    exact_area = ground.exact_area
+    weight = ground.weight
+    _, dropped, site_xy, site_z, _, mesh, emitted, _, site_triangle = workspace
+    n_all = len(z)
+    weighted = len(weight) > 0
+    n_regions = len(row) - REGIONS
+    total = 0.0
+    squares = 0.0
+    maximum = 0.0
+    # Vertices in no emitted triangle are listed for later; the list takes the place of the dropped ones already seen.
+    n_bare = 0
+    t = 0
+    last = -1
+    for q in range(n_all - n):
+        i = dropped[q]
+        # The site before this vertex on the curve is close to it, and so is any triangle of that site.
+        j = i - q - 1
+        if j != last and j >= 0:
+            last = j
+            if site_triangle[j] != NO_SITE:
+                t = site_triangle[j]
+        x = xy[2 * i]
+        y = xy[2 * i + 1]
+        if lined:
+            t = locate_at_random(site_xy, mesh, t, x, y, exact_area)
+        else:
+            t = locate(site_xy, mesh, t, x, y, exact_area)
+        if emitted[t // RECORD] == 0:
+            dropped[n_bare] = i
+            n_bare += 1
+            continue
+        d = abs(height_on(site_xy, site_z, mesh, t, x, y) - z[i])
+        if weighted:
+            w = weight[i]
+            total += w * d
+            squares += w * d * d
+            maximum = max(maximum, d) if w > 0.0 else maximum
+        else:
+            w = 1.0
+            total += d
+            squares += d * d
+            maximum = max(maximum, d)
+        if n_regions > 0:
+            row[REGIONS + i * n_regions // n_all] += w * d
+        if len(deviation) > 0:
+            deviation[i] = d
+            covered[i] = True
+    return total, squares, maximum, n_bare
+
+
 @inner
 def _evaluate_one(
     ground: Ground,
@@ -179,7 +245,8 @@ def _evaluate_one(
     for k in range(len(corners)):
         first[k] = place_of(sites, n, corners[k])
     end = triangulate(site_xy, n, first, np.empty(0, np.int64), inserted, mesh, exact_area, ground.exact_lift)
-    if end > 0 and len(ground.lines.at) > 0:
+    lined = len(ground.lines.at) > 0
+    if end > 0 and lined:
         constrain(site_xy, mesh, end, ground.lines, sites, n, site_triangle, exact_area, ground.exact_lift)
     n_triangles = emit(
         site_xy,
@@ -212,47 +279,12 @@ def _evaluate_one(
             site_triangle[mesh[t]] = t
             site_triangle[mesh[t + 1]] = t
             site_triangle[mesh[t + 2]] = t
-    weighted = len(weight) > 0
-    n_regions = len(row) - REGIONS
     row[REGIONS:] = 0.0
-    total = 0.0
-    squares = 0.0
-    maximum = 0.0
-    # Vertices in no emitted triangle are listed for later; the list takes the place of the dropped ones already seen.
-    n_bare = 0
-    t = 0
-    last = -1
-    for q in range(n_all - n):
-        i = dropped[q]
-        # The site before this vertex on the curve is close to it, and so is any triangle of that site.
-        j = i - q - 1
-        if j != last and j >= 0:
-            last = j
-            if site_triangle[j] != NO_SITE:
-                t = site_triangle[j]
-        x = xy[2 * i]
-        y = xy[2 * i + 1]
-        t = locate(site_xy, mesh, t, x, y, exact_area)
-        if emitted[t // RECORD] == 0:
-            dropped[n_bare] = i
-            n_bare += 1
-            continue
-        d = abs(height_on(site_xy, site_z, mesh, t, x, y) - z[i])
-        if weighted:
-            w = weight[i]
-            total += w * d
-            squares += w * d * d
-            maximum = max(maximum, d) if w > 0.0 else maximum
-        else:
-            w = 1.0
-            total += d
-            squares += d * d
-            maximum = max(maximum, d)
-        if n_regions > 0:
-            row[REGIONS + i * n_regions // n_all] += w * d
-        if len(deviation) > 0:
-            deviation[i] = d
-            covered[i] = True
+    # One loop where edges are forced, one where none are: the walks differ, and to choose at each vertex takes longer.
+    if lined:
+        total, squares, maximum, n_bare = _measure_covered(ground, workspace, n, row, deviation, covered, True)
+    else:
+        total, squares, maximum, n_bare = _measure_covered(ground, workspace, n, row, deviation, covered, False)
     n_used = 0
     for j in range(n):
         i = sites[j]
@@ -317,8 +349,12 @@ def measure_between(
     emitted: np.ndarray,
     unit: float,
     nearest: bool,
+    lined: bool,
 ) -> float:
-    """Return the mean deviation of a mesh at samples between the vertices, weighted by their shares."""
+    """Return the mean deviation of a mesh at samples between the vertices, weighted by their shares.
+
+    ``lined`` says whether some edges of the mesh are forced.
+    """
     xy = between.xy
     z = between.z
     share = between.share
@@ -329,7 +365,10 @@ def measure_between(
     for i in range(len(z)):
         x = xy[2 * i]
         y = xy[2 * i + 1]
-        t = locate(site_xy, mesh, t, x, y, between.exact_area)
+        if lined:
+            t = locate_at_random(site_xy, mesh, t, x, y, between.exact_area)
+        else:
+            t = locate(site_xy, mesh, t, x, y, between.exact_area)
         if emitted[t // RECORD] == 0:
             bare[n_bare] = i
             n_bare += 1
@@ -426,6 +465,6 @@ def triangulate_subset(
         faces = canonical_faces(records) if row[TRIANGLES] else records[:0]
         surface_error = np.nan
         if between is not None and row[TRIANGLES]:
-            rules = ground.unit, ground.nearest
+            rules = ground.unit, ground.nearest, len(ground.lines.at) > 0
             surface_error = measure_between(between, site_xy, site_z, mesh, end, emitted, *rules)
         return sites[faces], row, deviation, covered, surface_error

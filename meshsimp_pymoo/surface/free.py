@@ -787,6 +787,8 @@ class FreeGround:
         both = on_border[start] & on_border[indices]
         self.name = model.name
         self.pinned = pinned
+        #: Vertices that stay where they are kept (N,): the pinned ones, and all on break lines.
+        self.held = pinned | (ground.lines.at >= 0) if len(ground.lines.at) else pinned
         #: Share of each sample behind the vertices in the area (K,): those of the centroids, or none.
         self.share = share
         self._sites = sites
@@ -823,7 +825,7 @@ class FreeGround:
             freedom = self._freedom._replace(ratio=float(min_height), onto=onto, fan=fan, other=other)
             build(freedom.ground, live, self._sites(kept, self.pinned), self.name)
             _open(freedom.ground, live, len(freedom.ground.z))
-            yield FreeTriangulation(freedom, live, self.pinned)
+            yield FreeTriangulation(freedom, live, self.held)
 
 
 def _make_room(n_vertices: int, n_samples: int) -> tuple[Live, Fan, Fan, IntArray]:
@@ -839,15 +841,18 @@ class FreeTriangulation:
     ----------
     freedom, books : records
         What the compiled functions work on.
+    held : (N,) bool array
+        Vertices that neither move nor collapse.
     accepted : (3,) int array
         How many flips, shifts and swaps were made.
     """
 
-    def __init__(self, freedom: Freedom, books: Live, pinned: BoolArray) -> None:
+    def __init__(self, freedom: Freedom, books: Live, held: BoolArray) -> None:
         self.freedom = freedom
         self.books = books
+        self.held = held
         n = freedom.n_vertices
-        rows = np.flatnonzero((books.site[:n] == 1) & (books.used[:n] > 0) & ~pinned)
+        rows = np.flatnonzero((books.site[:n] == 1) & (books.used[:n] > 0) & ~held)
         self._movable = np.empty(n, np.int64)
         self._movable[: len(rows)] = rows
         self._n_movable = np.array([len(rows)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.orient import area_vectors
 from meshsimp_pymoo.surface.places import highest
-from meshsimp_pymoo.surface.rules import OUTLINE, SHARP
+from meshsimp_pymoo.surface.rules import OUTLINE, SHARP, meant_word_for_lines
 from meshsimp_pymoo.surface.units import reference_system
 
 _PARAMETER = re.compile(r'\bPARAMETER\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)')
@@ -44,6 +45,9 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
         the model's are not along the file's z.
     """
     if isinstance(given, (str, os.PathLike)):
+        word = meant_word_for_lines(given)
+        if word and not Path(given).exists():
+            raise ModelError(f"{given}: no such file of break lines{word}; check the path")
         given = read_lines(given)
     elif isinstance(given, SourceLines):
         given = build_lines(given.name, given.lines, given.names, given.georeference)

@@ -19,6 +19,7 @@ from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.heights import MESH_SAMPLE_BYTES, grid_mesh
 from meshsimp_pymoo.memory import check_free
 from meshsimp_pymoo.plane.faces import canonical_faces, one_rings
+from meshsimp_pymoo.reprs import in_short
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import REGIONS
@@ -50,7 +51,10 @@ class GridSurface:
     def __init__(self, grid: HeightGrid, rules: Rules = DEFAULT) -> None:
         for name, value in vars(rules).items():
             if name not in FREE_RULES and value != getattr(DEFAULT, name):
-                raise ModelError(f"{grid.name}: {name}={value!r} is not for a grid read by windows; leave it out")
+                raise ModelError(
+                    f"{grid.name}: {name}={in_short(value)} is not for a grid read by windows; leave it out, or take "
+                    "the grid in one piece (MeshProblem), or a part of it (window=)"
+                )
         self.model = grid
         self.rules = rules
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -63,7 +64,7 @@ class HeightSurface:
     def __init__(self, model: OpenModel, rules: Rules = DEFAULT) -> None:
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
         if rules.break_lines is not None:
-            self.model = lined_model(self.model, rules.break_lines, rules.line_tolerance)
+            self.model = lined_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
         is_small = self.n_vertices < LARGE
@@ -192,6 +193,27 @@ class HeightSurface:
         order = np.arange(len(rows)) if fixed is None else np.lexsort((~fixed[rows], group))
         first = np.r_[True, group[order][1:] != group[order][:-1]][: len(rows)]
         return np.sort(rows[order[first]])
+
+    def line_chains(self, kept: BoolArray) -> tuple[IntArray, ...]:
+        """Return each break line as the chain of edges that it is in the mesh of a subset (N,): rows, in order.
+
+        Beside the vertices that thinning left these are the kept ones that lie exactly on the line.
+        """
+        lines = self.model.lines
+        if lines is None:
+            return ()
+        first, along = self._ground.lines.start, self._ground.lines.along
+        is_site = np.zeros(self.n_vertices, bool)
+        is_site[self.sites(kept | self.pinned, self.pinned)] = True
+        between = {}
+        for s, (a, b) in enumerate(lines.segments.tolist()):
+            on = along[first[s] : first[s + 1]].astype(np.int64)
+            between[a, b] = on[is_site[on]]
+            between[b, a] = between[a, b][::-1]
+        return tuple(
+            np.concatenate([chain[:1], *(between[pair][1:] for pair in itertools.pairwise(chain.tolist()))])
+            for chain in lines.chains
+        )
 
     def selection(self, most: int) -> BoolArray:
         """Return about ``most`` vertices (N,): the vertices lie along a curve that fills the plane, so every k-th."""

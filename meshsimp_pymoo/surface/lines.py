@@ -32,7 +32,8 @@ class ModelLines:
     added : (A,) int array
         Rows of the vertices that are none of the model's file, ascending; they have no weight.
     found : dict of str to int
-        How many lines and vertices were thinned, added, cut off or left out, as far as there are any; for run.json.
+        How many ``lines`` and ``line_vertices`` were given; how many were thinned, added, cut off or left out, as far
+        as there are any; for run.json.
     """
 
     originals: tuple[FloatArray, ...]

@@ -20,7 +20,15 @@ from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.conflict import turn
 from meshsimp_pymoo.plane.constraints import constrain
 from meshsimp_pymoo.plane.stars import cavity_of, triangles_around
-from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import (
+    INFINITE,
+    LAST_INDEX,
+    RECORD,
+    TRIANGLE,
+    locate,
+    locate_at_random,
+    triangulate,
+)
 from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.bare import clear_bare, forget_bare, is_segment, note_bare, set_segment, settle_bare
 from meshsimp_pymoo.surface.books import (
@@ -268,6 +276,7 @@ def enter_region(g: Ground, live: Live, half: bool, closed: bool) -> None:
                 set_segment(live, h, theirs and not mine)
     # The pooled vertices, each to the triangle that holds it (exactly), else to a ghost that it sees.
     t = region[0] if count[N_REGION] > 0 else 0
+    lined = len(g.lines.at) > 0
     n_looked_through = count[N_REGION] if count[N_REGION] <= MOST_LOOKED_THROUGH else 0
     for n in range(count[N_POOL]):
         i = pool[n]
@@ -287,6 +296,8 @@ def enter_region(g: Ground, live: Live, half: bool, closed: bool) -> None:
                 break
         if not found and closed:
             t = _least_outside(xy, mesh, region, count[N_REGION], i)
+        elif not found and lined:
+            t = locate_at_random(xy, mesh, t, xy[2 * i], xy[2 * i + 1], g.exact_area)
         elif not found:
             t = locate(xy, mesh, t, xy[2 * i], xy[2 * i + 1], g.exact_area)
         r = t >> 3
@@ -542,7 +553,8 @@ def _build(
     end = triangulate(site_xy, len(sites), first, np.empty(0, np.int64), inserted, mesh, g.exact_area, g.exact_lift)
     if end == 0:
         return False
-    if len(g.lines.at) > 0:
+    lined = len(g.lines.at) > 0
+    if lined:
         constrain(site_xy, mesh, end, g.lines, sites, len(sites), live.rim, g.exact_area, g.exact_lift)
     count[:] = 0
     live.amount[:] = 0.0
@@ -569,7 +581,10 @@ def _build(
         if live.site[i]:
             t = live.place[i]
             continue
-        t = locate(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
+        if lined:
+            t = locate_at_random(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
+        else:
+            t = locate(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
         r = t >> 3
         live.place[i] = t
         live.following[i] = live.head[r]

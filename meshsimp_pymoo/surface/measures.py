@@ -208,6 +208,9 @@ class Quality:
         of_lines=True,
     )
 
+    def __reduce__(self) -> Any:  # so that one that comes from another process is equal, numbers that are not known too
+        return quality_of, ([(item.name, getattr(self, item.name)) for item in fields(self)],)
+
     @property
     def in_words(self) -> str:
         """What a mesh is told apart by."""

@@ -253,6 +253,31 @@ class OpenModel:
             )
         return dataclasses.replace(self, weights=values)
 
+    def without_lines(self) -> OpenModel:
+        """Return the model as it was before it had break lines: without them and the vertices that they brought."""
+        if self.lines is None:
+            return self
+        own = np.ones(self.n_vertices, bool)
+        own[self.lines.added] = False
+        place = np.cumsum(own) - 1
+        weights = None if self.weights is None else self.weights[own]
+        if weights is not None and (weights == 1.0).all():
+            weights = None
+        return dataclasses.replace(
+            self,
+            points=self.points[own],
+            faces=place[self.faces].astype(self.faces.dtype),
+            # the vertex that a line's covers comes right after it
+            corners=place[self.corners] + ~own[self.corners],
+            source_index=self.source_index[own],
+            file_points=self.file_points[own],
+            attributes={name: values[own] for name, values in self.attributes.items()},
+            xy=self.xy[own],
+            weights=weights,
+            feet=place[self.feet],
+            lines=None,
+        )
+
     def to_local(self, points: npt.ArrayLike) -> FloatArray:
         """Turn points (M, 3) of the file's frame into this model's upright local frame [model units]."""
         return (np.asarray(points, float) * self.scale - self.pivot) @ self.rotation.T - self.offset

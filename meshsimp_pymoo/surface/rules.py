@@ -109,8 +109,8 @@ class Rules:
         settle(self)
         if self.break_lines is None and self.line_tolerance is not None:
             raise InputError(
-                f"line_tolerance={self.line_tolerance:g} (--line-tolerance {self.line_tolerance:g}) is for break lines, "
-                "and there are none; name them by break_lines=FILE (--break-lines FILE)"
+                f"line_tolerance={self.line_tolerance:g} (--line-tolerance {self.line_tolerance:g}) is for break "
+                "lines, and there are none; name them by break_lines=FILE (--break-lines FILE)"
             )
         if self.break_lines is not None and self.line_tolerance is None and not is_word_for_lines(self.break_lines):
             near = meant_word_for_lines(self.break_lines)
@@ -145,6 +145,11 @@ class Rules:
 def is_word_for_lines(text: Any) -> bool:
     """Tell whether break lines are named by a word, which finds them in the original, and not by a file."""
     return isinstance(text, str) and (text == OUTLINE or text.startswith(SHARP))
+
+
+def is_file_of_lines(given: Any) -> bool:
+    """Tell whether break lines are those of a file."""
+    return isinstance(given, str) and not is_word_for_lines(given)
 
 
 def meant_word_for_lines(text: Any) -> str:

@@ -455,6 +455,39 @@ def mesh_arrays(model: Original, faces: IntArray) -> tuple[FloatArray, IntArray,
     return model.file_points[used], compact, attributes
 
 
+def mesh_lines(surface: Surface, faces: IntArray) -> tuple[tuple[IntArray, ...], tuple[str, ...]]:
+    """Return the break lines of a simplified mesh: chains of its edges, and what each is called.
+
+    Parameters
+    ----------
+    surface : Surface
+        The original mesh and its rules.
+    faces : (M, 3) int array
+        The mesh's triangles as rows of the surface's points.
+
+    Returns
+    -------
+    chains : tuple of (m,) int array
+        The vertices of each line in order, as rows of the surface's points; where a mesh does not reach them all, the
+        parts of two or more. None without break lines.
+    names : tuple of str
+        What messages call each of them.
+    """
+    lines = getattr(surface.model, "lines", None)  # which a surface of another kind need not have
+    if lines is None:
+        return (), ()
+    used = np.zeros(surface.n_vertices, bool)
+    used[np.asarray(faces)] = True
+    parts, names = [], []
+    for chain, name in zip(surface.line_chains(used), lines.names, strict=True):  # type: ignore[attr-defined]
+        ends = np.flatnonzero(np.diff(used[chain], prepend=False, append=False))
+        for first, last in zip(ends[::2], ends[1::2], strict=True):
+            if last - first >= 2:
+                parts.append(chain[first:last])
+                names.append(name)
+    return tuple(parts), tuple(names)
+
+
 def require_rules(surface: Any, who: str) -> None:
     """Raise a TypeError if somebody who needs a surface gets a model, which has no rules."""
     if not hasattr(surface, "rules"):

@@ -167,7 +167,7 @@ def tabulated(
     elif isinstance(centroids, Between):
         emitted = mesh.emitted.astype(np.uint8)
         surface_error = measure_between(
-            centroids, flat, mesh.z, mesh.records, len(mesh.records), emitted, grid.unit, True
+            centroids, flat, mesh.z, mesh.records, len(mesh.records), emitted, grid.unit, True, False
         )
     return row, deviation, surface_error
 

@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from counts import tried
 from lining import assert_constrained_delaunay, constrained_faces, random_segments, with_segments
-from nasty import SOURCES, nasty_model
 from samples import surface
 from scipy.spatial import Delaunay
 
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.plane.constraints import make_constraints
-from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.model import build_model, placed_model
 
 GRID = build_model(grid_source(np.zeros((3, 3))))

@@ -9,10 +9,14 @@ import pytest
 from counts import tried
 from lining import random_segments, with_segments
 from nasty import nasty_model
+from pymoo.optimize import minimize
 from samples import surface
 from test_nasty import walk
 
+from meshsimp_pymoo import MeshProblem, Moves, memetic
+from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
+from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
 
 # Lattices, where vertices lie on lines, clouds, where none do; hubs, gaps, twins, slivers at the hull.
@@ -49,3 +53,70 @@ def test_what_is_tried_beside_lines_is_what_is_done_and_as_from_scratch(name, mo
                 np.testing.assert_array_equal(live.faces, scratch.faces)
                 wanted = getattr(scratch.quality, lined.rules.measure)
                 assert live.error == pytest.approx(wanted, rel=1e-9, abs=rounding)
+
+
+def forced_edges_of(lined, faces):
+    """Whether all edges of the lines are edges of a mesh, cut at its vertices."""
+    used = np.zeros(lined.n_vertices, bool)
+    used[faces] = True
+    edges = {frozenset(pair) for face in faces.tolist() for pair in itertools.combinations(face, 2)}
+    chains = lined.line_chains(used)
+    return all(frozenset(pair) in edges for chain in chains for pair in itertools.pairwise(chain.tolist()))
+
+
+def lined_terrain(n_lines=12, **rules):
+    """A grid with lines between its vertices, some of which lie on others."""
+    model = build_model(load("jacksboro:9"))
+    segments, _ = random_segments(model.xy, np.random.default_rng(5), n_lines)
+    return surface(with_segments(model, segments), **rules)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_chains_of_lines_are_edges_of_every_mesh(share):
+    lined = lined_terrain()
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        kept = lined.pinned | (rng.random(lined.n_vertices) < share)
+        assert forced_edges_of(lined, lined.triangles(kept))
+    assert max(len(chain) for chain in lined.line_chains(np.ones(lined.n_vertices, bool))) > 2
+
+
+@pytest.mark.parametrize("centroids", [False, True])
+def test_free_meshes_keep_the_lines_and_what_lies_on_them(centroids):
+    lined = lined_terrain()
+    kept = lined.pinned | (np.random.default_rng(2).random(lined.n_vertices) < 0.3)
+    start = lined.triangles(kept)
+    before = [chain.tolist() for chain in lined.line_chains(kept)]
+    with lined.free_ground(centroids=centroids).triangulation(kept) as mesh:
+        mesh.anneal(20_000, np.array([7], np.uint64), hot=50.0, cold=0.1, triangles=len(start))
+        faces = mesh.faces
+        assert (mesh.accepted > 100).all()
+    used = np.zeros(lined.n_vertices, bool)
+    used[faces] = True
+    assert [chain.tolist() for chain in lined.line_chains(used)] == before
+    assert forced_edges_of(lined, faces)
+
+
+@pytest.mark.parametrize("triangulation", ["delaunay", "free"])
+def test_searched_fronts_keep_the_lines(triangulation):
+    lined = lined_terrain()
+    result = minimize(MeshProblem(lined), memetic(12, triangulation=triangulation), Moves(20_000), seed=1)
+    free = [mesh for mesh in result.opt.get("free", to_numpy=False) if mesh is not None]
+    assert len(free) > 5 if triangulation == "free" else not free
+    for faces in [*(lined.triangles(row) for row in result.X), *(mesh.faces for mesh in free)]:
+        assert forced_edges_of(lined, faces)
+    fewest = lined.simplify(lined.pinned).quality.triangles
+    assert min(result.F[:, 1]) <= fewest
+
+
+def test_refitting_holds_the_vertices_on_lines_and_is_no_worse():
+    lined = lined_terrain()
+    kept = lined.pinned | (np.random.default_rng(3).random(lined.n_vertices) < 0.2)
+    mesh = lined.simplify(kept)
+    fitted = lined.refit(mesh)
+    moved = np.flatnonzero((fitted.vertices != lined.model.file_points[fitted.rows]).any(axis=1))
+    on_lines = np.unique(np.concatenate(lined.line_chains(kept)))
+    assert len(moved) > 5
+    assert not np.isin(fitted.rows[moved], on_lines).any()
+    assert fitted.bound <= fitted.error < mesh.quality.error
+    assert fitted.bound >= 0.99 * fitted.error

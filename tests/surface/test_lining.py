@@ -122,6 +122,9 @@ def test_a_line_above_a_corner_is_the_corner():
     assert model.lines.chains[0][0] in model.corners
     lined = HeightSurface(model)
     assert lined.simplify(lined.pinned).covered.all()
+    bare = model.without_lines()
+    assert bare.hash == FLAT.hash
+    assert_array_equal(bare.corners, FLAT.corners)
 
 
 def test_of_several_heights_at_one_place_the_first_given_counts():

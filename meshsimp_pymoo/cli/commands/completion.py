@@ -16,7 +16,7 @@ examples:
 
 SHELLS = ("bash", "zsh", "tcsh")
 # Arguments that are files or folders, by their place in ``args``.
-PATHS = ("model", "output", "other", "front", "config", "models")
+PATHS = ("model", "output", "other", "front", "config", "models", "break_lines")
 
 
 def add(parser: argparse.ArgumentParser) -> None:

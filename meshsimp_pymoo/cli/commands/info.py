@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
 
 HELP = "say what a model is and whether it can be simplified"
 DESCRIPTION = """\
@@ -18,6 +19,8 @@ examples:
       the built-in models
   meshsimp info face.ply
       is it a height field, and seen from where?
+  meshsimp info dem.asc --break-lines rivers.geojson --line-tolerance 0.5
+      how many edges the lines force, and the smallest mesh they allow
   meshsimp info head.ply --patch front --up y
       and its front alone?
 """
@@ -25,10 +28,12 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    from meshsimp_pymoo.cli.arguments import add_model, add_shown
+    from meshsimp_pymoo.cli.arguments import add_model, add_settings, add_shown
     from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
 
     add_model(parser, Options, nargs="?")
+    add_settings(parser, Rules, only=("break_lines", "line_tolerance"))
     add_shown(parser, quiet=False)
 
 
@@ -41,17 +46,18 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.terminal import OK, tell
     from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.surface.rules import Rules
 
     if args.model is not None:
         with said_when_compiling(quiet=False):
-            return _describe(args.model, settings_from(args, Options), as_json=args.json)
+            return _describe(args.model, settings_from(args, Options), settings_from(args, Rules), as_json=args.json)
 
     lines = datasets.describe()
     tell(json.dumps(lines, indent=2) if args.json else "\n".join(lines.values()))
     return OK
 
 
-def _describe(model: str, options: Options, *, as_json: bool) -> int:
+def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> int:
     import json
     import math
     from dataclasses import asdict
@@ -63,8 +69,11 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
     from meshsimp_pymoo.formats.source.classes import classes_in_words
     from meshsimp_pymoo.formats.source.missing import suspects
     from meshsimp_pymoo.opening import mended_source
+    from meshsimp_pymoo.surface.height import HeightSurface
+    from meshsimp_pymoo.surface.model import build_model
     from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
     from meshsimp_pymoo.surface.places import count_places
+    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
     from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source, mended = mended_source(model, options)
@@ -133,6 +142,11 @@ def _describe(model: str, options: Options, *, as_json: bool) -> int:
             "folded over": f"{'' if facts.complete else 'at least '}{facts.n_folded:,} faces ({facts.fold_share:.2%})",
         }
     doubt = f"usable, but see the warning: {odd[0][1]:,} heights of {odd[0][0]:.9g}" if odd else ""
+    if rules.break_lines is not None and not refusal:
+        lined = HeightSurface(build_model(source, up=options.up), rules)
+        assert lined.model.lines is not None
+        content["lines"] = facts_of_lines(lined, lined.model.lines)
+        rows["break lines"] = lines_in_words(content["lines"], length_unit(source.georeference))
     rows["verdict"] = "refused" if refusal else doubt or "usable: an open height field"
     if as_json:
         tell(json.dumps(content | {"refusal": refusal}, indent=2))

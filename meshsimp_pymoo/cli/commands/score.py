@@ -28,6 +28,8 @@ examples:
 """
 
 PICTURES = (".png", ".svg", ".pdf")
+# Beside what a vertex outside costs, what of the rules decides the numbers of any mesh.
+SAID = ("weights", "break_lines", "line_tolerance")
 # A mesh of the front itself, measured from its file, differs by less.
 ROUNDING = 1e-9
 
@@ -43,7 +45,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--front", metavar="OUT", help="folder of a front of MODEL to compare with")
     parser.add_argument("-o", "--output", metavar="FILE", help="picture of the error to write: png, svg or pdf")
     parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
-    add_settings(parser, Rules, only=("outside", "weights"), outside="nearest, or as in the front")
+    add_settings(parser, Rules, only=("outside", *SAID), outside="nearest, or as in the front")
     add_shown(parser, quiet=False)
 
 
@@ -118,9 +120,8 @@ def _front_of(folder: str, model: str, options: Options, rules: Rules, outside: 
 
     front = Front.load(folder)
     usual = plain(type(options)()) | plain(type(rules)())
-    said = {
-        name: value for name, value in (plain(options) | {"weights": rules.weights}).items() if value != usual[name]
-    }
+    given = plain(options) | {name: getattr(rules, name) for name in SAID}
+    said = {name: value for name, value in given.items() if value != usual[name]}
     if outside is not None:
         said["outside"] = outside
     made = usual | front.run.get("options", {}) | front.run.get("rules", {})

@@ -25,6 +25,8 @@ examples:
       a height grid
   meshsimp simplify scan.laz --classes 2 --max-edge 5 --format landxml
       the ground of a point cloud with bays and holes, as a TIN for GIS programs
+  meshsimp simplify dem.asc --break-lines rivers.geojson --line-tolerance 0.5
+      polylines that every mesh keeps as edges, to half a unit
   meshsimp simplify huge.npy --tile 512 --triangles 200000
       a height grid that is too big for one piece
 """

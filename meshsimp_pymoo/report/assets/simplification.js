@@ -78,12 +78,14 @@ async function pick(row) {
     `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
-  const [faces, levels] = solution ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation)]) : [null, null];
+  const [faces, levels, edges] = solution
+    ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation), solution.lines ? unpackArray(solution.lines) : null])
+    : [null, null, null];
   if (state.row !== row) return; // another one was picked meanwhile
-  state.mesh = faces && { row, faces, levels };
+  state.mesh = faces && { row, faces, levels, edges };
   document.documentElement.dataset.shown = row;
   if (state.viewer) {
-    state.viewer.show(faces);
+    state.viewer.show(faces, edges);
     paintErrors();
   }
 }
@@ -233,9 +235,10 @@ function colourBar() {
 }
 
 async function openViewer() {
-  const [points, faces, paint] = await Promise.all([
+  const [points, faces, lines, paint] = await Promise.all([
     unpackArray(data.points),
     unpackFaces(data.faces),
+    data.lines && unpackArray(data.lines),
     data.paint && unpackArray(data.paint),
   ]);
   state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
@@ -256,6 +259,7 @@ async function openViewer() {
     state.viewer = new MeshPair(canvas, windows, {
       positions: upright,
       faces,
+      lines,
       paint,
       channels: data.paint ? data.paint.channels : 0,
       exaggeration: heights.valueAsNumber,
@@ -285,11 +289,12 @@ async function openViewer() {
     part("heights-value").textContent = `× ${readable(heights.valueAsNumber)}`;
     viewer.setExaggeration(heights.valueAsNumber);
   });
+  part("lines")?.addEventListener("change", (event) => viewer.showLines(event.target.checked));
   part("from-above").addEventListener("click", () => viewer.look(0, 0));
   part("from-side").addEventListener("click", () => viewer.look(0.6, 1.2));
   part("reset").addEventListener("click", () => viewer.reset());
   if (state.mesh) {
-    viewer.show(state.mesh.faces);
+    viewer.show(state.mesh.faces, state.mesh.edges);
     paintErrors();
   }
 }

@@ -8,8 +8,9 @@ const TURN_STEP = Math.PI / 36;
 const TEXTURE_SIZE = 1024;
 
 class MeshPair {
-  // positions: (V, 3) upright from a local origin; extent: [low, high] of the original; paint: (V, k) uint8 or null
-  constructor(canvas, windows, { positions, faces, paint, channels, exaggeration, relief, onDraw }) {
+  // positions: (V, 3) upright from a local origin; extent: [low, high] of the original; paint: (V, k) uint8 or null;
+  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null
+  constructor(canvas, windows, { positions, faces, lines, paint, channels, exaggeration, relief, onDraw }) {
     Object.assign(this, { canvas, windows, paint, onDraw });
     const count = positions.length / 3;
     const low = [Infinity, Infinity, Infinity];
@@ -49,9 +50,11 @@ class MeshPair {
 
     const side = THREE.DoubleSide;
     const lifted = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+    const below = lines ? lifted : {}; // lines lie in front of the faces that they are edges of
     this.materials = {
-      shaded: new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side }),
-      texture: new THREE.MeshLambertMaterial({ flatShading: true, side }),
+      shaded: new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side, ...below }),
+      texture: new THREE.MeshLambertMaterial({ flatShading: true, side, ...below }),
+      line: new THREE.LineBasicMaterial(),
       paper: new THREE.MeshBasicMaterial({ side, ...lifted }),
       wire: new THREE.MeshBasicMaterial({ wireframe: true, side }),
     };
@@ -59,7 +62,10 @@ class MeshPair {
     const pixels = [0, 1].map((k) => Math.max(16, Math.round((TEXTURE_SIZE * this.extent[k]) / longest)));
     this.target = new THREE.WebGLRenderTarget(pixels[0], pixels[1], { minFilter: THREE.LinearFilter });
     this.materials.texture.map = this.target.texture;
-    this.original = this.scene(faces);
+    const ends = lines && new Float32Array(lines.length);
+    for (let i = 0; ends && i < ends.length; i++) ends[i] = (lines[i] - (low[i % 3] + high[i % 3]) / 2) / size;
+    this.linesShown = true;
+    this.original = this.scene(faces, ends);
     this.simplified = null;
     this.flat = new THREE.Scene();
     const coloured = this.geometry(faces);
@@ -102,20 +108,53 @@ class MeshPair {
     return geometry;
   }
 
-  scene(faces) {
+  scene(faces, ends) {
     const scene = new THREE.Scene();
     const mesh = new THREE.Mesh(this.geometry(faces), this.materials.shaded);
     const wire = new THREE.Mesh(mesh.geometry, this.materials.wire);
     mesh.frustumCulled = wire.frustumCulled = false;
     scene.add(mesh, wire);
-    return { scene, mesh, wire };
+    return { scene, mesh, wire, lines: ends && this.linesOf(ends) };
   }
 
-  // faces: Uint32Array or null for no mesh
-  show(faces) {
+  // ends: (2 S, 3) Float32Array; the lines have a scene of their own, which is drawn several times to make them wider
+  linesOf(ends) {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(ends, 3));
+    const segments = new THREE.LineSegments(geometry, this.materials.line);
+    segments.frustumCulled = false;
+    const scene = new THREE.Scene();
+    scene.add(segments);
+    return { scene, segments };
+  }
+
+  // faces: Uint32Array or null for no mesh; edges: the ends of its break lines as rows of the vertices, or null
+  show(faces, edges) {
     if (this.simplified) this.simplified.mesh.geometry.dispose();
-    this.simplified = faces ? this.scene(faces) : null;
+    if (this.simplified?.lines) this.simplified.lines.segments.geometry.dispose();
+    const ends = edges && new Float32Array(3 * edges.length);
+    for (let i = 0; ends && i < ends.length; i++) ends[i] = this.arrays.position[3 * edges[Math.floor(i / 3)] + (i % 3)];
+    this.simplified = faces ? this.scene(faces, ends) : null;
     this.request();
+  }
+
+  showLines(shown) {
+    this.linesShown = shown;
+    this.request();
+  }
+
+  // Lines are one pixel wide by WebGL's rules; moved by half a pixel to all sides they are two.
+  drawLines(part, width, height) {
+    part.lines.segments.scale.z = this.exaggeration;
+    part.lines.scene.add(this.camera);
+    this.renderer.autoClear = false;
+    const step = 0.5;
+    for (const [x, y] of [[step, 0], [-step, 0], [0, step], [0, -step]]) {
+      this.camera.setViewOffset(width, height, x, y, width, height);
+      this.renderer.render(part.lines.scene, this.camera);
+    }
+    this.camera.clearViewOffset();
+    this.renderer.autoClear = true;
   }
 
   // colours: (V, 3) float, of the error at every vertex
@@ -145,6 +184,7 @@ class MeshPair {
     const style = getComputedStyle(document.documentElement);
     this.materials.paper.color.set(style.getPropertyValue("--card").trim());
     this.materials.wire.color.set(style.getPropertyValue("--wire").trim());
+    this.lineColours = { shaded: "#00574b", wireframe: style.getPropertyValue("--breakline").trim() };
     this.request();
   }
 
@@ -225,6 +265,7 @@ class MeshPair {
     const bright = this.mode === "error" ? 0.72 : 0.3; // colours of the error must be told from the light
     this.sky.intensity = Math.PI * bright;
     this.sun.intensity = Math.PI * (this.mode === "error" ? 0.36 : 0.78);
+    this.materials.line.color.set(this.lineColours[this.mode === "wireframe" ? "wireframe" : "shaded"]);
     renderer.setScissorTest(false);
     renderer.clear();
     renderer.setScissorTest(true);
@@ -244,6 +285,7 @@ class MeshPair {
       part.mesh.scale.z = part.wire.scale.z = this.exaggeration;
       part.scene.add(this.camera, this.sky);
       renderer.render(part.scene, this.camera);
+      if (part.lines && this.linesShown) this.drawLines(part, rectangle[2], rectangle[3]);
     });
     this.onDraw();
   }
