@@ -20,6 +20,7 @@ from meshsimp_pymoo.comparison.store import read_model, write_model
 from meshsimp_pymoo.errors import InputError, ModelError, ResultError
 from meshsimp_pymoo.formats.source.lines import SourceLines
 from meshsimp_pymoo.formats.table import read_lines, write_lines
+from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.report.figures import BREAK_LINE
 from meshsimp_pymoo.storage import FRONT_COLUMNS, LINES, read_front
@@ -264,7 +265,7 @@ def test_big_grids_say_that_tiles_do_not_know_lines(tmp_path, monkeypatch, capsy
     (line,) = capsys.readouterr().err.splitlines()
     assert "big.npy does not fit into the memory in one piece; take a part of it (--window" in line
     with pytest.raises(ModelError, match=r"break_lines='outline' is not for a grid read by windows; leave it out, or"):
-        tiled_front(tmp_path / "big.npy", rules=Rules(break_lines="outline"))
+        tiled_front(open_grid(tmp_path / "big.npy"), rules=Rules(break_lines="outline"))
 
 
 # ------------------------------------------------------------------------------------------------ pictures and the page
@@ -288,7 +289,7 @@ def test_plots_show_the_lines(front):
     assert drawn(plot_mesh("roof:5" and MeshProblem("roof:5"), Figure().subplots())) == []
 
 
-# --------------------------------------------------------------------------------------------------- python, experiment
+# -------------------------------------------------------------------------------------------------- python, experiments
 
 
 def test_an_experiments_file_lies_in_the_folder_of_the_models_and_is_told_by_its_content(file, tmp_path):

@@ -12,12 +12,13 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.formats.source.lines import SourceLines
+from meshsimp_pymoo.formats.source.lines import SourceLines, build_lines, spelled_name
+from meshsimp_pymoo.formats.table import read_lines
+from meshsimp_pymoo.plane.chains import chains
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.orient import area_vectors
 from meshsimp_pymoo.surface.places import highest
-from meshsimp_pymoo.surface.polylines import chained
 from meshsimp_pymoo.surface.rules import OUTLINE, SHARP, meant_word_for_lines
 from meshsimp_pymoo.surface.units import reference_system
 
@@ -44,28 +45,14 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
         the model's are not along the file's z.
     """
     if isinstance(given, (str, os.PathLike)):
-        from meshsimp_pymoo.formats.table import read_lines
-
         word = meant_word_for_lines(given)
         if word and not Path(given).exists():
             raise ModelError(f"{given}: no such file of break lines{word}; check the path")
         given = read_lines(given)
-    elif not isinstance(given, SourceLines):
-        arrays = [np.asarray(line, float) for line in given]
-        given = SourceLines("break_lines", tuple(arrays), tuple(f"line {k + 1}" for k in range(len(arrays))))
-    for line, name in zip(given.lines, given.names, strict=True):
-        if line.ndim != 2 or line.shape[1] not in (2, 3) or len(line) < 2:
-            raise ModelError(
-                f"{given.name}: {name} has shape {line.shape}; give two or more positions, (n, 2) or (n, 3)"
-            )
-        wrong = np.flatnonzero(~np.isfinite(line).all(axis=1))
-        if len(wrong):
-            raise ModelError(
-                f"{given.name}: {name}: {len(wrong)} of {len(line)} positions are not finite (first: position "
-                f"{wrong[0]}, {line[wrong[0]].tolist()}); leave them out"
-            )
-    if not given.lines:
-        raise ModelError(f"{given.name}: holds no lines; give one or more")
+    elif isinstance(given, SourceLines):
+        given = build_lines(given.name, given.lines, given.names, given.georeference)
+    else:
+        given = build_lines("break_lines", given, [spelled_name("line", k + 1) for k in range(len(given))])
     if systems_differ(given.georeference, model.georeference):
         raise ModelError(
             f"{given.name}: is in {reference_system(given.georeference)}, and {model.name} in "
@@ -126,7 +113,7 @@ def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:
         If the word's angle is none, or the model has no such edges.
     """
     if word == OUTLINE:
-        rows = chained(_border(model))
+        rows = chains(_border(model))
         if not rows:
             raise ModelError(f"{model.name}: has no outline to take for break lines; leave break_lines={word!r} out")
         return rows
@@ -136,7 +123,7 @@ def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:
         degrees = np.nan
     if not 0.0 < degrees < 180.0:
         raise ModelError(f"break_lines={word!r}: no angle; give degrees between 0 and 180, as in 'sharp:30'")
-    rows = chained(sharp_edges(model, degrees))
+    rows = chains(sharp_edges(model, degrees))
     if not rows:
         raise ModelError(
             f"break_lines={word!r}: no two faces of {model.name} meet at more than {degrees:g} degrees; give fewer"

@@ -29,6 +29,7 @@ from meshsimp_pymoo.errors import InputError, ModelError, warn_of
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.segments import along_faces, enclosed_points, meeting_segments, points_on
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.given_lines import lines_in_file_frame, lines_of_word
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import OpenModel
@@ -45,6 +46,7 @@ USUAL_TOLERANCE = 1e-3
 GIVEN, BETWEEN_GIVEN, DRAPED, BETWEEN_DRAPED = range(4)
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Polylines:
     """The vertices of polylines one after the other: M in all.
@@ -306,8 +308,8 @@ class _Lining:
             self.found |= {"lines_cut": n_cut, "lines_left_out": n_left_out}
             share = 1.0 - inside / float(length.sum())
             warn_of(
-                f"{self.what}: parts of {n_cut} lines and the whole of {n_left_out} lie outside {model.name} and are "
-                f"cut off: {share:.2%} of the length"
+                f"{self.what}: of {n_lines} lines, parts of {n_cut} and the whole of {n_left_out} lie outside "
+                f"{model.name} and are cut off: {share:.2%} of the length"
             )
         # what begins where the piece before it ends goes on
         joins = np.zeros(len(piece), bool)

@@ -267,7 +267,8 @@ class OpenModel:
             self,
             points=self.points[own],
             faces=place[self.faces].astype(self.faces.dtype),
-            corners=place[self.corners],
+            # the vertex that a line's covers comes right after it
+            corners=place[self.corners] + ~own[self.corners],
             source_index=self.source_index[own],
             file_points=self.file_points[own],
             attributes={name: values[own] for name, values in self.attributes.items()},

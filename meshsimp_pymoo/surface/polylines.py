@@ -1,4 +1,4 @@
-"""Polylines as runs between the places where they meet or end: chained from edges, cut into runs, thinned.
+"""Polylines as runs between the places where they meet or end, and how these are thinned.
 
 The vertices of polylines are numbers, the same at the same place. What two lines share is one run, whatever else the
 lines do, and a run is thinned the same way in whichever direction it is listed.
@@ -14,40 +14,6 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.reprs import brief
-
-
-def chained(edges: IntArray) -> list[IntArray]:
-    """Return polylines that have all the edges (E, 2), each once: from one end or fork to the next, or closed.
-
-    Examples
-    --------
-    >>> [chain.tolist() for chain in chained(np.array([[0, 1], [1, 2], [1, 3], [5, 4], [6, 5], [4, 6]]))]
-    [[0, 1], [1, 2], [1, 3], [4, 5, 6, 4]]
-    """
-    edges = np.unique(np.sort(edges, axis=1), axis=0)
-    if len(edges) == 0:
-        return []
-    ends = np.concatenate([edges, edges[:, ::-1]])
-    order = np.lexsort((ends[:, 1], ends[:, 0]))
-    start, to = ends[order].T.tolist()
-    edge = (order % len(edges)).tolist()
-    first = np.searchsorted(start, np.arange(max(start) + 2)).tolist()
-    used = [False] * len(edges)
-
-    def walked(k: int) -> IntArray:
-        chain = [start[k]]
-        while not used[edge[k]]:
-            used[edge[k]] = True
-            here = to[k]
-            chain.append(here)
-            low, high = first[here], first[here + 1]
-            if high - low != 2:
-                break
-            k = low if used[edge[low + 1]] else low + 1
-        return np.array(chain, np.int64)
-
-    forks = [k for k in range(len(start)) if first[start[k] + 1] - first[start[k]] != 2]
-    return [walked(k) for k in (*forks, *range(len(start))) if not used[edge[k]]]
 
 
 @brief

@@ -776,3 +776,49 @@ def test_the_libraries_are_the_ones_that_their_readme_names():
         assert f"| `{path.name}` |" in text
         assert hashlib.sha256(path.read_bytes()).hexdigest() in text
         assert b"Permission" in path.read_bytes()[:600]  # its licence
+
+
+# -------------------------------------------------------------------------------------------------------- break lines
+
+
+@pytest.fixture(scope="module")
+def lined(tmp_path_factory):
+    """A front, with its page, of a model with a line across it."""
+    bend = [[[2.0, 3.0], [9.0, 12.0], [20.0, 14.0]]]
+    points, faces, _ = relief(SIDE, np.random.default_rng(8))
+    place = tmp_path_factory.mktemp("lined")
+    write_mesh(place / "hill.ply", points, faces)
+    problem = MeshProblem(place / "hill.ply", break_lines=bend, line_tolerance=0.5, n_threads=1)
+    front = Front.from_subsets(problem, subsets(problem, 6, np.random.default_rng(8)), ends=True)
+    return front, front.save(place / "out", chosen=2)
+
+
+def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
+    front, folder = lined
+    visit = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+    page = visit.page
+    assert shown(page) == 2
+    assert "Break lines: 1 line, 3 vertices thinned to " in page.inner_text("header")
+    for name in MEASURES:
+        assert number(page, name) == getattr(front[2], name)
+    assert "line max error" in page.locator("#measure option").all_inner_texts()
+    for look in ("shaded", "wireframe", "error"):
+        page.check(f"input[value={look}]", force=True)
+        with_lines = pixels(page)
+        page.uncheck("#lines")
+        without = pixels(page)
+        page.check("#lines")
+        for window in (0, 1):
+            assert 0.002 < unlike(with_lines[window], without[window]) < 0.1, look
+            assert unlike(with_lines[window], pixels(page)[window]) == 0.0
+    page.locator("#slider").fill("0")
+    assert shown(page) == 0
+    edges = page.evaluate("Array.from(state.mesh.edges)")
+    assert len(edges) == 2 * (len(front[0].lines[0]) - 1)
+    visit.check()
+    visit.close()
+
+
+def test_a_page_without_break_lines_says_nothing_of_any(seen):
+    assert seen.page.locator("#lines").count() == 0
+    assert "reak line" not in seen.page.inner_text("body")

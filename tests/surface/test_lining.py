@@ -13,13 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from samples import holey_grid, stepped_model, surface
-from test_places import walled
+from test_places import skirted, walled
 
 from meshsimp_pymoo.datasets import load, load_lines
 from meshsimp_pymoo.errors import InputError, ModelError, ModelWarning
 from meshsimp_pymoo.formats.source import build_source
 from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.source.lines import SourceLines
+from meshsimp_pymoo.formats.table import write_lines
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.lining import lined_model
@@ -100,10 +101,11 @@ def test_thinning_keeps_to_its_tolerance():
     assert 0.1 < away.max() <= 0.2
 
 
-def test_a_line_with_heights_of_its_own_carries_the_surface_at_a_samples_place():
-    model = lined_model(FLAT, [[[2, 2, 5], [6, 2, 7]]], 0)
+@pytest.mark.parametrize("up", [1, -1])
+def test_a_line_with_heights_of_its_own_carries_the_surface_at_a_samples_place(up):
+    model = lined_model(FLAT, [[[2, 2, 5 * up], [6, 2, 7 * up]]], 0)
     assert model.n_vertices == 83
-    assert chains(model) == [[[2, 2, 5], [6, 2, 7]]]
+    assert chains(model) == [[[2, 2, 5 * up], [6, 2, 7 * up]]]
     lined = HeightSurface(model)
     everything = lined.simplify(np.ones(83, bool))
     assert set(model.lines.vertices) <= set(everything.faces.ravel())
@@ -120,6 +122,9 @@ def test_a_line_above_a_corner_is_the_corner():
     assert model.lines.chains[0][0] in model.corners
     lined = HeightSurface(model)
     assert lined.simplify(lined.pinned).covered.all()
+    bare = model.without_lines()
+    assert bare.hash == FLAT.hash
+    assert_array_equal(bare.corners, FLAT.corners)
 
 
 def test_of_several_heights_at_one_place_the_first_given_counts():
@@ -148,6 +153,23 @@ def test_what_two_lines_share_is_one_set_of_edges():
     assert len(model.lines.segments) == 3
 
 
+def test_where_a_line_without_heights_runs_along_one_with_heights_it_has_these():
+    soft, hard = [[1, 2.5], [7, 2.5]], [[5.25, 2.5, 3], [3.25, 2.5, 3]]
+    model = lined_model(ROUGH, [soft, hard], 0)
+    of_soft, of_hard = chains(model)
+    low = of_soft.index([3.25, 2.5, 3])
+    assert of_hard == of_soft[low : low + len(of_hard)][::-1]
+    assert len(of_soft) > len(of_hard) == 2
+
+
+def test_feet_of_walls_stay_what_they_are():
+    walls = stepped_model(skirted())
+    model = lined_model(walls, [[[1.3, -1.4, 30], [5.6, -7.2, 30]]], 0)
+    assert_array_equal(np.sort(model.source_index[model.feet]), np.sort(walls.source_index[walls.feet]))
+    assert (model.weights[model.feet] == 0).all()
+    assert model.total_weight == walls.total_weight
+
+
 def test_lines_that_cross_are_refused_by_name_and_place():
     lines = SourceLines("kerbs.obj", tuple(np.array(x) for x in CROSSING), ("line 1", "line 7"))
     with pytest.raises(
@@ -167,7 +189,7 @@ def test_a_line_that_crosses_itself_is_refused():
 
 
 def test_lines_that_cross_outside_the_model_do_not_matter():
-    with pytest.warns(ModelWarning, match=r"parts of 2 lines and the whole of 0 lie outside"):
+    with pytest.warns(ModelWarning, match=r"of 2 lines, parts of 2 and the whole of 0 lie outside"):
         model = lined_model(FLAT, [[[4, 2], [12, 4]], [[4, 4], [12, 2]]], 0.1)
     assert_allclose([chain[-1] for chain in chains(model)], [[8, 3, 0], [8, 3, 0]], atol=1e-9)
 
@@ -178,7 +200,7 @@ def test_what_lies_outside_is_cut_off_at_the_outline():
     across = [[low[0] - 5, -13.0, 3.0], [high[0] + 5, -13.0, 8.0]]
     away = [[high[0] + 1, 0.0], [high[0] + 2, 1.0]]
     with pytest.warns(
-        ModelWarning, match=r"parts of 1 lines and the whole of 1 lie outside holey .*: [\d.]+% of the le"
+        ModelWarning, match=r"of 2 lines, parts of 1 and the whole of 1 lie outside holey .*: [\d.]+% of the le"
     ):
         model = lined_model(holey, [across, away], 0)
     lengths = [np.ptp(line[:, 0]) for line in model.lines.originals]
@@ -186,6 +208,9 @@ def test_what_lies_outside_is_cut_off_at_the_outline():
     assert_allclose(sum(lengths), np.ptp(holey.points[:, 0]) - 8)
     assert model.lines.names == ("line 1", "line 1")
     assert model.lines.found["lines_cut"] == model.lines.found["lines_left_out"] == 1
+    with pytest.warns(ModelWarning):
+        back = lined_model(holey, [across[::-1], away], 0)
+    assert chains(back) == [chain[::-1] for chain in chains(model)[::-1]]
     # heights are those of the line where it was cut
     for chain in chains(model):
         for x, _, z in chain:
@@ -207,12 +232,17 @@ def test_a_line_along_the_outline_is_whole():
     assert [place[:2] for place in chains(model)[0]] == rim
 
 
+def test_a_line_keeps_to_the_models_corners():
+    model = lined_model(FLAT, [[[2, 0], [8, 0], [8, 3]]], 100)
+    assert [place[:2] for place in chains(model)[0]] == [[2, 0], [8, 0], [8, 3]]
+
+
 def test_repeated_vertices_and_lines_of_one_place_are_left_out_and_said():
     with pytest.warns(ModelWarning, match=r"2 vertices repeat the place of the one before, and 1 lines are one place"):
-        model = lined_model(FLAT, [[[1, 1], [1, 1], [2, 5]], [[3, 3], [3, 3]]], 1)
+        model = lined_model(FLAT, [[[1, 1], [1, 1], [2, 5]], [[3, 3], [3, 3 + 1e-12]]], 1)
     assert len(model.lines.chains) == 1
     with pytest.warns(ModelWarning), pytest.raises(ModelError, match="holds no line of two places"):
-        lined_model(FLAT, [[[3, 3], [3, 3]]], 1)
+        lined_model(FLAT, [[[3, 3], [3, 3 + 1e-12]]], 1)
 
 
 def wiggly(y):
@@ -227,6 +257,12 @@ def test_thinned_lines_that_come_to_cross_get_vertices_back_until_they_do_not():
     assert model.lines.found["put_back_line_vertices"] > 0
     assert len(model.lines.vertices) > sum(alone)
     assert_no_crossing(model)
+
+
+def test_of_two_that_cross_the_one_that_was_thinned_more_gets_its_vertex_back():
+    around, upright = [[1, 2.5], [4, 3.5], [7, 2.5]], [[4, 3.3], [4.05, 2], [4, 1]]
+    model = lined_model(FLAT, [around, upright], 2)
+    assert [len(chain) for chain in model.lines.chains] == [3, 2]
 
 
 def test_a_line_is_not_thinned_across_another():
@@ -293,9 +329,9 @@ def test_the_outline_is_closed_lines_around_the_model_and_its_holes():
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ([[[0, 1], [np.nan, 2]]], r"line 1: 1 of 2 positions are not finite \(first: position 1"),
-        ([[[0, 1, 2, 3], [1, 2, 3, 4]]], r"line 1 has shape \(2, 4\); give two or more positions"),
-        ([[[0, 1]]], r"line 1 has shape \(1, 2\)"),
+        ([[[0, 1], [np.nan, 2]]], r"line 1 has 1 of 2 vertices that are NaN"),
+        ([[[0, 1, 2, 3], [1, 2, 3, 4]]], r"line 1 has the shape \(2, 4\)"),
+        ([[[0, 1]]], r"break_lines: holds no lines \(but 1 lines that are one place\)"),
         ([], "holds no lines"),
     ],
 )
@@ -418,6 +454,15 @@ def test_the_original_stays_what_it_was(seed):
     assert (np.diff(indptr)[model.lines.added] == 0).all()
     everything = HeightSurface(model).simplify(np.ones(model.n_vertices, bool)).quality
     assert everything.line_max_error == pytest.approx(0, abs=1e-9)
+
+
+def test_lines_of_a_file_are_those_of_its_arrays(tmp_path):
+    lines = [np.array([[1.3, 1.2, 4.0], [6.1, 5.5, 7.0]]), np.array([[2, 6, 3.5], [4, 6.5, 2.0], [6, 7, 3.5]])]
+    source = SourceLines("x", tuple(lines), ("line 1", "line 2"))
+    write_lines(tmp_path / "lines.geojson", source)
+    model = lined_model(ROUGH, tmp_path / "lines.geojson", 0.1)
+    assert model.hash == lined_model(ROUGH, lines, 0.1).hash
+    assert model.lines.names[0].startswith("feature 1")
 
 
 def test_attributes_of_added_vertices_are_those_of_the_nearest():
