@@ -326,6 +326,16 @@ def test_stored_lines_that_do_not_fit_together_are_refused(problem):
         ModelLines.of_arrays(arrays | {"names": np.array(["a", "b"])})
 
 
+def test_free_meshes_keep_their_lines_and_know_their_errors(front):
+    freed = front.free(moves=20_000)
+    assert freed.n_free > 0
+    for solution in freed:
+        edges, (chain,) = edges_of(solution.faces), solution.lines
+        assert all(tuple(sorted(pair)) in edges for pair in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True))
+        found = freed.surface.of_faces(solution.faces).quality
+        assert solution.line_max_error == pytest.approx(found.line_max_error, abs=1e-12)
+
+
 def test_lines_go_with_wishes_and_problems_say_them(problem):
     most = smallest_mesh(problem.surface) + 10
     found = simplify_to(problem, triangles=most, moves=2000)
