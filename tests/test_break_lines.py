@@ -150,6 +150,19 @@ def test_a_model_that_has_its_lines_already_is_taken_as_the_original(folder):
     assert front.model.without_lines().hash == MeshProblem(MODEL).model.hash
 
 
+def test_other_rules_line_a_model_anew(problem):
+    rules = dataclasses.replace(problem.surface.rules, line_tolerance=3.0 * problem.surface.rules.line_tolerance)
+    anew, fresh = MeshProblem(problem.model, rules=rules).model, MeshProblem(MODEL, rules=rules).model
+    assert anew.n_vertices < problem.model.n_vertices
+    assert anew.hash == fresh.hash
+
+
+def test_originals_that_thinning_leaves_alone_are_told_apart(problem):
+    lines = problem.model.lines
+    other = dataclasses.replace(lines, originals=tuple(line + 1e-9 for line in lines.originals))
+    assert other.hash != lines.hash == dataclasses.replace(lines, names=("another",)).hash
+
+
 @pytest.mark.parametrize("change", ["gone", "other", "nearly the same"])
 def test_lines_that_vanished_or_changed_are_refused_in_one_line(folder, file, change, capsys):
     content = file.read_text()
@@ -229,6 +242,8 @@ def test_a_wish_below_what_lines_allow_is_told_which_tolerance_would(problem, fi
     assert not out.exists()
     assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", "2", "-q"]) == 1
     assert "no tolerance allows 2: leave some of the lines out" in capsys.readouterr().err
+    how = ["--moves", "1000", "--no-page", "--meshes", "none", "-q"]
+    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest), *how]) == 0
 
 
 @pytest.mark.parametrize(
