@@ -150,6 +150,19 @@ def test_a_model_that_has_its_lines_already_is_taken_as_the_original(folder):
     assert front.model.without_lines().hash == MeshProblem(MODEL).model.hash
 
 
+def test_other_rules_line_a_model_anew(problem):
+    rules = dataclasses.replace(problem.surface.rules, line_tolerance=3.0 * problem.surface.rules.line_tolerance)
+    anew, fresh = MeshProblem(problem.model, rules=rules).model, MeshProblem(MODEL, rules=rules).model
+    assert anew.n_vertices < problem.model.n_vertices
+    assert anew.hash == fresh.hash
+
+
+def test_originals_that_thinning_leaves_alone_are_told_apart(problem):
+    lines = problem.model.lines
+    other = dataclasses.replace(lines, originals=tuple(line + 1e-9 for line in lines.originals))
+    assert other.hash != lines.hash == dataclasses.replace(lines, names=("another",)).hash
+
+
 @pytest.mark.parametrize("change", ["gone", "other", "nearly the same"])
 def test_lines_that_vanished_or_changed_are_refused_in_one_line(folder, file, change, capsys):
     content = file.read_text()
@@ -229,6 +242,8 @@ def test_a_wish_below_what_lines_allow_is_told_which_tolerance_would(problem, fi
     assert not out.exists()
     assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", "2", "-q"]) == 1
     assert "no tolerance allows 2: leave some of the lines out" in capsys.readouterr().err
+    how = ["--moves", "1000", "--no-page", "--meshes", "none", "-q"]
+    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest), *how]) == 0
 
 
 @pytest.mark.parametrize(
@@ -324,6 +339,16 @@ def test_stored_lines_that_do_not_fit_together_are_refused(problem):
         ModelLines.of_arrays(arrays | {"chain_start": np.array([0, 1])})
     with pytest.raises(ValueError, match="1 lines have 1 chains and 2 names"):
         ModelLines.of_arrays(arrays | {"names": np.array(["a", "b"])})
+
+
+def test_free_meshes_keep_their_lines_and_know_their_errors(front):
+    freed = front.free(moves=20_000)
+    assert freed.n_free > 0
+    for solution in freed:
+        edges, (chain,) = edges_of(solution.faces), solution.lines
+        assert all(tuple(sorted(pair)) in edges for pair in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True))
+        found = freed.surface.of_faces(solution.faces).quality
+        assert solution.line_max_error == pytest.approx(found.line_max_error, abs=1e-12)
 
 
 def test_lines_go_with_wishes_and_problems_say_them(problem):

@@ -419,13 +419,15 @@ def measured_meshes(
     """
     found = list(quality)
     own = tuple(faces) or (None,) * len(found)
+    has_lines = getattr(surface.model, "lines", None) is not None  # which a surface of another kind need not have
+    wanted = OF_MESH + OF_LINES * has_lines
 
     def measure(row: int) -> None:
-        is_known = not any(math.isnan(getattr(found[row], name)) for name in OF_MESH)
+        is_known = not any(math.isnan(getattr(found[row], name)) for name in wanted)
         if found[row].triangles and not is_known and (until is None or time.perf_counter() < until):
             triangles = own[row]
             whole = (surface.simplify(kept[row]) if triangles is None else surface.of_faces(triangles)).quality
-            found[row] = replace(found[row], **{name: getattr(whole, name) for name in OF_MESH + OF_LINES})
+            found[row] = replace(found[row], **{name: getattr(whole, name) for name in wanted})
 
     on_threads(measure, spread(len(found)), n_threads=n_threads)
     return found
