@@ -151,13 +151,15 @@ def _scores() -> None:
 
 
 def _lining() -> None:
+    from meshsimp_pymoo.surface.height import HeightSurface
     from meshsimp_pymoo.surface.lining import lined_model
 
     # a line without heights that turns, so that it is cut, draped and thinned around another, which is met
     bent = [[-0.5, 0.1], [0.3, 0.6], [0.4, 0.6], [0.9, 0.1]]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # says what is cut off
-        lined_model(_square().model, [bent, [[0.35, 0.3], [0.35, 0.5]]], 0.5)
+        lined = lined_model(_square().model, [bent, [[0.35, 0.3], [0.35, 0.5]]], 0.5)
+    HeightSurface(lined).ground()
 
 
 def _folds() -> None:
@@ -222,7 +224,7 @@ PARTS = (
         "break lines",
         (
             "plane.segments:_in_faces", "plane.segments:_sweep", "plane.segments:_near", "plane.segments:_meeting",
-            "plane.segments:_enclosed", "surface.polylines:_thin",
+            "plane.segments:_enclosed", "plane.constraints:_vertices_on", "surface.polylines:_thin",
         ),
         _lining, 4.0, False,
     ),
