@@ -517,8 +517,8 @@ class _Reader:
         if not isinstance(code, list):
             return code
         kind, *rest = code
-        if kind == "float":
-            return float(rest[0])
+        if kind == "float":  # there is one NaN, so that records that hold it are equal
+            return math.nan if rest[0] == "nan" else float(rest[0])
         if kind == "scalar":
             return self.arrays[rest[0]][()]
         if kind == "population":
