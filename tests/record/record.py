@@ -123,6 +123,24 @@ def moead_face() -> str:
     return simplified("face:300", "--algorithm", "moead", "--generations", 15, "--format", "stl", "--meshes", "all")
 
 
+# --------------------------------------------------------------------------------------------------------- break lines
+
+
+@row
+def soft_lines_free() -> str:
+    winding = [[1200 * k, -900 * k + (-1) ** k * 400] for k in range(1, 24)]
+    lines = {"type": "MultiLineString", "coordinates": [winding, [[2000, -30000], [15000, -29000], [29000, -27000]]]}
+    Path("lines.json").write_text(json.dumps(lines), encoding="utf-8")
+    words = ("--break-lines", "lines.json", "--line-tolerance", 20, "--free", "--format", "obj")
+    return simplified("jacksboro:21", "--population", 20, "--generations", 3, *words)
+
+
+@row
+def outline_refitted() -> str:
+    lines = ("--break-lines", "outline", "--line-tolerance", 0.02)
+    return simplified("horseshoe:150", "--algorithm", "nsga2_v1", "--evaluations", 1000, *lines, "--refit")
+
+
 # ------------------------------------------------------------------------------------------- measures, refit, weights
 
 
