@@ -95,7 +95,8 @@ def make_parser() -> Parser:
         epilog=MODELS + "\n`meshsimp COMMAND --help` has examples of each command.\n",
     )
     parser.add_argument("--version", action=_Version, nargs=0, dest=argparse.SUPPRESS, help="show the version and exit")
-    listed = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    listed = parser.add_subparsers(title="commands", metavar="COMMAND")
+    parser.set_defaults(command=lambda _: parser.error(f"a command is missing: {', '.join(listed.choices)}"))
     for name, command in _commands():
         added = listed.add_parser(name, help=command.HELP, description=command.DESCRIPTION, fill=_filling(command))
         added.set_defaults(command=command.run, parser=parser)
