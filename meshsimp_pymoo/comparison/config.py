@@ -138,6 +138,8 @@ TRIAL_GENERATIONS = 3
 TRIAL_POPULATION = 100
 # Packages whose lines tell a reader of their own operators nothing.
 NOT_THEIRS = sys.stdlib_module_names | {"meshsimp_pymoo", "moocore", "numba", "numpy", "pymoo", "scipy"}
+# How the paths of classes begin that come with pymoo or with this package.
+KNOWN_HOMES = ("pymoo.", "meshsimp_pymoo.")
 # Settings of an algorithm that do not change what it finds.
 WITHOUT_EFFECT = {"output", "display", "callback", "verbose", "termination", "seed", "evaluator"}
 
@@ -667,7 +669,7 @@ def settings(part: Any) -> dict[str, Any]:
     # a class of this package is known by its name, wherever it lives
     home = "meshsimp_pymoo" if kind.__module__.startswith("meshsimp_pymoo.") else kind.__module__
     found: dict[str, Any] = {"class": f"{home}.{kind.__qualname__}"}
-    if not f"{home}.".startswith(("meshsimp_pymoo.", "pymoo.")) and (code := _code_of(kind.__module__)):
+    if not f"{home}.".startswith(KNOWN_HOMES) and (code := _code_of(kind.__module__)):
         found["code"] = code  # whoever changes a class of theirs wants its runs done again
     for name in sorted((_parameters(kind) or set()) - WITHOUT_EFFECT):
         value: Any = getattr(part, name, None)
@@ -913,7 +915,7 @@ def _shape_of(kind: str, operator: Any, args: Sequence[Any]) -> tuple[int, ...] 
 
 def _is_known(path: str) -> bool:
     """Return whether what is named (a path, or a name of ours) comes with pymoo or with this package."""
-    return "." not in path or path.startswith(("pymoo.", "meshsimp_pymoo."))
+    return "." not in path or path.startswith(KNOWN_HOMES)
 
 
 def _sized_sampling(algorithm: Any) -> RandomSubset | None:

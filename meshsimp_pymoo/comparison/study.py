@@ -60,6 +60,7 @@ from meshsimp_pymoo.comparison.analysis import (
     unary_scores,
 )
 from meshsimp_pymoo.comparison.baselines import BASELINES
+from meshsimp_pymoo.comparison.config import KNOWN_HOMES
 from meshsimp_pymoo.comparison.statistics import Friedman, friedman, rank_sum
 from meshsimp_pymoo.comparison.store import EXPERIMENT_FILE, RunStore, StoredRun, read_experiment, read_model
 from meshsimp_pymoo.errors import ResultError, reason_of
@@ -558,7 +559,7 @@ class Study:
             return "baseline"
         parts = [operator["name"] for operator in item["description"].get("operators", {}).values()]
         paths = [*([] if item["preset"] else [item["class"]]), *(name for name in parts if "." in name)]
-        if not all(path.startswith(("pymoo.", "meshsimp_pymoo.")) for path in paths):
+        if not all(path.startswith(KNOWN_HOMES) for path in paths):
             return "own"
         if not item["preset"]:
             return "pymoo"
