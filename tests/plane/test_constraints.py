@@ -3,12 +3,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from counts import tried
-from lining import assert_constrained_delaunay, constrained_faces, random_segments, with_segments
+from delaunay import orient
+from from_python import from_python
+from lining import (
+    assert_constrained_delaunay,
+    constrained_faces,
+    random_segments,
+    whole_numbers,
+    with_segments,
+)
 from samples import surface
 from scipy.spatial import Delaunay
 
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.plane import triangulation
 from meshsimp_pymoo.plane.constraints import make_constraints
+from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
+from meshsimp_pymoo.surface.books import END
+from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.model import build_model, placed_model
 
 GRID = build_model(grid_source(np.zeros((3, 3))))
@@ -108,3 +120,27 @@ def test_triangles_are_those_of_a_slow_twin_for_all_vertices_and_some(cases):
             faces = lined.triangles(some)
             np.testing.assert_array_equal(faces, expected)
             assert_constrained_delaunay(model.xy, faces, segments, sites.tolist())
+
+
+@tried("points", 40)
+def test_walks_among_forced_edges_end_where_a_point_is(points):
+    walk = from_python(triangulation.locate_at_random)
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        model = flat(0.25 + 0.5 * rng.random((60, 2)))
+        segments, _ = random_segments(model.xy, rng, 25)
+        live = LiveTriangulation(whole(with_segments(model, segments)), np.ones(60, bool)).live
+        for x, y in np.round(rng.random((points, 2)) * 2.0**52) / 2.0**52:
+            start = RECORD * int(rng.integers(live.tally[END] // RECORD))
+            t = walk(model.xy.ravel(), live.mesh, start, x, y, 0.0)
+            corners = live.mesh[t : t + 3]
+            sides = [
+                orient(*whole_numbers([model.xy[a], model.xy[b], (x, y)]))
+                for a, b in zip(corners, np.roll(corners, -1), strict=True)
+                if max(a, b) <= LAST_INDEX
+            ]
+            if len(sides) == 3:
+                assert min(sides) >= 0
+            else:  # a ghost, whose hull edge the point sees
+                assert len(sides) == 1
+                assert sides[0] > 0

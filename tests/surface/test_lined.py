@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -163,3 +164,15 @@ def test_refitting_holds_the_vertices_on_lines_and_is_no_worse():
     assert not np.isin(fitted.rows[moved], on_lines).any()
     assert fitted.bound <= fitted.error < mesh.quality.error
     assert fitted.bound >= 0.99 * fitted.error
+
+
+@pytest.mark.parametrize("outside", OUTSIDES)
+@pytest.mark.parametrize("make", [lined_terrain, lined_rows])
+def test_meshes_with_lines_are_measured_as_their_faces_are(make, outside):
+    lined = make(outside=outside)
+    rng = np.random.default_rng(6)
+    for share in (0.05, 0.2, 0.6):
+        mesh = lined.simplify(lined.pinned | (rng.random(lined.n_vertices) < share))
+        other = lined.of_faces(mesh.faces)
+        np.testing.assert_allclose(mesh.deviation, other.deviation, atol=1e-9 * lined.diagonal)
+        assert dataclasses.asdict(mesh.quality) == pytest.approx(dataclasses.asdict(other.quality), rel=1e-9)
