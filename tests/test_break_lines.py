@@ -26,7 +26,7 @@ from meshsimp_pymoo.report.figures import BREAK_LINE
 from meshsimp_pymoo.storage import FRONT_COLUMNS, LINES, read_front
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import OF_LINES
-from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, Rules
 from meshsimp_pymoo.surface.smallest import smallest_mesh, tolerance_for
 
 # A line across the hill that winds: 21 vertices, of which some tolerance leaves few.
@@ -231,16 +231,18 @@ def test_the_shell_says_what_lines_are_and_what_they_ask_of_every_mesh(problem, 
     assert json.loads(capsys.readouterr().out)["line_mean_error"] == pytest.approx(best.line_mean_error, abs=1e-9)
 
 
-def test_a_wish_below_what_lines_allow_is_told_which_tolerance_would(problem, file, tmp_path, capsys):
+@pytest.mark.parametrize("footprint", FOOTPRINTS)
+def test_a_wish_below_what_lines_allow_is_told_which_tolerance_would(problem, file, tmp_path, capsys, footprint):
     given = ["--break-lines", str(file), "--line-tolerance", f"{problem.surface.rules.line_tolerance!r}"]
     smallest = smallest_mesh(problem.surface)
     out = tmp_path / "out"
-    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest - 1), "-q"]) == 1
+    footprint = ["--footprint", footprint]
+    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest - 1), "-q", *footprint]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"the smallest mesh of {MODEL} has {smallest} triangles; --line-tolerance " in line
     assert line.endswith(f"would allow {smallest - 1}")
     assert not out.exists()
-    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", "2", "-q"]) == 1
+    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", "2", "-q"]) == 2
     assert "no tolerance allows 2: leave some of the lines out" in capsys.readouterr().err
     how = ["--moves", "1000", "--no-page", "--meshes", "none", "-q"]
     assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest), *how]) == 0

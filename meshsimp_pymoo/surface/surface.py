@@ -507,7 +507,7 @@ def _are_edges(chain: IntArray, known: IntArray, n: int) -> BoolArray:
 
 
 def _beside(xy: FloatArray, used: BoolArray, a: int, b: int) -> IntArray:
-    """Return the vertices (N, 2) used that lie between two on the segment that these end, but for rounding; in order."""
+    """Return the vertices used that lie on the segment between two of them (N, 2), but for rounding, in order."""
     rows = np.setdiff1d(np.flatnonzero(used), (a, b))
     u, v = xy[b] - xy[a], xy[rows] - xy[a]
     length = float(np.hypot(*u))
