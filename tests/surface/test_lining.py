@@ -104,17 +104,37 @@ def test_thinning_keeps_to_its_tolerance():
 @pytest.mark.parametrize("up", [1, -1])
 def test_a_line_with_heights_of_its_own_carries_the_surface_at_a_samples_place(up):
     model = lined_model(FLAT, [[[2, 2, 5 * up], [6, 2, 7 * up]]], 0)
-    assert model.n_vertices == 83
-    assert chains(model) == [[[2, 2, 5 * up], [6, 2, 7 * up]]]
+    assert model.n_vertices == 86
+    assert chains(model) == [[[2 + k, 2, (5 + k / 2) * up] for k in range(5)]]
     lined = HeightSurface(model)
-    everything = lined.simplify(np.ones(83, bool))
+    everything = lined.simplify(np.ones(86, bool))
     assert set(model.lines.vertices) <= set(everything.faces.ravel())
     assert everything.quality.line_max_error == 0
     # the samples below do not lie on the mesh, and are still what the error is of
     assert everything.quality.max_error == 7
     assert lined.total_weight == 81
     assert_array_equal(np.flatnonzero(model.weights == 0), model.lines.added)
-    assert_array_equal(np.sort(model.source_index)[-2:], [81, 82])
+    assert_array_equal(np.sort(model.source_index)[-5:], range(81, 86))
+
+
+@pytest.mark.parametrize("turn", [0.0, 20.0])
+def test_no_sample_below_a_line_with_heights_draws_it_down(turn):
+    """A crest over a row of samples; in a turned grid they lie below it but for rounding."""
+    sine, cosine = np.sin(np.radians(turn)), np.cos(np.radians(turn))
+    turned = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    grid = grid_source(np.zeros((9, 9)), 1.0, 1.0, origin=(0.0, 8.0))
+    crest = np.array([[0.5, 2, 3.0], [7.5, 2, 3.0]]) @ turned
+    bare = build_model(dataclasses.replace(grid, points=grid.points @ turned))
+    rng = np.random.default_rng(1)
+    for tolerance, n_kept in ((0.0, 9), (2.9, 9), (3.1, 2)):
+        model = lined_model(bare, [crest], tolerance)
+        assert len(model.lines.vertices) == n_kept
+        lined = HeightSurface(model)
+        places = crest[0, :2] + np.linspace(0, 1, 57)[:, None] * (crest[1] - crest[0])[:2]
+        for share in (0.0, 0.3, 1.0):
+            mesh = lined.simplify(lined.pinned | (rng.random(model.n_vertices) < share))
+            heights = height_of(dataclasses.replace(model, faces=mesh.faces), places)
+            assert np.abs(heights - 3.0).max() <= tolerance + 1e-9
 
 
 def test_a_line_above_a_corner_is_the_corner():
