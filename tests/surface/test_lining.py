@@ -265,6 +265,17 @@ def test_repeated_vertices_and_lines_of_one_place_are_left_out_and_said():
         lined_model(FLAT, [[[3, 3], [3, 3 + 1e-12]]], 1)
 
 
+@pytest.mark.parametrize("short", [1.2e-9, 1.9e-9, 3e-9])
+@pytest.mark.parametrize("width", [2, 3])
+def test_a_line_goes_on_over_the_shortest_of_pieces(short, width):
+    line = np.array([[1.3, 1.2, 1], [3.3, 2.2, 1], [3.3 + short * np.hypot(8, 8), 2.2, 1], [5.1, 6.2, 1]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = lined_model(ROUGH, [line[:, :width]], 0)
+    assert len(model.lines.chains) == 1
+    assert np.isfinite(model.points).all()
+
+
 def wiggly(y):
     x = np.linspace(0.5, 7.5, 141)
     return np.column_stack([x, y + 0.1 * np.sin(4 * x)])
