@@ -12,6 +12,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.outmesh import metres_of
 from meshsimp_pymoo.formats.source.lines import SourceLines, build_lines, spelled_name
 from meshsimp_pymoo.formats.table import read_lines
 from meshsimp_pymoo.plane.chains import chains
@@ -41,8 +42,8 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
     Raises
     ------
     ModelError
-        If the file cannot be read, the reference systems differ, these are no lines, or the lines have no heights and
-        the model's are not along the file's z.
+        If the file cannot be read, the reference systems or units differ, these are no lines, or the lines have no
+        heights and the model's are not along the file's z.
     """
     if isinstance(given, (str, os.PathLike)):
         word = meant_word_for_lines(given)
@@ -57,6 +58,12 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
         raise ModelError(
             f"{given.name}: is in {reference_system(given.georeference)}, and {model.name} in "
             f"{reference_system(model.georeference)}; convert the lines, as by ogr2ogr -t_srs"
+        )
+    units = [str(georeference.get("unit")) for georeference in (given.georeference, model.georeference)]
+    metres = [metres_of(unit) for unit in units]
+    if all(metres) and metres[0] != metres[1]:
+        raise ModelError(
+            f"{given.name}: is in {units[0]}, and {model.name} in {units[1]}; export the lines in the unit of the model"
         )
     n_soft = sum(line.shape[1] == 2 for line in given.lines)
     if n_soft and not (model.rotation[2] == (0.0, 0.0, 1.0)).all():

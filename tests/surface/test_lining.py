@@ -389,6 +389,15 @@ def test_lines_without_heights_need_heights_along_z():
     assert_allclose(np.array(chains(turned))[..., [1, 2, 0]], chains(upright), atol=1e-12)
 
 
+def test_lines_in_another_unit_are_refused_where_both_are_known():
+    here = dataclasses.replace(FLAT, georeference={"unit": "metre"})
+    line = (np.array([[1.0, 1], [2, 2]]),)
+    with pytest.raises(ModelError, match=r"^kerbs.xml: is in US survey foot, and grid in metre; export the lines in t"):
+        lined_model(here, SourceLines("kerbs.xml", line, ("line 1",), {"unit": "US survey foot"}), 1)
+    for unit in ({}, {"unit": "meter"}, {"unit": "degree"}):
+        assert lined_model(here, SourceLines("kerbs.xml", line, ("line 1",), unit), 1).lines is not None
+
+
 def test_lines_of_another_reference_system_are_refused():
     here = dataclasses.replace(FLAT, georeference={"epsg": 25832})
     lines = SourceLines("streams.shp", (np.array([[1.0, 1], [2, 2]]),), ("line 1",), {"epsg": 4326})
