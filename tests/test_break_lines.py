@@ -24,10 +24,11 @@ from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.report.figures import BREAK_LINE
 from meshsimp_pymoo.storage import FRONT_COLUMNS, LINES, read_front
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import OF_LINES
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, Rules
-from meshsimp_pymoo.surface.smallest import smallest_mesh, tolerance_for
+from meshsimp_pymoo.surface.smallest import facts_of_lines, smallest_mesh, tolerance_for
 
 # A line across the hill that winds: 21 vertices, of which some tolerance leaves few.
 T = np.linspace(-0.9, 0.9, 21)
@@ -303,7 +304,7 @@ def test_plots_show_the_lines(front):
     assert drawn(plot_mesh(front.problem, Figure().subplots())) == given
     assert drawn(solution.plot_error(Figure().subplots(), bar=False)) == given
     assert drawn(solution.plot(Figure().subplots(), lines=False)) == []
-    assert drawn(plot_mesh("roof:5" and MeshProblem("roof:5"), Figure().subplots())) == []
+    assert drawn(plot_mesh(MeshProblem("roof:5"), Figure().subplots())) == []
 
 
 # -------------------------------------------------------------------------------------------------- python, experiments
@@ -327,6 +328,8 @@ def test_an_experiments_file_lies_in_the_folder_of_the_models_and_is_told_by_its
     again = read_model(tmp_path, relative, entry.model.hash)
     for one, other in zip(again.lines.arrays().values(), entry.model.lines.arrays().values(), strict=True):
         np.testing.assert_array_equal(one, other)
+    surface = HeightSurface(again)
+    assert facts_of_lines(surface, again.lines)["vertices"] == sum(map(len, again.lines.originals))
     config.write_text(config.read_text().replace("winding", "../winding"))
     with pytest.raises(ConfigError, match="leads out of the folder"):
         read_experiment_file(config)
