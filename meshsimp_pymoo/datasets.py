@@ -87,7 +87,7 @@ def load(name: str, /, **parameters: float) -> SourceMesh:
 
 
 def load_lines(name: str, /, **parameters: float) -> SourceLines:
-    """Make the break lines that a built-in model has, for ``break_lines=``.
+    """Make the break lines that a built-in model has; ``break_lines=`` takes their ``lines``.
 
     Parameters
     ----------

@@ -236,6 +236,8 @@ PARTS = (
 SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
 #: What free meshes need besides.
 FREE = ("free meshes",)
+#: What break lines need besides: their errors are measured as scores are.
+LINED = ("break lines", "scores")
 #: What a search for one mesh needs: its first answer is inserted.
 WISH = (*SEARCH, "insertion")
 

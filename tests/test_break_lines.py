@@ -24,10 +24,11 @@ from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.report.figures import BREAK_LINE
 from meshsimp_pymoo.storage import FRONT_COLUMNS, LINES, read_front
+from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import OF_LINES
-from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.surface.smallest import smallest_mesh, tolerance_for
+from meshsimp_pymoo.surface.rules import FOOTPRINTS, Rules
+from meshsimp_pymoo.surface.smallest import facts_of_lines, smallest_mesh, tolerance_for
 
 # A line across the hill that winds: 21 vertices, of which some tolerance leaves few.
 T = np.linspace(-0.9, 0.9, 21)
@@ -231,16 +232,18 @@ def test_the_shell_says_what_lines_are_and_what_they_ask_of_every_mesh(problem, 
     assert json.loads(capsys.readouterr().out)["line_mean_error"] == pytest.approx(best.line_mean_error, abs=1e-9)
 
 
-def test_a_wish_below_what_lines_allow_is_told_which_tolerance_would(problem, file, tmp_path, capsys):
+@pytest.mark.parametrize("footprint", FOOTPRINTS)
+def test_a_wish_below_what_lines_allow_is_told_which_tolerance_would(problem, file, tmp_path, capsys, footprint):
     given = ["--break-lines", str(file), "--line-tolerance", f"{problem.surface.rules.line_tolerance!r}"]
     smallest = smallest_mesh(problem.surface)
     out = tmp_path / "out"
-    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest - 1), "-q"]) == 1
+    footprint = ["--footprint", footprint]
+    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest - 1), "-q", *footprint]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"the smallest mesh of {MODEL} has {smallest} triangles; --line-tolerance " in line
     assert line.endswith(f"would allow {smallest - 1}")
     assert not out.exists()
-    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", "2", "-q"]) == 1
+    assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", "2", "-q"]) == 2
     assert "no tolerance allows 2: leave some of the lines out" in capsys.readouterr().err
     how = ["--moves", "1000", "--no-page", "--meshes", "none", "-q"]
     assert main(["simplify", MODEL, "-o", str(out), *given, "--triangles", str(smallest), *how]) == 0
@@ -301,7 +304,7 @@ def test_plots_show_the_lines(front):
     assert drawn(plot_mesh(front.problem, Figure().subplots())) == given
     assert drawn(solution.plot_error(Figure().subplots(), bar=False)) == given
     assert drawn(solution.plot(Figure().subplots(), lines=False)) == []
-    assert drawn(plot_mesh("roof:5" and MeshProblem("roof:5"), Figure().subplots())) == []
+    assert drawn(plot_mesh(MeshProblem("roof:5"), Figure().subplots())) == []
 
 
 # -------------------------------------------------------------------------------------------------- python, experiments
@@ -325,6 +328,8 @@ def test_an_experiments_file_lies_in_the_folder_of_the_models_and_is_told_by_its
     again = read_model(tmp_path, relative, entry.model.hash)
     for one, other in zip(again.lines.arrays().values(), entry.model.lines.arrays().values(), strict=True):
         np.testing.assert_array_equal(one, other)
+    surface = HeightSurface(again)
+    assert facts_of_lines(surface, again.lines)["vertices"] == sum(map(len, again.lines.originals))
     config.write_text(config.read_text().replace("winding", "../winding"))
     with pytest.raises(ConfigError, match="leads out of the folder"):
         read_experiment_file(config)

@@ -24,7 +24,6 @@ from meshsimp_pymoo.cli.results import WAIT_SECONDS, hand_over, hand_over_stored
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
     INTERRUPTED,
-    TARGET_MISSED,
     WRITING,
     Stages,
     answering,
@@ -67,9 +66,9 @@ from meshsimp_pymoo.storage import (
 )
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import MEASURES
-from meshsimp_pymoo.surface.smallest import smallest_mesh, tolerance_for
+from meshsimp_pymoo.surface.smallest import tolerance_for
 from meshsimp_pymoo.surface.surface import Refitted
-from meshsimp_pymoo.warming import FREE, SEARCH, WISH
+from meshsimp_pymoo.warming import FREE, LINED, SEARCH, WISH
 
 # Seconds that freeing a front is thought to take where nobody says how long.
 FREEING_SECONDS = 15.0
@@ -117,6 +116,8 @@ def _simplify(request: Request, shown: Stages) -> int:
     parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
     if output.refit or request.free.no_centroids:
         parts.append("scores")
+    if request.rules.break_lines is not None:
+        parts.extend(LINED)
     with compiling(parts, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
@@ -125,8 +126,6 @@ def _simplify(request: Request, shown: Stages) -> int:
         compiled.finish()
         request = replace(request, wish=request.wish.among(lambda: len(problem.model.faces)))
         _refuse_impossible(problem, request.wish, quiet=output.quiet)
-        if _lines_forbid(problem, request.wish):
-            return TARGET_MISSED
     if search.time is not None:
         seconds = _search_seconds(request, search.time)
         shown.expect("freeing", (1.0 - SUBSETS_SHARE) * seconds if request.is_freed else 0.0)
@@ -181,6 +180,12 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
         )
     # With open bays, more vertices can mean fewer triangles, but never none.
     bays = problem.surface.rules.footprint != "hull"
+    if problem.model.lines is not None and wish.triangles is not None and wish.triangles < bare.triangles:
+        said = _below_lines(problem, wish.triangles, bare.triangles)
+        if not bays or problem.model.footprint.side == 0:
+            raise UsageError(said)
+        if not quiet:
+            say(f"{said}; looking for one all the same, as open bays may allow it")
     least = max(1, min(bare.triangles, 2)) if bays else bare.triangles
     if wish.triangles is not None and wish.triangles < least:
         raise UsageError(
@@ -195,27 +200,19 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
         say(f"even all {problem.n_var:,} vertices together have {said}; looking for what comes nearest")
 
 
-def _lines_forbid(problem: MeshProblem, wish: Wish) -> bool:
-    """Say, where a mesh is wished for that is smaller than break lines allow, which tolerance would; tell whether so.
-
-    Where bays stay open, a mesh of more vertices may have fewer triangles; then it is said, and searched all the same.
-    """
-    surface = problem.surface
-    if wish.triangles is None or problem.model.lines is None:
-        return False
+def _below_lines(problem: MeshProblem, wished: int, smallest: int) -> str:
+    """Return that a mesh is wished for that is smaller than break lines allow, and which tolerance would allow it."""
+    surface, lines = problem.surface, problem.model.lines
     assert isinstance(surface, HeightSurface)
-    smallest = smallest_mesh(surface)
-    if wish.triangles >= smallest:
-        return False
-    tolerance = tolerance_for(surface, wish.triangles) if surface.rules.break_lines is not None else None
-    way_out = f"no tolerance allows {wish.triangles:,}: leave some of the lines out"
+    assert lines is not None
+    tolerance = tolerance_for(surface, wished) if surface.rules.break_lines is not None else None
+    way_out = f"no tolerance allows {wished:,}: leave some of the lines out"
     if tolerance is not None:
-        way_out = f"--line-tolerance {tolerance:g} would allow {wish.triangles:,}"
-    say(
-        f"--triangles {wish.triangles}: with break lines within {problem.model.lines.tolerance:g} the smallest mesh of "
+        way_out = f"--line-tolerance {tolerance:g} would allow {wished:,}"
+    return (
+        f"--triangles {wished}: with break lines within {lines.tolerance:g} the smallest mesh of "
         f"{problem.model.name} has {smallest:,} triangles; {way_out}"
     )
-    return surface.rules.footprint == "hull" or problem.model.footprint.side == 0
 
 
 # ----------------------------------------------------------------------------------------------------------- the search

@@ -130,7 +130,9 @@ def _write_lines(path: Path, lines: SourceLines) -> None:
     """Write a feature for each line, one in a row of the file, with its name."""
     import json
 
-    number = lines.georeference.get("epsg")
+    from meshsimp_pymoo.formats.source.metric import epsg_number
+
+    number = epsg_number(lines.georeference)
     named = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{number}"}}
     head = '{"type": "FeatureCollection",' + (f' "crs": {json.dumps(named)},' if number else "")
     features = [

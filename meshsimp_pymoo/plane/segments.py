@@ -227,7 +227,8 @@ def along_faces(
         [_height_in(xy[held], z[held], ends[:, :2] + (ends[:, 2:] - ends[:, :2]) * t[:, None]) for t in spans.T]
     )
     starts = np.searchsorted(pairs[:, 0], np.arange(len(segments) + 1))
-    close = 2.0 * reach / np.hypot(*(segments[:, 2:] - segments[:, :2]).T)
+    # the ends of a segment are two stops, however short it is
+    close = np.minimum(2.0 * reach / np.hypot(*(segments[:, 2:] - segments[:, :2]).T), 0.25)
     most = 2 * len(pairs)
     segment, at, height = np.empty(most, np.int64), np.empty(most), np.empty(most)
     goes_on = np.empty(most, np.bool_)

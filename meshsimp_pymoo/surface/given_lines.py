@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,9 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.formats.outmesh import metres_of
 from meshsimp_pymoo.formats.source.lines import SourceLines, build_lines, spelled_name
+from meshsimp_pymoo.formats.source.metric import systems_differ
 from meshsimp_pymoo.formats.table import read_lines
 from meshsimp_pymoo.plane.chains import chains
 from meshsimp_pymoo.plane.faces import edge_table
@@ -21,11 +21,6 @@ from meshsimp_pymoo.surface.orient import area_vectors
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.rules import OUTLINE, SHARP, meant_word_for_lines
 from meshsimp_pymoo.surface.units import reference_system
-
-_PARAMETER = re.compile(r'\bPARAMETER\s*\[\s*"[^"]*"\s*,\s*([-+.\deE]+)')
-_NUMBER = re.compile(r'(?:AUTHORITY\s*\[\s*"EPSG"\s*,\s*"?(\d+)"?\s*\]|ID\s*\[\s*"EPSG"\s*,\s*(\d+)\s*\])\s*\]\s*$')
-_IS_COMPOUND = re.compile(r"\s*COMP(?:D_CS|OUNDCRS)\b")
-_IS_PROJECTED = re.compile(r"\bPROJ(?:CS|CRS|ECTEDCRS)\s*\[")
 
 
 def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
@@ -41,8 +36,8 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
     Raises
     ------
     ModelError
-        If the file cannot be read, the reference systems differ, these are no lines, or the lines have no heights and
-        the model's are not along the file's z.
+        If the file cannot be read, the reference systems or units differ, these are no lines, or the lines have no
+        heights and the model's are not along the file's z.
     """
     if isinstance(given, (str, os.PathLike)):
         word = meant_word_for_lines(given)
@@ -58,6 +53,12 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
             f"{given.name}: is in {reference_system(given.georeference)}, and {model.name} in "
             f"{reference_system(model.georeference)}; convert the lines, as by ogr2ogr -t_srs"
         )
+    units = [str(georeference.get("unit")) for georeference in (given.georeference, model.georeference)]
+    metres = [metres_of(unit) for unit in units]
+    if all(metres) and metres[0] != metres[1]:
+        raise ModelError(
+            f"{given.name}: is in {units[0]}, and {model.name} in {units[1]}; export the lines in the unit of the model"
+        )
     n_soft = sum(line.shape[1] == 2 for line in given.lines)
     if n_soft and not (model.rotation[2] == (0.0, 0.0, 1.0)).all():
         raise ModelError(
@@ -65,41 +66,6 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
             f"along {model.up.round(6).tolist()}, not along the file's z; give x, y and z of each vertex"
         )
     return given
-
-
-def systems_differ(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
-    """Tell whether two georeferences are known to be of different reference systems.
-
-    Where both name their number in the EPSG register it decides; else whether they are projected, and the numbers that
-    define the projections, whatever these are called.
-
-    Examples
-    --------
-    >>> utm = 'PROJCS["WGS_1984_UTM_Zone_{}N",...,PARAMETER["Central_Meridian",{}],PARAMETER["Scale_Factor",0.9996]]'
-    >>> systems_differ({"crs": utm.format(33, 15.0)}, {"crs": utm.format(33, 15)})
-    False
-    >>> systems_differ({"crs": utm.format(33, 15.0)}, {"crs": utm.format(32, 9)})
-    True
-    >>> systems_differ({"epsg": 32633}, {"epsg": 25833}), systems_differ({"epsg": 32633}, {})
-    (True, False)
-    """
-    numbers = [_number(georeference) for georeference in (first, second)]
-    if all(numbers):
-        return numbers[0] != numbers[1]
-    texts = [str(georeference.get("crs") or "") for georeference in (first, second)]
-    if not all(texts):
-        return False
-    kinds = [bool(_IS_PROJECTED.search(text)) for text in texts]
-    defined = [sorted(filter(None, map(float, _PARAMETER.findall(text)))) for text in texts]
-    return kinds[0] != kinds[1] or defined[0] != defined[1]
-
-
-def _number(georeference: Mapping[str, Any]) -> int | None:
-    if georeference.get("epsg"):
-        return int(georeference["epsg"])
-    text = str(georeference.get("crs") or "")
-    found = None if _IS_COMPOUND.match(text) else _NUMBER.search(text)
-    return int(found[1] or found[2]) if found else None
 
 
 def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:

@@ -5,7 +5,9 @@ In this order:
 1. Lines are brought into the model's frame. Vertices within ``SNAP`` of a vertex of the model, or of each other, in the
    plane are at its place.
 2. What lies outside the projection of the original faces is cut off.
-3. A vertex of one line on another (within ``SNAP``) is a vertex of both. Lines that cross otherwise are refused.
+3. A vertex of one line on another (within ``SNAP``) is a vertex of both. Lines that cross otherwise are refused. Where
+   a line with heights passes over a vertex of the model (within ``SNAP``) whose height is off by more than the
+   tolerance, it has a vertex, and keeps one: else the mesh with that vertex would have left the line.
 4. Lines without heights are draped: they get a vertex wherever they cross an edge of the original, so that their
    profile is the surface's.
 5. What is between the places where lines meet or end is thinned (`surface.polylines`). Where thinned lines come to
@@ -113,6 +115,11 @@ class Polylines:
         source = np.where(inner, np.where(self.source[piece] <= BETWEEN_GIVEN, BETWEEN_GIVEN, BETWEEN_DRAPED), 0)
         return xy, z, np.where(inner, source, self.source[near])
 
+    def shares_of(self, piece: IntArray, xy: FloatArray) -> FloatArray:
+        """Return where on the pieces from these vertices on places (n, 2) lie: at 0 and 1 at the ends."""
+        u = self.xy[piece + 1] - self.xy[piece]
+        return np.asarray(((xy - self.xy[piece]) * u).sum(axis=1) / (u**2).sum(axis=1))
+
     def with_vertices(self, piece: IntArray, t: FloatArray, xy: FloatArray, z: FloatArray) -> Polylines:
         """Return the polylines with more vertices in the pieces from these on, at 0 < t < 1."""
         _, _, source = self.between(piece, t)
@@ -184,6 +191,7 @@ class _Lining:
         self.tolerance = tolerance
         self.reach = SNAP * float(np.hypot(*np.ptp(model.xy, axis=0)))
         self.height_reach = SNAP * model.diagonal
+        self.height_tolerance = max(tolerance, self.height_reach)
         self.first = np.unique(highest(model.xy))  # the vertices that carry the surface, one a place
         self.places = cKDTree(model.xy[self.first])
         self.found: dict[str, int] = {}
@@ -211,7 +219,7 @@ class _Lining:
         lines = self._read(break_lines)
         lines = self._distinct(self._snapped(lines), first=True)
         lines = self._distinct(self._snapped(self._cut(lines)))
-        return self._lined(self._draped(self._met(lines)))
+        return self._lined(self._draped(self._met(self._over_samples(lines))))
 
     def _read(self, break_lines: Any) -> Polylines:
         """Bring lines into the model's frame."""
@@ -350,6 +358,22 @@ class _Lining:
 
     # ------------------------------------------------------------------------------------------------- where lines meet
 
+    def _over_samples(self, lines: Polylines) -> Polylines:
+        """Give lines with heights a vertex wherever they pass far above or below a vertex of the model."""
+        places, node = _distinct_places(lines.xy)
+        pieces = lines.pieces
+        pieces = pieces[lines.source[pieces] <= BETWEEN_GIVEN]
+        if len(pieces) == 0:
+            return lines
+        ends = len(self.first) + np.column_stack([node[pieces], node[pieces + 1]])
+        vertex, number = points_on(np.concatenate([self.places.data, places]), ends, self.reach).T
+        vertex, number = vertex[vertex < len(self.first)], number[vertex < len(self.first)]
+        piece, xy = pieces[number], self.places.data[vertex]
+        t = lines.shares_of(piece, xy)
+        _, z, _ = lines.between(piece, t)
+        far = np.abs(z - self.model.points[self.first[vertex], 2]) > self.height_tolerance
+        return lines.with_vertices(piece[far], t[far], xy[far], z[far])
+
     def _met(self, lines: Polylines) -> Polylines:
         """Make vertices of one line on another vertices of both; refuse lines that cross otherwise."""
         places, node = _distinct_places(lines.xy)
@@ -364,8 +388,7 @@ class _Lining:
             within = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
             piece = pieces[order[first[on[which, 1]] + within]]
             xy = places[on[which, 0]]
-            a, u = lines.xy[piece], lines.xy[piece + 1] - lines.xy[piece]
-            t = ((xy - a) * u).sum(axis=1) / (u**2).sum(axis=1)
+            t = lines.shares_of(piece, xy)
             _, z, _ = lines.between(piece, t)
             lines = lines.with_vertices(piece, t, xy, z)
             pieces, ends, number = _segments(lines, np.searchsorted(_keys(places), _keys(lines.xy)))
@@ -437,7 +460,8 @@ class _Lining:
         cuts = np.flatnonzero(np.diff(lines.part)) + 1
         corners = np.flatnonzero(np.isin(at, highest(model.xy)[model.corners]))
         runs = cut_into_runs(np.split(node, cuts), corners)
-        kept = self._thinned(runs, places, points)
+        own = (at >= 0) & (np.abs(z - model.points[at, 2]) > self.height_tolerance) & ~of_model
+        kept = self._thinned(runs, places, points, own)
         chains = runs.joined(kept)
 
         used = np.unique(np.concatenate(chains))
@@ -486,43 +510,46 @@ class _Lining:
             )
         return z, chosen
 
-    def _thinned(self, runs: Runs, places: FloatArray, points: FloatArray) -> list[IntArray]:
-        """Return which vertices of each run stay: few of them, and none so that lines cross or pass each other."""
+    def _thinned(self, runs: Runs, places: FloatArray, points: FloatArray, own: BoolArray) -> list[IntArray]:
+        """Return which vertices of each run stay: few, so that none cross or pass each other, or samples they are over.
+
+        ``own`` says which places have a height so far from that of the model's vertex there that both cannot stand for
+        each other.
+        """
         along = [points[run] for run in runs.runs]
-        kept: list[IntArray] = [
-            np.flatnonzero(stays) for stays in thinned(along, max(self.tolerance, self.height_reach))
-        ]
+        kept: list[IntArray] = [np.flatnonzero(stays) for stays in thinned(along, self.height_tolerance)]
         n_put_back = 0
         while True:
             run = np.repeat(np.arange(len(kept)), [len(at) - 1 for at in kept])
             low = np.concatenate([at[:-1] for at in kept])
             high = np.concatenate([at[1:] for at in kept])
             ends = np.array([(runs.runs[k][a], runs.runs[k][b]) for k, a, b in zip(run, low, high, strict=True)])
+            longer = np.flatnonzero(high - low > 1)
+            back: set[tuple[int, int]] = set()
             pairs = meeting_segments(places, ends)
             if len(pairs) == 0:
-                longer = np.flatnonzero(high - low > 1)
                 rings = [runs.runs[run[s]][low[s] : high[s] + 1] for s in longer]
                 passed = enclosed_points(places, np.unique(ends), rings)
                 pairs = np.unique(longer[passed[:, 1]])[:, None]
-            if len(pairs) == 0:
-                break
-            back: set[tuple[int, int]] = set()
             for segments in pairs:
-                longer = segments[high[segments] - low[segments] > 1]
-                far = [(*farthest_between(along[run[s]], low[s], high[s]), run[s]) for s in longer]
-                if not far:
-                    crossing = np.array([[self._line_of(runs, k) for k in run[segments]]])
-                    raise ModelError(self._crossing(places, ends[segments][None], np.sort(crossing)))
+                # one of them is longer, as pieces of the lines themselves do not cross
+                far = [
+                    (*farthest_between(along[run[s]], low[s], high[s]), run[s])
+                    for s in segments[high[segments] - low[segments] > 1]
+                ]
                 most = max(away for _, away, _ in far)
                 back |= {(k, at) for at, away, k in far if away == most}
+            if len(pairs) == 0 and own.any():
+                for p, s in points_on(places, ends, self.reach):
+                    between = runs.runs[run[s]][low[s] + 1 : high[s]]
+                    back |= {(run[s], low[s] + 1 + at) for at in np.flatnonzero(between == p) if own[p]}
+            if not back:
+                break
             for k, at in back:
                 kept[k] = np.sort(np.append(kept[k], at))
             n_put_back += len(back)
         self.found["put_back_line_vertices"] = n_put_back
         return kept
-
-    def _line_of(self, runs: Runs, run: int) -> int:
-        return next(k for k, parts in enumerate(runs.parts) if any(which == run for which, _ in parts))
 
     def _with_vertices(
         self, xy: FloatArray, points: FloatArray, file_points: FloatArray

@@ -29,8 +29,9 @@ def facts_of_lines(surface: Surface, lines: ModelLines) -> dict[str, Any]:
     found = dict(lines.found)
     return {
         "tolerance": lines.tolerance,
-        "lines": int(found.pop("lines")),
-        "vertices": int(found.pop("line_vertices")),
+        # of lines that were stored nobody knows more than what is left of them
+        "lines": int(found.pop("lines", len(lines.names))),
+        "vertices": int(found.pop("line_vertices", sum(map(len, lines.originals)))),
         "thinned": len(lines.vertices),
         "forced_edges": len(lines.segments),
         "smallest": smallest_mesh(surface),

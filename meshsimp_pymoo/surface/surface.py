@@ -19,7 +19,8 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, spread
 from meshsimp_pymoo.formats.material import Material
-from meshsimp_pymoo.plane.faces import canonical_faces, is_canonical, used_rows
+from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.faces import canonical_faces, edge_table, is_canonical, used_rows
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_LINES, OF_MESH, Quality
 from meshsimp_pymoo.surface.rules import Rules
@@ -470,24 +471,50 @@ def mesh_lines(surface: Surface, faces: IntArray) -> tuple[tuple[IntArray, ...],
     Returns
     -------
     chains : tuple of (m,) int array
-        The vertices of each line in order, as rows of the surface's points; where a mesh does not reach them all, the
-        parts of two or more. None without break lines.
+        The vertices of each line in order, as rows of the surface's points. Along the hull, where slivers are left out,
+        they go through what lies on the line but for rounding; what the footprint cuts off leaves parts of a line, or
+        none. Empty without break lines.
     names : tuple of str
         What messages call each of them.
     """
     lines = getattr(surface.model, "lines", None)  # which a surface of another kind need not have
     if lines is None:
         return (), ()
-    used = np.zeros(surface.n_vertices, bool)
+    n = surface.n_vertices
+    used = np.zeros(n, bool)
     used[np.asarray(faces)] = True
+    sides = edge_table(np.asarray(faces)).ends
+    known = np.sort(sides[:, 0] * n + sides[:, 1])
     parts, names = [], []
-    for chain, name in zip(surface.line_chains(used), lines.names, strict=True):  # type: ignore[attr-defined]
-        ends = np.flatnonzero(np.diff(used[chain], prepend=False, append=False))
+    for line, name in zip(surface.line_chains(used), lines.names, strict=True):  # type: ignore[attr-defined]
+        chain = line
+        is_there = _are_edges(chain, known, n)
+        for k in np.flatnonzero(~is_there)[::-1]:
+            chain = np.insert(chain, k + 1, _beside(surface.points[:, :2], used, *line[k : k + 2]))
+        is_there = _are_edges(chain, known, n)
+        ends = np.flatnonzero(np.diff(is_there, prepend=False, append=False))
         for first, last in zip(ends[::2], ends[1::2], strict=True):
-            if last - first >= 2:
-                parts.append(chain[first:last])
-                names.append(name)
+            parts.append(chain[first : last + 1])
+            names.append(name)
     return tuple(parts), tuple(names)
+
+
+def _are_edges(chain: IntArray, known: IntArray, n: int) -> BoolArray:
+    """Tell which steps of a chain of m of n vertices are among the edges with these numbers, ascending: (m - 1,)."""
+    low, high = np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1).T
+    key = low * n + high
+    return known[np.minimum(np.searchsorted(known, key), len(known) - 1)] == key
+
+
+def _beside(xy: FloatArray, used: BoolArray, a: int, b: int) -> IntArray:
+    """Return the vertices used that lie on the segment between two of them (N, 2), but for rounding, in order."""
+    rows = np.setdiff1d(np.flatnonzero(used), (a, b))
+    u, v = xy[b] - xy[a], xy[rows] - xy[a]
+    length = float(np.hypot(*u))
+    t, away = v @ u / length**2, np.abs(v[:, 0] * u[1] - v[:, 1] * u[0]) / length
+    # a sliver that goes exposes the next one, so several may lie one on the other
+    near = (away <= 4.0 * SLIVER_HEIGHT * float(np.hypot(*np.ptp(xy, axis=0)))) & (t > 0.0) & (t < 1.0)
+    return rows[near][np.argsort(t[near], kind="stable")]
 
 
 def require_rules(surface: Any, who: str) -> None:

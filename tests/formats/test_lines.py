@@ -268,6 +268,13 @@ def test_a_crs_member_is_read(tmp_path, spelled, facts):
     assert read_lines(path).georeference == facts
 
 
+def test_a_number_that_only_the_text_of_a_reference_system_says_is_written_too(tmp_path):
+    """Without it GDAL takes a GeoJSON for degrees."""
+    text = 'PROJCS["ETRS89 / UTM zone 32N",PARAMETER["central_meridian",9],AUTHORITY["EPSG","25832"]]'
+    write_lines(tmp_path / "a.geojson", SourceLines("a", (HARD,), ("line 1",), {"crs": text}))
+    assert read_lines(tmp_path / "a.geojson").georeference == {"epsg": 25832}
+
+
 def test_geojson_is_written_and_read_back_by_gdal_and_here(tmp_path):
     lines = SourceLines("a", (HARD, SOFT), ("line 1", 'M\u00fchle "a"'), SYSTEM)
     write_lines(tmp_path / "a.geojson", lines)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,9 +17,11 @@ from test_nasty import walk
 
 from meshsimp_pymoo import MeshProblem, Moves, memetic
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
+from meshsimp_pymoo.surface.surface import mesh_lines
 
 # Lattices, where vertices lie on lines, clouds, where none do; hubs, gaps, twins, slivers at the hull.
 MODELS = [
@@ -121,6 +124,40 @@ def test_chains_of_lines_are_edges_of_every_mesh(share):
         kept = lined.pinned | (rng.random(lined.n_vertices) < share)
         assert forced_edges_of(lined, lined.triangles(kept))
     assert max(len(chain) for chain in lined.line_chains(np.ones(lined.n_vertices, bool))) > 2
+
+
+def steps_of(chains):
+    return [frozenset(pair) for chain in chains for pair in itertools.pairwise(chain.tolist())]
+
+
+@pytest.mark.parametrize("turn", [17.3, 30.0])
+def test_lines_of_a_mesh_are_its_edges_where_slivers_along_the_hull_go(turn):
+    """The sides of a turned grid are straight but for rounding, so vertices lie a little beside a line along them."""
+    grid = load("plane:17")
+    sine, cosine = np.sin(np.radians(turn)), np.cos(np.radians(turn))
+    points = grid.points @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    lined = surface(build_model(replace(grid, points=points)), break_lines="outline", line_tolerance=0.1)
+    rng = np.random.default_rng(4)
+    for share in (0.0, 0.05, 0.2, 1.0):
+        faces = lined.triangles(lined.pinned | (rng.random(lined.n_vertices) < share))
+        ((chain,), _) = mesh_lines(lined, faces)
+        assert chain[0] == chain[-1] == lined.model.lines.chains[0][0]
+        assert set(lined.model.lines.chains[0]) <= set(chain)
+        table = edge_table(faces)
+        border = {frozenset(pair) for pair in table.ends[table.n_triangles == 1].tolist()}
+        assert set(steps_of([chain])) == border
+
+
+def test_what_the_footprint_cuts_off_a_line_is_not_said_to_be_in_the_mesh():
+    lined = surface("horseshoe:300", break_lines="outline", line_tolerance=0.05)
+    rng, n_parts = np.random.default_rng(4), 0
+    for _ in range(10):
+        faces = lined.triangles(lined.pinned | (rng.random(lined.n_vertices) < 0.1))
+        chains, names = mesh_lines(lined, faces)
+        n_parts = max(n_parts, len(chains))
+        assert set(names) == {"line 1"}
+        assert set(steps_of(chains)) <= {frozenset(pair) for pair in edge_table(faces).ends.tolist()}
+    assert n_parts > 1
 
 
 @pytest.mark.parametrize("centroids", [False, True])

@@ -26,6 +26,7 @@ from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.lining import lined_model
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.polylines import thinned
+from meshsimp_pymoo.surface.smallest import smallest_mesh
 
 ROOF = build_model(load("roof"))
 FLAT = build_model(grid_source(np.zeros((9, 9)), 1.0, 1.0, origin=(0.0, 8.0)))
@@ -104,17 +105,37 @@ def test_thinning_keeps_to_its_tolerance():
 @pytest.mark.parametrize("up", [1, -1])
 def test_a_line_with_heights_of_its_own_carries_the_surface_at_a_samples_place(up):
     model = lined_model(FLAT, [[[2, 2, 5 * up], [6, 2, 7 * up]]], 0)
-    assert model.n_vertices == 83
-    assert chains(model) == [[[2, 2, 5 * up], [6, 2, 7 * up]]]
+    assert model.n_vertices == 86
+    assert chains(model) == [[[2 + k, 2, (5 + k / 2) * up] for k in range(5)]]
     lined = HeightSurface(model)
-    everything = lined.simplify(np.ones(83, bool))
+    everything = lined.simplify(np.ones(86, bool))
     assert set(model.lines.vertices) <= set(everything.faces.ravel())
     assert everything.quality.line_max_error == 0
     # the samples below do not lie on the mesh, and are still what the error is of
     assert everything.quality.max_error == 7
     assert lined.total_weight == 81
     assert_array_equal(np.flatnonzero(model.weights == 0), model.lines.added)
-    assert_array_equal(np.sort(model.source_index)[-2:], [81, 82])
+    assert_array_equal(np.sort(model.source_index)[-5:], range(81, 86))
+
+
+@pytest.mark.parametrize("turn", [0.0, 20.0])
+def test_no_sample_below_a_line_with_heights_draws_it_down(turn):
+    """A crest over a row of samples; in a turned grid they lie below it but for rounding."""
+    sine, cosine = np.sin(np.radians(turn)), np.cos(np.radians(turn))
+    turned = np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]])
+    grid = grid_source(np.zeros((9, 9)), 1.0, 1.0, origin=(0.0, 8.0))
+    crest = np.array([[0.5, 2, 3.0], [7.5, 2, 3.0]]) @ turned
+    bare = build_model(dataclasses.replace(grid, points=grid.points @ turned))
+    rng = np.random.default_rng(1)
+    for tolerance, n_kept in ((0.0, 9), (2.9, 9), (3.1, 2)):
+        model = lined_model(bare, [crest], tolerance)
+        assert len(model.lines.vertices) == n_kept
+        lined = HeightSurface(model)
+        places = crest[0, :2] + np.linspace(0, 1, 57)[:, None] * (crest[1] - crest[0])[:2]
+        for share in (0.0, 0.3, 1.0):
+            mesh = lined.simplify(lined.pinned | (rng.random(model.n_vertices) < share))
+            heights = height_of(dataclasses.replace(model, faces=mesh.faces), places)
+            assert np.abs(heights - 3.0).max() <= tolerance + 1e-9
 
 
 def test_a_line_above_a_corner_is_the_corner():
@@ -245,6 +266,17 @@ def test_repeated_vertices_and_lines_of_one_place_are_left_out_and_said():
         lined_model(FLAT, [[[3, 3], [3, 3 + 1e-12]]], 1)
 
 
+@pytest.mark.parametrize("short", [1.2e-9, 1.9e-9, 3e-9])
+@pytest.mark.parametrize("width", [2, 3])
+def test_a_line_goes_on_over_the_shortest_of_pieces(short, width):
+    line = np.array([[1.3, 1.2, 1], [3.3, 2.2, 1], [3.3 + short * np.hypot(8, 8), 2.2, 1], [5.1, 6.2, 1]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = lined_model(ROUGH, [line[:, :width]], 0)
+    assert len(model.lines.chains) == 1
+    assert np.isfinite(model.points).all()
+
+
 def wiggly(y):
     x = np.linspace(0.5, 7.5, 141)
     return np.column_stack([x, y + 0.1 * np.sin(4 * x)])
@@ -356,6 +388,15 @@ def test_lines_without_heights_need_heights_along_z():
     upright = lined_model(build_model(grid), [[[1.5, -20.0, 30.0], [5.0, -19.0, 20.0]]], 1)
     turned = lined_model(lying, [[[30.0, 1.5, -20.0], [20.0, 5.0, -19.0]]], 1)
     assert_allclose(np.array(chains(turned))[..., [1, 2, 0]], chains(upright), atol=1e-12)
+
+
+def test_lines_in_another_unit_are_refused_where_both_are_known():
+    here = dataclasses.replace(FLAT, georeference={"unit": "metre"})
+    line = (np.array([[1.0, 1], [2, 2]]),)
+    with pytest.raises(ModelError, match=r"^kerbs.xml: is in US survey foot, and grid in metre; export the lines in t"):
+        lined_model(here, SourceLines("kerbs.xml", line, ("line 1",), {"unit": "US survey foot"}), 1)
+    for unit in ({}, {"unit": "meter"}, {"unit": "degree"}):
+        assert lined_model(here, SourceLines("kerbs.xml", line, ("line 1",), unit), 1).lines is not None
 
 
 def test_lines_of_another_reference_system_are_refused():
@@ -518,6 +559,11 @@ def test_an_embankments_lines_thin_to_a_fifth_and_every_mesh_keeps_them():
     for other in (lined.of_faces(mesh.faces).quality, lined.score(lined.model.file_points, mesh.faces).quality):
         assert other.line_max_error == pytest.approx(quality.line_max_error)
         assert other.line_mean_error == pytest.approx(quality.line_mean_error)
+    # the same vertices with nothing forced are no better; all vertices of the lines leave no small mesh
+    unforced = HeightSurface(dataclasses.replace(lined.model, lines=None))
+    assert quality.error < unforced.simplify(kept).quality.error
+    pinned_all = HeightSurface(lined_model(model, lines, 0.0))
+    assert smallest_mesh(lined) < 0.7 * smallest_mesh(pinned_all)
     # what the error is, from first principles
     sampled = np.concatenate(lined.model.lines.originals)
     own = np.concatenate([np.full(len(line), np.inf) for line in lined.model.lines.originals])

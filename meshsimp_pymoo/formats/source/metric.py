@@ -29,6 +29,10 @@ _VERTICAL = re.compile(r"\bVERT(?:_CS|CRS|ICALCRS)\s*\[")
 _PROJECTED = re.compile(r"\bPROJ(?:CS|CRS|ECTEDCRS)\s*\[")
 _GEOGRAPHIC = re.compile(r"\bGEOG(?:CS|CRS|RAPHICCRS)\s*\[|\bGEOD(?:ETIC)?CRS\s*\[.*\bCS\s*\[\s*ellipsoidal", re.DOTALL)
 
+_PARAMETER = re.compile(rf'\bPARAMETER\s*\[\s*"[^"]*"\s*,\s*({_NUMBER})')
+_REGISTERED = re.compile(r'(?:AUTHORITY\s*\[\s*"EPSG"\s*,\s*"?(\d+)"?\s*\]|ID\s*\[\s*"EPSG"\s*,\s*(\d+)\s*\])\s*\]\s*$')
+_IS_COMPOUND = re.compile(r"\s*COMP(?:D_CS|OUNDCRS)\b")
+
 
 def stated_system(text: str) -> dict[str, Any]:
     """Return the georeference that a text means which names a coordinate reference system; empty: none that is known.
@@ -41,6 +45,46 @@ def stated_system(text: str) -> dict[str, Any]:
     if re.fullmatch(r"(?:urn:ogc:def:crs:)?OGC:(?:1\.3:)?:?CRS84", text, re.IGNORECASE):  # WGS 84, longitude first
         return {"epsg": 4326, "unit": "degree"}
     return {"crs": text} if "[" in text else {}
+
+
+def systems_differ(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
+    """Tell whether two georeferences are known to be of different reference systems.
+
+    Where both name their number in the EPSG register it decides; else whether they are projected, and the numbers that
+    define the projections, whatever these are called.
+
+    Examples
+    --------
+    >>> utm = 'PROJCS["WGS_1984_UTM_Zone_{}N",...,PARAMETER["Central_Meridian",{}],PARAMETER["Scale_Factor",0.9996]]'
+    >>> systems_differ({"crs": utm.format(33, 15.0)}, {"crs": utm.format(33, 15)})
+    False
+    >>> systems_differ({"crs": utm.format(33, 15.0)}, {"crs": utm.format(32, 9)})
+    True
+    >>> systems_differ({"epsg": 32633}, {"epsg": 25833}), systems_differ({"epsg": 32633}, {})
+    (True, False)
+    """
+    numbers = [epsg_number(georeference) for georeference in (first, second)]
+    if all(numbers):
+        return numbers[0] != numbers[1]
+    texts = [str(georeference.get("crs") or "") for georeference in (first, second)]
+    if not all(texts):
+        return False
+    kinds = [bool(_PROJECTED.search(text)) for text in texts]
+    defined = [sorted(filter(None, map(float, _PARAMETER.findall(text)))) for text in texts]
+    return kinds[0] != kinds[1] or defined[0] != defined[1]
+
+
+def epsg_number(georeference: Mapping[str, Any]) -> int | None:
+    """Return the number in the EPSG register of a reference system that is stated by it, or whose text says it.
+
+    >>> epsg_number({"epsg": 25832}), epsg_number({"crs": 'PROJCS["UTM 32",...,AUTHORITY["EPSG","25832"]]'})
+    (25832, 25832)
+    """
+    if georeference.get("epsg"):
+        return int(georeference["epsg"])
+    text = str(georeference.get("crs") or "")
+    found = None if _IS_COMPOUND.match(text) else _REGISTERED.search(text)
+    return int(found[1] or found[2]) if found else None
 
 
 def metres_per_radian(latitude: float, ellipsoid: tuple[float, float] = WGS84) -> tuple[float, float]:
