@@ -15,6 +15,8 @@ from test_nasty import walk
 
 from meshsimp_pymoo import MeshProblem, Moves, memetic
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.source import build_source
+from meshsimp_pymoo.surface.lining import lined_model
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
@@ -120,6 +122,36 @@ def test_chains_of_lines_are_edges_of_every_mesh(share):
         kept = lined.pinned | (rng.random(lined.n_vertices) < share)
         assert forced_edges_of(lined, lined.triangles(kept))
     assert max(len(chain) for chain in lined.line_chains(np.ones(lined.n_vertices, bool))) > 2
+
+
+@pytest.mark.parametrize("name", ["horseshoe", "ring"])
+def test_chains_of_a_thinned_outline_are_edges_of_every_mesh_though_its_triangles_reach_over_bays(name):
+    model = build_model(load(name))
+    rng = np.random.default_rng(1)
+    for tolerance in (0.01, 0.1):
+        lined = surface(lined_model(model, "outline", tolerance * model.diagonal))
+        for share in (0.0, 0.05, 0.3, 1.0):
+            kept = lined.pinned | (rng.random(lined.n_vertices) < share)
+            assert forced_edges_of(lined, lined.triangles(kept))
+            np.testing.assert_array_equal(LiveTriangulation(lined, kept).faces, lined.triangles(kept))
+
+
+def test_a_line_between_two_bays_is_in_the_mesh_though_no_triangle_beside_it_is_inside():
+    """The letter H: both triangles beside a line in its bar have a corner at the end of a leg."""
+    inside = [(x, y) for x, y in itertools.product(range(9), range(18)) if x in (0, 1, 7, 8) or y in (8, 9)]
+    places = {place: k for k, place in enumerate(inside)}
+    faces = []
+    for x, y in places:
+        square = [places.get(place) for place in ((x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1))]
+        if None not in square:
+            faces += [square[:3], [square[0], *square[2:]]]
+    model = build_model(build_source([(x, y, 0.0) for x, y in places], faces))
+    lined = surface(lined_model(model, [[[2, 8.5, 0], [6, 8.5, 0]]], 0.0))
+    faces = lined.triangles(lined.pinned)
+    assert forced_edges_of(lined, faces)
+    ends = np.isin(faces, lined.model.lines.vertices).sum(axis=1)
+    assert (ends == 2).sum() == 1  # that on one side, not both
+    np.testing.assert_array_equal(LiveTriangulation(lined, lined.pinned).faces, faces)
 
 
 @pytest.mark.parametrize("centroids", [False, True])
