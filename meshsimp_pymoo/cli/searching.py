@@ -124,9 +124,9 @@ def _simplify(request: Request, shown: Stages) -> int:
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
         request = replace(request, wish=request.wish.among(lambda: len(problem.model.faces)))
-        _refuse_impossible(problem, request.wish, quiet=output.quiet)
         if _lines_forbid(problem, request.wish):
             return TARGET_MISSED
+        _refuse_impossible(problem, request.wish, quiet=output.quiet)
     if search.time is not None:
         seconds = _search_seconds(request, search.time)
         shown.expect("freeing", (1.0 - SUBSETS_SHARE) * seconds if request.is_freed else 0.0)
@@ -472,10 +472,12 @@ class Keeper:
     @property
     def what(self) -> dict[str, Any]:
         """What the search is: all that decides its results."""
-        search, versions = self.search, package_versions()
+        search, versions, lines = self.search, package_versions(), self.problem.model.lines
         return {
-            "model": self.problem.model.hash,
+            # the lines, of which the model's hash says only that it is another
             **plain(self.problem.surface.rules),
+            **({} if lines is None else {"break lines": lines.hash}),
+            "model": self.problem.model.hash,
             "algorithm": self.request.algorithm,
             **(self.request.wish.limits if self.request.is_targeted else {}),
             "population": search.population,
