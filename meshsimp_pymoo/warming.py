@@ -224,7 +224,8 @@ PARTS = (
         "break lines",
         (
             "plane.segments:_in_faces", "plane.segments:_sweep", "plane.segments:_near", "plane.segments:_meeting",
-            "plane.segments:_enclosed", "plane.constraints:_vertices_on", "surface.polylines:_thin",
+            "plane.segments:_enclosed", "plane.constraints:_vertices_on", "plane.constraints:_lean_left",
+            "surface.polylines:_thin",
         ),
         _lining, 4.0, False,
     ),

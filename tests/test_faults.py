@@ -320,6 +320,19 @@ def test_a_search_with_other_settings_does_not_go_on_from_it(tmp_path, whole, mo
     assert reproducible(tmp_path / "b") == whole
 
 
+def test_a_search_with_other_break_lines_says_which(tmp_path, monkeypatch, capsys):
+    lines = ("--break-lines", "outline")
+    out = stopped(tmp_path / "out", monkeypatch, 3, *lines)
+    capsys.readouterr()
+    for options, words in [
+        ((), "break_lines outline, not None"),
+        ((*lines, "--line-tolerance", "2"), "line_tolerance"),
+    ]:
+        assert simplify(out, *options) == 2
+        assert f"belongs to another search ({words}" in one_line(capsys)
+    assert simplify(out, *lines) == 0
+
+
 def test_a_search_for_a_wish_goes_on_to_the_same_bytes_and_for_another_one_not(tmp_path, monkeypatch, capsys):
     def search(out, *options):
         return run("simplify", "jacksboro:20", "--moves", "4000", *PLAIN, *OFTEN, *options, "-o", out)

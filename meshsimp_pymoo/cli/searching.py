@@ -469,10 +469,12 @@ class Keeper:
     @property
     def what(self) -> dict[str, Any]:
         """What the search is: all that decides its results."""
-        search, versions = self.search, package_versions()
+        search, versions, lines = self.search, package_versions(), self.problem.model.lines
         return {
-            "model": self.problem.model.hash,
+            # the lines, of which the model's hash says only that it is another
             **plain(self.problem.surface.rules),
+            **({} if lines is None else {"break lines": lines.hash}),
+            "model": self.problem.model.hash,
             "algorithm": self.request.algorithm,
             **(self.request.wish.limits if self.request.is_targeted else {}),
             "population": search.population,

@@ -27,12 +27,16 @@ import numpy as np
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.conflict import conflict, turn
+from meshsimp_pymoo.plane.footprint import Footprint, inside
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges, orient_sign
 from meshsimp_pymoo.plane.triangulation import RECORD, TRIANGLE
 
 # Vertices in one leaf of the tree that those on segments are looked for in.
 RUN = 8
+# Where it is asked on which side of a segment more of the original lies: so many places along it, at distances from
+# half its length down, each half the one before.
+ALONG, DEPTHS = 8, 10
 # Marks a twin that is a side of the polygons to be filled, of that number, while they are.
 MARK = 0x80000000
 
@@ -44,9 +48,10 @@ class Constraints(NamedTuple):
     listed: np.ndarray  # their number, then which they are, vertex by vertex
     start: np.ndarray  # (S + 1,) where each segment's vertices are in ``along``
     along: np.ndarray  # the vertices on it, both ends included, from one end to the other
+    left: np.ndarray  # (S,) whether the triangles on its left, as ``along`` lists it, hold it, else those on its right
 
 
-NO_CONSTRAINTS = Constraints(*(np.empty(0, np.int32) for _ in range(4)))
+NO_CONSTRAINTS = Constraints(*(np.empty(0, np.int32) for _ in range(5)))
 
 
 @inner(inline=True)
@@ -65,16 +70,42 @@ def is_forced(lines: Constraints, a: int, b: int) -> bool:
     k = at[a]
     if k < 0 or at[b] < 0:
         return False
-    return _share(lines, k, at[b])
+    return _share(lines, k, at[b]) >= 0
 
 
 @inner
-def _share(lines: Constraints, k: int, m: int) -> bool:
+def _share(lines: Constraints, k: int, m: int) -> int:
+    """Return the first segment in two lists; -1 if there is none."""
     listed = lines.listed
     for i in range(k + 1, k + 1 + listed[k]):
         for j in range(m + 1, m + 1 + listed[m]):
             if listed[i] == listed[j]:
-                return True
+                return int(listed[i])
+    return -1
+
+
+@inner
+def holds_line(xy: np.ndarray, lines: Constraints, a: int, b: int, c: int) -> bool:
+    """Whether a counter-clockwise triangle is in the mesh for the sake of a side that is forced, wherever it lies.
+
+    Both triangles beside a forced edge may be outside the footprint; that on the side where more of the original lies
+    is in the mesh all the same, or the mesh would not have the edge.
+    """
+    at = lines.at
+    if len(at) == 0:
+        return False
+    for _ in range(3):
+        k, m = at[a], at[b]
+        if k >= 0 and m >= 0:
+            s = _share(lines, k, m)
+            if s >= 0:
+                p, q = lines.along[lines.start[s]], lines.along[lines.start[s + 1] - 1]
+                ahead = (xy[2 * q] - xy[2 * p]) * (xy[2 * b] - xy[2 * a]) + (xy[2 * q + 1] - xy[2 * p + 1]) * (
+                    xy[2 * b + 1] - xy[2 * a + 1]
+                )
+                if (ahead > 0.0) == (lines.left[s] != 0):
+                    return True
+        a, b, c = b, c, a
     return False
 
 
@@ -335,7 +366,40 @@ def _vertices_on(xy: np.ndarray, segments: np.ndarray, boxes: np.ndarray, exact_
     return m
 
 
-def make_constraints(xy: FloatArray, segments: IntArray) -> Constraints:
+@entry
+def _lean_left(
+    xy: np.ndarray,
+    segments: np.ndarray,
+    side: int,
+    columns: int,
+    state: np.ndarray,
+    start: np.ndarray,
+    items: np.ndarray,
+    faces: np.ndarray,
+    left: np.ndarray,
+) -> None:
+    """Mark the segments on whose left there is at least as much of the original as on their right."""
+    for s in range(len(segments) if side > 0 else 0):  # else all of the hull is inside, and nobody asks
+        a, b = segments[s, 0], segments[s, 1]
+        ax, ay = xy[2 * a], xy[2 * a + 1]
+        ux, uy = xy[2 * b] - ax, xy[2 * b + 1] - ay
+        more = 0
+        depth = 0.5
+        for _ in range(DEPTHS):
+            for k in range(ALONG):
+                t = (k + 0.5) / ALONG
+                for sign in (1, -1):
+                    x = ax + t * ux - sign * depth * uy
+                    y = ay + t * uy + sign * depth * ux
+                    # in the box of the model, which the cells cover
+                    if 0.0 <= x < (columns - 1) / side and 0.0 <= y < (len(state) // columns - 1) / side:
+                        if inside(xy, side, columns, state, start, items, faces, 3.0 * x, 3.0 * y):
+                            more += sign
+            depth *= 0.5
+        left[s] = more >= 0
+
+
+def make_constraints(xy: FloatArray, segments: IntArray, footprint: Footprint | None = None) -> Constraints:
     """Return segments between vertices as the compiled functions want them.
 
     Parameters
@@ -344,6 +408,8 @@ def make_constraints(xy: FloatArray, segments: IntArray) -> Constraints:
         The vertices along a curve: multiples of 2**-52 in [0, 1].
     segments : (S, 2) int array
         Their ends, at different places. They may meet, and lie on each other, but must not cross.
+    footprint : Footprint, optional
+        That of the original, where it decides which triangles are in a mesh.
 
     Examples
     --------
@@ -374,4 +440,7 @@ def make_constraints(xy: FloatArray, segments: IntArray) -> Constraints:
     at = np.full(len(xy), -1, np.int32)
     at[on] = first + np.arange(len(on))
     listed = np.insert(segment[order], first, count)
-    return Constraints(at, listed.astype(np.int32), by_segment.astype(np.int32), along.astype(np.int32))
+    left = np.ones(len(segments), np.int32)
+    if footprint is not None:
+        _lean_left(flat, segments, *footprint, left)
+    return Constraints(at, listed.astype(np.int32), by_segment.astype(np.int32), along.astype(np.int32), left)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
+from meshsimp_pymoo.plane.constraints import Constraints, holds_line
 from meshsimp_pymoo.plane.footprint import inside
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE
 
@@ -53,10 +54,15 @@ def emit(
     start: np.ndarray,
     items: np.ndarray,
     faces: np.ndarray,
+    lines: Constraints,
+    sites: np.ndarray,
     emitted: np.ndarray,
     stack: np.ndarray,
 ) -> int:
-    """Mark the mesh's triangles: no ghosts, no slivers at the hull, none outside the footprint; return their number."""
+    """Mark the mesh's triangles: no ghosts, no slivers at the hull, none outside the footprint; return their number.
+
+    What holds a forced edge in the mesh counts as inside. ``sites`` are the vertices of the model that ``xy`` lists.
+    """
     for t in range(0, end, RECORD):
         emitted[t // RECORD] = 0 if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX else 1
     for ghost in range(0, end, RECORD):
@@ -85,7 +91,9 @@ def emit(
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
             x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
             y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-            if not inside(model_xy, side, columns, state, start, items, faces, x3, y3):
+            if not inside(model_xy, side, columns, state, start, items, faces, x3, y3) and not holds_line(
+                model_xy, lines, sites[a], sites[b], sites[c]
+            ):
                 emitted[t // RECORD] = 0
                 continue
         n_triangles += 1

@@ -260,6 +260,8 @@ def _evaluate_one(
         ground.start,
         ground.items,
         ground.faces,
+        ground.lines,
+        sites,
         emitted,
         stack,
     )

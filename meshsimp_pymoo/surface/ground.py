@@ -50,7 +50,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
     xy = np.ascontiguousarray(model.xy)
     extent = np.ptp(xy, axis=0)
     area, lift = exact_ranges(xy)
-    footprint = model.footprint
+    footprint, by_footprint = model.footprint, rules.footprint == "model"
     weight = np.empty(0) if model.weights is None else model.weights
     power = OBJECTIVES[rules.measure].power
     return Ground(
@@ -62,13 +62,15 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         min_height=SLIVER_HEIGHT * float(np.hypot(extent[0], extent[1])),
         exact_area=area,
         exact_lift=lift,
-        side=footprint.side if rules.footprint == "model" else 0,
+        side=footprint.side if by_footprint else 0,
         columns=footprint.columns,
         state=footprint.state,
         start=footprint.start,
         items=footprint.items,
         faces=footprint.faces,
-        lines=NO_CONSTRAINTS if model.lines is None else make_constraints(xy, model.lines.segments),
+        lines=NO_CONSTRAINTS
+        if model.lines is None
+        else make_constraints(xy, model.lines.segments, footprint if by_footprint else None),
         boxes=boxes_of_runs(xy, RUN),
         nearest=rules.outside == "nearest",
         weight=weight,

@@ -472,7 +472,7 @@ def mesh_lines(surface: Surface, faces: IntArray) -> tuple[tuple[IntArray, ...],
     -------
     chains : tuple of (m,) int array
         The vertices of each line in order, as rows of the surface's points. Along the hull, where slivers are left out,
-        they go through what lies on the line but for rounding; what the footprint cuts off leaves parts of a line, or
+        they go through what lies on the line but for rounding; where edges are missing all the same, parts are left, or
         none. Empty without break lines.
     names : tuple of str
         What messages call each of them.

@@ -799,6 +799,8 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     page = visit.page
     assert shown(page) == 2
     assert "Break lines: 1 line, 3 vertices thinned to " in page.inner_text("header")
+    assert len(front.model.lines.added) > 0
+    assert "even selection" not in page.inner_text("header")  # all vertices are drawn that the original's faces have
     for name in MEASURES:
         assert number(page, name) == getattr(front[2], name)
     assert "line max error" in page.locator("#measure option").all_inner_texts()

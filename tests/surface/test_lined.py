@@ -17,7 +17,9 @@ from test_nasty import walk
 
 from meshsimp_pymoo import MeshProblem, Moves, memetic
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.formats.source import build_source
 from meshsimp_pymoo.plane.faces import edge_table
+from meshsimp_pymoo.surface.lining import lined_model
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import FOOTPRINTS, OUTSIDES
@@ -148,16 +150,34 @@ def test_lines_of_a_mesh_are_its_edges_where_slivers_along_the_hull_go(turn):
         assert set(steps_of([chain])) == border
 
 
-def test_what_the_footprint_cuts_off_a_line_is_not_said_to_be_in_the_mesh():
-    lined = surface("horseshoe:300", break_lines="outline", line_tolerance=0.05)
-    rng, n_parts = np.random.default_rng(4), 0
-    for _ in range(10):
-        faces = lined.triangles(lined.pinned | (rng.random(lined.n_vertices) < 0.1))
-        chains, names = mesh_lines(lined, faces)
-        n_parts = max(n_parts, len(chains))
-        assert set(names) == {"line 1"}
-        assert set(steps_of(chains)) <= {frozenset(pair) for pair in edge_table(faces).ends.tolist()}
-    assert n_parts > 1
+@pytest.mark.parametrize("name", ["horseshoe", "ring"])
+def test_chains_of_a_thinned_outline_are_edges_of_every_mesh_though_its_triangles_reach_over_bays(name):
+    model = build_model(load(name))
+    rng = np.random.default_rng(1)
+    for tolerance in (0.01, 0.1):
+        lined = surface(lined_model(model, "outline", tolerance * model.diagonal))
+        for share in (0.0, 0.05, 0.3, 1.0):
+            kept = lined.pinned | (rng.random(lined.n_vertices) < share)
+            assert forced_edges_of(lined, lined.triangles(kept))
+            np.testing.assert_array_equal(LiveTriangulation(lined, kept).faces, lined.triangles(kept))
+
+
+def test_a_line_between_two_bays_is_in_the_mesh_though_no_triangle_beside_it_is_inside():
+    """The letter H: both triangles beside a line in its bar have a corner at the end of a leg."""
+    inside = [(x, y) for x, y in itertools.product(range(9), range(18)) if x in (0, 1, 7, 8) or y in (8, 9)]
+    places = {place: k for k, place in enumerate(inside)}
+    faces = []
+    for x, y in places:
+        square = [places.get(place) for place in ((x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1))]
+        if None not in square:
+            faces += [square[:3], [square[0], *square[2:]]]
+    model = build_model(build_source([(x, y, 0.0) for x, y in places], faces))
+    lined = surface(lined_model(model, [[[2, 8.5, 0], [6, 8.5, 0]]], 0.0))
+    faces = lined.triangles(lined.pinned)
+    assert forced_edges_of(lined, faces)
+    ends = np.isin(faces, lined.model.lines.vertices).sum(axis=1)
+    assert (ends == 2).sum() == 1  # that on one side, not both
+    np.testing.assert_array_equal(LiveTriangulation(lined, lined.pinned).faces, faces)
 
 
 @pytest.mark.parametrize("centroids", [False, True])
