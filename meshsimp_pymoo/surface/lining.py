@@ -44,6 +44,8 @@ from meshsimp_pymoo.surface.rules import OUTLINE, is_word_for_lines
 SNAP = SLIVER_HEIGHT
 # The tolerance of lines that a word names, where nothing is said, as a share of the diagonal in space.
 USUAL_TOLERANCE = 1e-3
+# Lines that are on average farther from the surface than this many times its relief are in another unit, or datum.
+SUSPECT_SHARE = 10.0
 # Where a vertex of a line has its height from. Of several at one place the least counts, of equal ones the first.
 GIVEN, BETWEEN_GIVEN, DRAPED, BETWEEN_DRAPED = range(4)
 
@@ -293,7 +295,8 @@ class _Lining:
         model = self.model
         if len(lines.line) == 0:
             raise ModelError(f"{self.what}: holds no line of two places; give one or more")
-        segment, at, _, goes_on = along_faces(lines.ends, model.xy, model.points[:, 2], model.faces, self.reach)
+        segment, at, height, goes_on = along_faces(lines.ends, model.xy, model.points[:, 2], model.faces, self.reach)
+        self._compare_heights(lines, lines.pieces[segment], at, height)
         before = np.zeros(len(at), bool)
         before[1:] = goes_on[:-1] & (segment[1:] == segment[:-1])
         low, high = np.flatnonzero(goes_on & ~before), np.flatnonzero(before & ~goes_on)
@@ -337,6 +340,17 @@ class _Lining:
             np.concatenate([part[begins], part])[order],
             lines.of_lines(piece[begins]),
         )
+
+    def _compare_heights(self, lines: Polylines, piece: IntArray, at: FloatArray, surface: FloatArray) -> None:
+        """Warn of lines with heights that are in another unit or datum, by the surface's where they go along it."""
+        _, z, source = lines.between(piece, at)
+        away = np.abs(z - surface)[source <= BETWEEN_GIVEN]
+        relief = float(np.ptp(self.model.points[:, 2]))
+        if relief and len(away) and away.mean() > SUSPECT_SHARE * relief:
+            warn_of(
+                f"{self.what}: lines with heights lie {away.mean():.4g} off the surface of {self.model.name} on "
+                f"average, whose heights span {relief:.4g}; check the unit and datum of theirs, or give x and y alone"
+            )
 
     def _nothing_inside(self, lines: Polylines) -> str:
         model = self.model
@@ -409,7 +423,7 @@ class _Lining:
         t = ((c[0] - a[0]) * v[1] - (c[1] - a[1]) * v[0]) / turn if turn else 0.5
         x, y = self._in_file(np.array([[*((a + t * u) * self.model.unit), 0.0]]))[0, :2]
         what = f"{first} crosses itself" if lines[k, 0] == lines[k, 1] else f"{first} and {second} cross"
-        more = f" (and there are {len(lines) - 1} more crossings)" if len(lines) > 1 else ""
+        more = f" (the first of {len(lines)} crossings)" if len(lines) > 1 else ""
         return f"{self.what}: {what} at {x:.9g}, {y:.9g}{more}; {self.way_out}"
 
     # ----------------------------------------------------------------------------------------------------- the heights

@@ -587,3 +587,9 @@ def test_an_embankments_lines_thin_to_a_fifth_and_every_mesh_keeps_them():
 def test_a_model_without_lines_of_its_own_is_said():
     with pytest.raises(ModelError, match=r"^roof: has no lines of its own; those that have: embankment"):
         load_lines("roof")
+
+
+def test_lines_far_off_the_surface_are_taken_with_a_warning():
+    model = build_model(load("roof:9"))
+    with pytest.warns(ModelWarning, match=r"lie 99\.3 off the surface of roof:9 on average"):
+        lined_model(model, [[[-0.5, 0.0, 100.0], [0.5, 0.0, 100.0]]], 0.1)
