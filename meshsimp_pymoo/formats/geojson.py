@@ -130,6 +130,8 @@ def _write_lines(path: Path, lines: SourceLines) -> None:
     """Write a feature for each line, one in a row of the file, with its name."""
     import json
 
+    from meshsimp_pymoo.formats.source.lines import given_name
+
     from meshsimp_pymoo.formats.source.metric import epsg_number
 
     number = epsg_number(lines.georeference)
@@ -139,7 +141,7 @@ def _write_lines(path: Path, lines: SourceLines) -> None:
         json.dumps(
             {
                 "type": "Feature",
-                "properties": {"name": called},
+                "properties": {"name": given_name(called)},
                 "geometry": {"type": "LineString", "coordinates": line.tolist()},
             },
             allow_nan=False,

@@ -71,6 +71,8 @@ def _write(path: Path, mesh: OutMesh) -> None:
 
     import numpy as np
 
+    from meshsimp_pymoo.formats.source.lines import given_name
+
     system, unit, _ = UNITS[metres_of(mesh.georeference.get("unit")) or 1.0]  # metres where nothing is known
     measures = {"linearUnit": unit} | MEASURES[system]
     crs = {"epsgCode": str(mesh.georeference.get("epsg") or ""), "ogcWktCode": str(mesh.georeference.get("crs") or "")}
@@ -86,7 +88,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
     places = mesh.vertices[:, [1, 0, 2]].tolist()
     names = mesh.line_names or [""] * len(mesh.lines)
     breaklines = [
-        f"<Breakline{spelled({'brkType': 'standard', 'name': called})}><PntList3D>"
+        f"<Breakline{spelled({'brkType': 'standard', 'name': given_name(called)})}><PntList3D>"
         + " ".join(repr(value) for row in line.tolist() for value in places[row])
         + "</PntList3D></Breakline>"
         for line, called in zip(mesh.lines, names, strict=True)

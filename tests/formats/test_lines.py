@@ -275,6 +275,23 @@ def test_a_number_that_only_the_text_of_a_reference_system_says_is_written_too(t
     assert read_lines(tmp_path / "a.geojson").georeference == {"epsg": 25832}
 
 
+@pytest.mark.parametrize("suffix", ["geojson", "xml"])
+def test_names_of_lines_do_not_grow_from_file_to_file(tmp_path, suffix):
+    def written(path, lines):
+        if suffix == "geojson":
+            write_lines(path, lines)
+        else:
+            write_mesh(path, POINTS, FACES, lines=CHAINS, line_names=lines.names)
+        return read_lines(path)
+
+    first = SourceLines("a", (HARD, SOFT), ("feature 7 (kerb (left))", "polyline #2F (layer toes)"))
+    again = written(tmp_path / f"a.{suffix}", first)
+    kind = {"geojson": "feature", "xml": "break line"}[suffix]
+    assert again.names == (f"{kind} 1 (kerb (left))", f"{kind} 2 (layer toes)")
+    assert written(tmp_path / f"b.{suffix}", again).names == again.names
+    assert b"break line 1" not in (tmp_path / f"b.{suffix}").read_bytes()
+
+
 def test_geojson_is_written_and_read_back_by_gdal_and_here(tmp_path):
     lines = SourceLines("a", (HARD, SOFT), ("line 1", 'M\u00fchle "a"'), SYSTEM)
     write_lines(tmp_path / "a.geojson", lines)

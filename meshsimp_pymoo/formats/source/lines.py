@@ -5,6 +5,7 @@ Each way in ends in :func:`build_lines`, so that lines always have two vertices 
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ from meshsimp_pymoo.reprs import brief
 
 # Of what a file calls a line, in a message.
 LONGEST_NAME = 60
+_SPELLED = re.compile(r"[^(]* \((.+)\)((?:, part \d+)?)")
 
 
 @brief
@@ -107,6 +109,18 @@ def spelled_name(kind: str, number: object, name: object = None) -> str:
     """
     text = "" if name is None else " ".join(printable(name).split())[:LONGEST_NAME]
     return f"{kind} {number} ({text})" if text else f"{kind} {number}"
+
+
+def given_name(called: str) -> str:
+    """Return the name that a line has in its file, by what messages call it; that, where it has none.
+
+    What is written has this name, or names would grow from file to file.
+
+    >>> given_name("feature 12 (Mill Creek)"), given_name("feature 2 (dam (old)), part 3"), given_name("line 3")
+    ('Mill Creek', 'dam (old), part 3', 'line 3')
+    """
+    spelled = _SPELLED.fullmatch(called)
+    return spelled[1] + spelled[2] if spelled else called
 
 
 def part_names(called: str, count: int) -> list[str]:
