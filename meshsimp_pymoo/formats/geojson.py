@@ -131,7 +131,6 @@ def _write_lines(path: Path, lines: SourceLines) -> None:
     import json
 
     from meshsimp_pymoo.formats.source.lines import given_name
-
     from meshsimp_pymoo.formats.source.metric import epsg_number
 
     number = epsg_number(lines.georeference)

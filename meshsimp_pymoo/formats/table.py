@@ -64,6 +64,10 @@ WAYS_OUT = (
         ".shp .gpkg .geojson .json .kml .gml .gpx .gdb",
         "it holds features: make a raster of them (gdal_grid), or save their points as x y z (.xyz)",
     ),
+    (
+        ".xml .landxml",
+        "a surface of LandXML is written, not read: export it as .ply or .obj, or its points as x y z (.xyz), easting first",
+    ),
     (".xls .xlsx .ods", "save the table as .csv, x y z in every line"),
 )
 
@@ -287,7 +291,7 @@ def read_suffixes(sort: str, *, further: bool = True) -> list[str]:
     found = {suffix for suffix, its_sort in stated.items() if its_sort == sort}
     for kind in known:
         if further and kind.sort == sort and kind.further is not None:
-            found |= set(kind.further()) - set(stated)
+            found |= set(kind.further()) - {suffix for other in all_formats() for suffix in other.suffixes}
     return sorted(found)
 
 

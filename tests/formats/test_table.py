@@ -24,8 +24,10 @@ from meshsimp_pymoo.formats.table import (
     Format,
     all_formats,
     described,
+    format_of_input,
     read_lines,
     read_source,
+    read_suffixes,
     register,
     write_lines,
     write_mesh,
@@ -289,12 +291,18 @@ def test_archives_are_not_unpacked(tmp_path, suffix):
         ("contours.shp", "can be break lines of a model: --break-lines FOLDER/contours.shp"),
         ("plan.dxf", "--break-lines FOLDER/plan.dxf"),
         ("tin.xml", "--break-lines FOLDER/tin.xml"),
+        ("tin.xml", "written, not read: export it as .ply or .obj"),
     ],
 )
 def test_what_is_not_read_is_told_the_way_out(tmp_path, name, advice):
     message = refusal(write(tmp_path, name, "1"))
     assert f"unknown suffix {Path(name).suffix.lower()!r}; " in message
     assert advice.replace("FOLDER", str(tmp_path)) in message
+
+
+def test_no_suffix_is_said_to_be_known_and_refused():
+    known = [suffix for sort in SORTS for suffix in read_suffixes(sort)]
+    assert [suffix for suffix in known if format_of_input(f"a{suffix}") is None] == []
 
 
 def test_no_suffix_is_both_read_and_sent_elsewhere():
