@@ -66,7 +66,7 @@ WAYS_OUT = (
     ),
     (
         ".xml .landxml",
-        "a surface of LandXML is written, not read: export it as .ply or .obj, or its points as x y z (.xyz), easting first",
+        "a surface of LandXML is written, not read: export it as .ply or .obj, or its points as x y z (.xyz)",
     ),
     (".xls .xlsx .ods", "save the table as .csv, x y z in every line"),
 )
