@@ -22,6 +22,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.constraints import constrain, place_of
 from meshsimp_pymoo.plane.emission import emit, outline
 from meshsimp_pymoo.plane.faces import canonical_faces
@@ -335,9 +336,10 @@ def _evaluate(
     covered: np.ndarray,
 ) -> int:
     """Fill a row of ``table`` for each subset; return the end of the triangles' records of the last."""
+    g = borrowed(ground)
     end = 0
     for k in range(len(kept)):
-        end = _evaluate_one(ground, workspace, kept[k], table[k], deviation, covered)
+        end = _evaluate_one(g, workspace, kept[k], table[k], deviation, covered)
     return end
 
 
