@@ -28,7 +28,7 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.conflict import conflict, turn
 from meshsimp_pymoo.plane.footprint import Footprint, inside
-from meshsimp_pymoo.plane.nearest import boxes_of_runs
+from meshsimp_pymoo.plane.nearest import DEEPEST, boxes_of_runs, next_leaf
 from meshsimp_pymoo.plane.predicates import exact_ranges, orient_sign
 from meshsimp_pymoo.plane.triangulation import RECORD, TRIANGLE
 
@@ -334,8 +334,7 @@ def _vertices_on(xy: np.ndarray, segments: np.ndarray, boxes: np.ndarray, exact_
     Returns their number.
     """
     n = len(xy) // 2
-    n_leaves = len(boxes) // 2
-    stack = np.empty(64, np.int64)
+    stack = np.empty(DEEPEST, np.int64)
     m = 0
     for s in range(len(segments)):
         a, b = segments[s, 0], segments[s, 1]
@@ -343,18 +342,9 @@ def _vertices_on(xy: np.ndarray, segments: np.ndarray, boxes: np.ndarray, exact_
         low_x, high_x = min(ax, bx), max(ax, bx)
         low_y, high_y = min(ay, by), max(ay, by)
         stack[0] = 1
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if boxes[node, 0] > high_x or boxes[node, 1] < low_x or boxes[node, 2] > high_y or boxes[node, 3] < low_y:
-                continue
-            if node < n_leaves:
-                stack[depth] = 2 * node
-                stack[depth + 1] = 2 * node + 1
-                depth += 2
-                continue
-            for v in range((node - n_leaves) * RUN, min((node - n_leaves + 1) * RUN, n)):
+        leaf, depth = next_leaf(boxes, stack, 1, ax, ay, bx, by, 0.0)
+        while leaf >= 0:
+            for v in range(leaf * RUN, min((leaf + 1) * RUN, n)):
                 x, y = xy[2 * v], xy[2 * v + 1]
                 if not (low_x <= x <= high_x and low_y <= y <= high_y):
                     continue
@@ -363,6 +353,7 @@ def _vertices_on(xy: np.ndarray, segments: np.ndarray, boxes: np.ndarray, exact_
                         found[m, 0] = s
                         found[m, 1] = v
                     m += 1
+            leaf, depth = next_leaf(boxes, stack, depth, ax, ay, bx, by, 0.0)
     return m
 
 

@@ -15,6 +15,8 @@ from meshsimp_pymoo.compiling.functions import inner
 LEAF = 4
 # What rounding may add to a distance in the unit square, of a point to a segment inside a box.
 ROUNDING = 1e-15
+# Nodes that a search has still to visit are at most so many: one for each level of the tree, and one.
+DEEPEST = 64
 
 
 def boxes_of_runs(xy: np.ndarray, run: int) -> np.ndarray:
@@ -52,6 +54,43 @@ def boxes_of_runs(xy: np.ndarray, run: int) -> np.ndarray:
                 column[first:end] = extreme(children[:, 0], children[:, 1])
                 end = first
     return boxes
+
+
+@inner
+def touches_box(boxes: np.ndarray, node: int, ax: float, ay: float, bx: float, by: float, reach: float) -> bool:
+    """Whether the segment a-b comes as near as ``reach`` to a node's box; now and then also where it is farther."""
+    low_x, high_x, low_y, high_y = boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3]
+    if max(ax, bx) < low_x - reach or min(ax, bx) > high_x + reach:
+        return False
+    if max(ay, by) < low_y - reach or min(ay, by) > high_y + reach:
+        return False
+    ux = bx - ax
+    uy = by - ay
+    away = abs(ux * (0.5 * (low_y + high_y) - ay) - uy * (0.5 * (low_x + high_x) - ax))
+    size = abs(ux) * (0.5 * (high_y - low_y) + reach) + abs(uy) * (0.5 * (high_x - low_x) + reach)
+    return away <= size * (1.0 + 1e-9) + 1e-15
+
+
+@inner
+def next_leaf(
+    boxes: np.ndarray, stack: np.ndarray, depth: int, ax: float, ay: float, bx: float, by: float, reach: float
+) -> tuple[int, int]:
+    """Return a leaf whose box the segment a-b comes near, as `touches_box` has it, and what is left to visit.
+
+    Begin with the root, 1, as the one node in ``stack``, which has room for ``DEEPEST``; the leaf is -1 at the end.
+    """
+    n_leaves = len(boxes) // 2
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if not touches_box(boxes, node, ax, ay, bx, by, reach):
+            continue
+        if node >= n_leaves:
+            return node - n_leaves, depth
+        stack[depth] = 2 * node
+        stack[depth + 1] = 2 * node + 1
+        depth += 2
+    return -1, 0
 
 
 @inner

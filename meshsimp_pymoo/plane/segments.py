@@ -14,13 +14,11 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.hilbert import hilbert_keys
-from meshsimp_pymoo.plane.nearest import boxes_of_runs
+from meshsimp_pymoo.plane.nearest import DEEPEST, boxes_of_runs, next_leaf
 from meshsimp_pymoo.plane.predicates import orient_sign
 
 # Things in one leaf of a tree.
 LEAF = 4
-# Nodes that a search has still to visit are at most so many: one for each level of the tree, and one.
-DEEPEST = 64
 
 
 def _along_the_curve(corners: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -37,21 +35,6 @@ def _found(fill: Callable[[IntArray], int], guess: int) -> IntArray:
         rows = np.empty((n, 2), np.int64)
         fill(rows)
     return rows[:n]
-
-
-@inner
-def _touches_box(boxes: np.ndarray, node: int, ax: float, ay: float, bx: float, by: float, reach: float) -> bool:
-    """Whether the segment a-b comes as near as ``reach`` to a node's box; now and then also where it is farther."""
-    low_x, high_x, low_y, high_y = boxes[node, 0], boxes[node, 1], boxes[node, 2], boxes[node, 3]
-    if max(ax, bx) < low_x - reach or min(ax, bx) > high_x + reach:
-        return False
-    if max(ay, by) < low_y - reach or min(ay, by) > high_y + reach:
-        return False
-    ux = bx - ax
-    uy = by - ay
-    away = abs(ux * (0.5 * (low_y + high_y) - ay) - uy * (0.5 * (low_x + high_x) - ax))
-    size = abs(ux) * (0.5 * (high_y - low_y) + reach) + abs(uy) * (0.5 * (high_x - low_x) + reach)
-    return away <= size * (1.0 + 1e-9) + 1e-15
 
 
 # ------------------------------------------------------------------------------------------------------------- in faces
@@ -91,24 +74,14 @@ def _in_faces(
     segments: np.ndarray, faces: np.ndarray, boxes: np.ndarray, reach: float, pairs: np.ndarray, spans: np.ndarray
 ) -> int:
     """List which segments (S, 4) lie in which faces (F, 6), from where to where; return how many pairs there are."""
-    n_leaves = len(boxes) // 2
     stack = np.empty(DEEPEST, np.int64)
     n = 0
     for s in range(len(segments)):
         ax, ay, bx, by = segments[s, 0], segments[s, 1], segments[s, 2], segments[s, 3]
         stack[0] = 1
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if not _touches_box(boxes, node, ax, ay, bx, by, reach):
-                continue
-            if node < n_leaves:
-                stack[depth] = 2 * node
-                stack[depth + 1] = 2 * node + 1
-                depth += 2
-                continue
-            first = (node - n_leaves) * LEAF
+        leaf, depth = next_leaf(boxes, stack, 1, ax, ay, bx, by, reach)
+        while leaf >= 0:
+            first = leaf * LEAF
             for f in range(first, min(first + LEAF, len(faces))):
                 low, high = _clip(segments[s], faces[f], reach)
                 if low <= high:
@@ -118,6 +91,7 @@ def _in_faces(
                         spans[n, 0] = low
                         spans[n, 1] = high
                     n += 1
+            leaf, depth = next_leaf(boxes, stack, depth, ax, ay, bx, by, reach)
     return n
 
 
@@ -254,25 +228,15 @@ def _height_in(corners: FloatArray, z: FloatArray, places: FloatArray) -> FloatA
 
 @entry
 def _near(xy: np.ndarray, ends: np.ndarray, boxes: np.ndarray, reach: float, pairs: np.ndarray) -> int:
-    n_leaves = len(boxes) // 2
     stack = np.empty(DEEPEST, np.int64)
     n = 0
     for i in range(len(xy)):
         x = xy[i, 0]
         y = xy[i, 1]
         stack[0] = 1
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if not _touches_box(boxes, node, x, y, x, y, reach):
-                continue
-            if node < n_leaves:
-                stack[depth] = 2 * node
-                stack[depth + 1] = 2 * node + 1
-                depth += 2
-                continue
-            first = (node - n_leaves) * LEAF
+        leaf, depth = next_leaf(boxes, stack, 1, x, y, x, y, reach)
+        while leaf >= 0:
+            first = leaf * LEAF
             for s in range(first, min(first + LEAF, len(ends))):
                 a, b = ends[s, 0], ends[s, 1]
                 if i == a or i == b:
@@ -289,6 +253,7 @@ def _near(xy: np.ndarray, ends: np.ndarray, boxes: np.ndarray, reach: float, pai
                         pairs[n, 0] = i
                         pairs[n, 1] = s
                     n += 1
+            leaf, depth = next_leaf(boxes, stack, depth, x, y, x, y, reach)
     return n
 
 
@@ -344,30 +309,21 @@ def _meet(xy: np.ndarray, a: int, b: int, c: int, d: int) -> bool:
 
 @entry
 def _meeting(xy: np.ndarray, ends: np.ndarray, boxes: np.ndarray, pairs: np.ndarray) -> int:
-    n_leaves = len(boxes) // 2
     stack = np.empty(DEEPEST, np.int64)
     n = 0
     for i in range(len(ends)):
         a, b = ends[i, 0], ends[i, 1]
         stack[0] = 1
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if not _touches_box(boxes, node, xy[a, 0], xy[a, 1], xy[b, 0], xy[b, 1], 0.0):
-                continue
-            if node < n_leaves:
-                stack[depth] = 2 * node
-                stack[depth + 1] = 2 * node + 1
-                depth += 2
-                continue
-            first = (node - n_leaves) * LEAF
+        leaf, depth = next_leaf(boxes, stack, 1, xy[a, 0], xy[a, 1], xy[b, 0], xy[b, 1], 0.0)
+        while leaf >= 0:
+            first = leaf * LEAF
             for j in range(max(first, i + 1), min(first + LEAF, len(ends))):
                 if _meet(xy, a, b, ends[j, 0], ends[j, 1]):
                     if n < len(pairs):
                         pairs[n, 0] = i
                         pairs[n, 1] = j
                     n += 1
+            leaf, depth = next_leaf(boxes, stack, depth, xy[a, 0], xy[a, 1], xy[b, 0], xy[b, 1], 0.0)
     return n
 
 
@@ -401,7 +357,6 @@ def _enclosed(
     boxes: np.ndarray,
     pairs: np.ndarray,
 ) -> int:
-    n_leaves = len(boxes) // 2
     stack = np.empty(DEEPEST, np.int64)
     n = 0
     for q in range(len(points)):
@@ -409,18 +364,9 @@ def _enclosed(
         x = xy[p, 0]
         y = xy[p, 1]
         stack[0] = 1
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            if not _touches_box(boxes, node, x, y, x, y, 0.0):
-                continue
-            if node < n_leaves:
-                stack[depth] = 2 * node
-                stack[depth + 1] = 2 * node + 1
-                depth += 2
-                continue
-            first = (node - n_leaves) * LEAF
+        leaf, depth = next_leaf(boxes, stack, 1, x, y, x, y, 0.0)
+        while leaf >= 0:
+            first = leaf * LEAF
             for k in range(first, min(first + LEAF, len(starts) - 1)):
                 is_inside = False
                 last = around[starts[k + 1] - 1]
@@ -439,6 +385,7 @@ def _enclosed(
                         pairs[n, 0] = p
                         pairs[n, 1] = k
                     n += 1
+            leaf, depth = next_leaf(boxes, stack, depth, x, y, x, y, 0.0)
     return n
 
 
