@@ -18,6 +18,7 @@ is quick.
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -48,6 +49,9 @@ NO_MEMORY = "the work does not fit into memory; take a part of the model, a smal
 # What Python says where there is no room for the stack of another thread.
 NO_THREAD = "can't start new thread"
 
+# What a signal has broken off. A compiler that was stopped halfway crashes where it is cleared away, so it never is.
+_broken_off: list[BaseException] = []
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -73,9 +77,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         with suppress(OSError, ValueError):  # and Python shall not try again at its end
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OK
-    except KeyboardInterrupt:
-        say("interrupted; nothing is written")
-        return interrupted_code()
+    except KeyboardInterrupt as stopped:
+        return _interrupted(stopped)
     except MemoryError:
         say(NO_MEMORY)
         return BAD_INPUT
@@ -92,11 +95,27 @@ def main(argv: Sequence[str] | None = None) -> int:
 def program() -> NoReturn:
     """Be the shell command: once :func:`main` is done, no signal changes what came of it."""
     sys.unraisablehook = tell_unraisable
+    atexit.register(_end)  # the first that is registered is the last that is called
     give_back_at_once()
     code = main()
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     sys.exit(code)
+
+
+def _interrupted(stopped: BaseException) -> int:
+    _broken_off.append(stopped)
+    say("interrupted; nothing is written")
+    return interrupted_code()
+
+
+def _end() -> None:
+    """End the process without clearing anything away, if a signal has broken something off."""
+    if _broken_off:
+        with suppress(OSError, ValueError):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(interrupted_code())
 
 
 def _open_streams() -> None:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from meshsimp_pymoo.cli.terminal import Stages, say
+from meshsimp_pymoo.cli.terminal import Stages, await_interruption, say
 from meshsimp_pymoo.compiling.store import place, told_of_compiling
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.warming import Warming
@@ -28,7 +28,11 @@ class Compiling:
             return
         before = self.seconds
         with self._shown.stage("compiling", _once(self._warming)):
-            self._warming.finish()
+            try:
+                self._warming.finish()
+            except Exception:
+                await_interruption()  # the compiler may swallow one, and fail of what that has left
+                raise
         self.seconds = before + self._shown.seconds["compiling"]
 
 

@@ -45,6 +45,7 @@ __all__ = [
     "WRITING",
     "Stages",
     "answering",
+    "await_interruption",
     "bar",
     "described",
     "front_in_words",
@@ -212,6 +213,12 @@ def interrupted_code() -> int:
 def is_interrupted() -> bool:
     """Tell whether Ctrl-C or SIGTERM came in this part of the work."""
     return _Signals.part.came > 0
+
+
+def await_interruption() -> None:
+    """Wait for the KeyboardInterrupt that met what can raise nothing, if one did: it is raised in here."""
+    while _Signals.repeated:
+        time.sleep(0.01)
 
 
 def stop_if_interrupted() -> None:
