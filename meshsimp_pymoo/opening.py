@@ -29,9 +29,11 @@ from meshsimp_pymoo.formats.table import (
     refuse_foreign,
 )
 from meshsimp_pymoo.settings import by_name, settings_of, taken
+from meshsimp_pymoo.surface.closed.model import closed_model, topology
 from meshsimp_pymoo.surface.grid import HeightGrid
-from meshsimp_pymoo.surface.model import OpenModel, build_model
-from meshsimp_pymoo.surface.orient import Up, front_patch
+from meshsimp_pymoo.surface.kinds import Model
+from meshsimp_pymoo.surface.model import Mesh, OpenModel, build_model
+from meshsimp_pymoo.surface.orient import Up, front_patch, seen_upright
 from meshsimp_pymoo.surface.repair import Mended, mend
 
 if TYPE_CHECKING:
@@ -41,38 +43,41 @@ if TYPE_CHECKING:
 Source: TypeAlias = "str | os.PathLike[str] | trimesh.Trimesh | SourceMesh"
 
 
-def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenModel:
+def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
     """Read, check and orient a mesh.
 
     Parameters
     ----------
-    model : path, built-in name, trimesh.Trimesh, SourceMesh or OpenModel
-        The mesh; a file wins over a built-in model of the same name, and an :class:`OpenModel` is returned as it is.
+    model : path, built-in name, trimesh.Trimesh, SourceMesh, OpenModel or ClosedModel
+        The mesh; a file wins over a built-in model of the same name, and a model is returned as it is.
     options : Options
         How it is read; what cannot apply (see :func:`applicable`) is refused.
 
     Returns
     -------
-    OpenModel
+    OpenModel or ClosedModel
+        What ``options.surface`` says; with ``"auto"`` a closed one where the mesh is no height field, but closed and of
+        genus 0.
 
     Raises
     ------
     ModelError
-        If it cannot be read or is no open height field; the message names the cause and the way out.
+        If it cannot be read, or is neither; the message names the cause and the way out.
     TypeError
         If it is nothing of that kind.
 
     Warns
     -----
     ModelWarning
-        Of what was mended, of what a patch leaves out and of what is doubtful, with the numbers.
+        Of what was mended, of what a patch leaves out, of what is doubtful, with the numbers, and that a surface is
+        taken as a closed one.
 
     Examples
     --------
     >>> open_model("roof:3").n_vertices, len(open_model("roof:3").faces)
     (9, 8)
     """
-    if isinstance(model, OpenModel):
+    if isinstance(model, Mesh):
         if options != DEFAULT:
             raise ModelError(
                 f"{model.name}: is a model that was read already, so that nothing can be said of how to read it; leave "
@@ -80,11 +85,51 @@ def open_model(model: Source | OpenModel, options: Options = DEFAULT) -> OpenMod
             )
         return model
     source, mended = mended_source(model, options)
-    built = build_model(source, up=options.up)
+    built: Model
+    if kind_of(source, options) == "closed":
+        built = closed_model(source)
+        if options.surface == "auto":
+            warn_of(
+                f"{source.name}: is no height field but a closed surface, and is taken as one (--surface closed "
+                "(surface='closed') says so; --patch front (patch='front') takes one side of it)"
+            )
+    else:
+        built = build_model(source, up=options.up)
     if mended != Mended():
         warn_of(f"{source.name}: {mended} (--repair none (repair='none') leaves them)")
         built = replace(built, found=built.found | {f"faces_{what}": n for what, n in vars(mended).items() if n})
     return built
+
+
+def kind_of(source: SourceMesh, options: Options = DEFAULT) -> str:
+    """Return what a mesh is taken for, "height" or "closed": what the options say, else what it passes for.
+
+    A mesh that passes for neither is a height field, whose refusal says why.
+
+    Raises
+    ------
+    ModelError
+        If the options say that it is closed, and something else that only height fields have.
+    """
+    side = next((name for name in ("patch", "up") if getattr(options, name) != getattr(DEFAULT, name)), None)
+    if options.surface == "closed" and side is not None:
+        value = getattr(options, side)
+        raise ModelError(
+            f"{source.name}: --{side} {value} ({side}={value!r}) describes height surfaces, and --surface closed "
+            f"(surface='closed') a closed one; leave one of them out"
+        )
+    if options.surface != "auto":
+        return options.surface
+    if side is not None or source.sort != "mesh" or source.up is not None:
+        return "height"
+    what = topology(source.faces)
+    if not what.is_sphere:
+        return "height"
+    try:
+        refused = seen_upright(source.measured, options.up)[1].refusal is not None
+    except ModelError:
+        refused = True
+    return "closed" if refused else "height"
 
 
 def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
@@ -134,10 +179,10 @@ def _patch(source: SourceMesh, up: Up) -> SourceMesh:
 def applicable(model: Any, options: Options) -> Options:
     """Return how a model is read as far as that applies to what it is given as, the other settings by default.
 
-    All of it applies to a file; what does not describe a sort of files (``up``, ``patch``, ``repair``, ``scale``) to a
-    mesh that is in memory or built in; nothing to an OpenModel, which was read already.
+    All of it applies to a file; what does not describe a sort of files (``surface``, ``up``, ``patch``, ...) to a
+    mesh that is in memory or built in; nothing to a model, which was read already.
     """
-    if isinstance(model, OpenModel):
+    if isinstance(model, Mesh):
         return DEFAULT
     if isinstance(model, (str, os.PathLike)) and _is_file(model):
         return options
@@ -155,7 +200,7 @@ def _source_of(model: Source, options: Options) -> SourceMesh:
         source, what = from_trimesh(model), "a mesh in memory"
     else:
         raise TypeError(
-            "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh or an OpenModel, "
+            "a model is a path, a built-in name, a trimesh.Trimesh, a SourceMesh, an OpenModel or a ClosedModel, "
             f"not {type(model).__name__}"
         )
     if given := [name for name in described() if are_given([name], options)]:
@@ -208,7 +253,7 @@ def open_grid(
         if options != DEFAULT:
             raise ModelError(f"{model.name}: is a grid that is open already; say how it is read where it is opened")
         return model
-    if isinstance(model, OpenModel):
+    if isinstance(model, Mesh):
         return _grid_of_model(open_model(model, options), options)
     if not isinstance(model, (str, os.PathLike)):
         _refuse_other_sides("grid", options)
@@ -270,8 +315,12 @@ def _grid_of_heights(name: str, found: PlacedHeights, options: Options) -> Heigh
     )
 
 
-def _grid_of_model(model: OpenModel, options: Options) -> HeightGrid:
+def _grid_of_model(model: Model, options: Options) -> HeightGrid:
     """Find the rows and columns of a model's vertices."""
+    if not isinstance(model, OpenModel):
+        raise NoFullGrid(
+            f"{model.name}: is a closed surface; only a height grid can be cut into tiles: leave the tiles out"
+        )
     x, column = np.unique(model.xy[:, 0], return_inverse=True)
     y, row = np.unique(model.xy[:, 1], return_inverse=True)
     number = (len(y) - 1 - row) * len(x) + column

@@ -24,7 +24,7 @@ from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import by_name, documentation, settings_of, taken
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import Model, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -39,7 +39,6 @@ from meshsimp_pymoo.surface.measures import (
     as_quality,
     checked_objectives,
 )
-from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.surface import Simplified, Surface, mesh_arrays, mesh_lines
 
@@ -92,13 +91,14 @@ class MeshProblem(ElementwiseProblem):
     """Choose the vertices of a mesh to keep: minimise (error, triangles), or other measures of the error.
 
     A solution is a bool vector over the vertices in vector order (see :class:`OpenModel`); its mesh is what the
-    problem's surface makes of it: of an open model the Delaunay triangulation of the kept vertices in the plane. Pinned
+    problem's surface makes of it: of an open model the Delaunay triangulation of the kept vertices in the plane, of a
+    closed one the convex hull of their images on a sphere. Pinned
     vertices belong to every mesh, whether or not the chromosome says so; with ``repair=PinnedCorners()`` it does, which
     keeps duplicates recognisable.
 
     Parameters
     ----------
-    model : path, built-in name, trimesh.Trimesh, SourceMesh, OpenModel or Surface
+    model : path, built-in name, trimesh.Trimesh, SourceMesh, OpenModel, ClosedModel or Surface
         The original mesh. A surface has its rules already.
     SETTINGS
     options : Options, optional
@@ -129,7 +129,7 @@ class MeshProblem(ElementwiseProblem):
     ----------
     surface : Surface
         What a chromosome means: the model with its rules.
-    model : OpenModel
+    model : OpenModel or ClosedModel
         The original mesh; it holds the weights.
     options : Options
         How it was read.
@@ -158,7 +158,7 @@ class MeshProblem(ElementwiseProblem):
     @by_name(Options, Rules)
     def __init__(
         self,
-        model: str | Path | trimesh.Trimesh | SourceMesh | OpenModel | Surface,
+        model: str | Path | trimesh.Trimesh | SourceMesh | Model | Surface,
         *,
         options: Options | None = None,
         rules: Rules | None = None,
@@ -200,7 +200,7 @@ class MeshProblem(ElementwiseProblem):
             measure = (rules or Rules()).measure
             self.objectives = checked_objectives(objectives if objectives is not None else (measure, "triangles"))
             rules = taken(Rules, rules, named | {"measure": self.objectives[0]})
-            self.surface = HeightSurface(open_model(model, self.options), rules)
+            self.surface = surface_of(open_model(model, self.options), rules)
         self.max_triangles = max_triangles
         self.max_objective = max_objective
         self._memo: OrderedDict[bytes, FloatArray] = OrderedDict()

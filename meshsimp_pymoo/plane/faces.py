@@ -60,18 +60,27 @@ def used_rows(faces: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def least_angles(xy: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the least angle of each triangle (M, 3) of vertices (V, 2) in the plane; 0 where it has no area [degrees].
+    """Return the least angle of each triangle (M, 3); 0 where it has no area [degrees].
+
+    The vertices are in the plane (V, 2) or in space (V, 3).
 
     Examples
     --------
     >>> least_angles(np.array([[0.0, 0], [1, 0], [0, 1], [-1, 0]]), np.array([[0, 1, 2], [0, 1, 3]])).tolist()
     [45.0, 0.0]
     """
-    x, y = (np.ascontiguousarray(xy[:, k])[faces.T] for k in (0, 1))
-    dx, dy = x - x[[1, 2, 0]], y - y[[1, 2, 0]]
-    squares = dx * dx + dy * dy
+    if xy.shape[1] == 2:
+        x, y = (np.ascontiguousarray(xy[:, k])[faces.T] for k in (0, 1))
+        dx, dy = x - x[[1, 2, 0]], y - y[[1, 2, 0]]
+        squares = dx * dx + dy * dy
+        area = np.abs(dx[0] * dy[1] - dy[0] * dx[1])
+    else:
+        corners = xy[faces.T]
+        sides = corners - corners[[1, 2, 0]]
+        squares = (sides**2).sum(axis=2)
+        area = np.linalg.norm(np.cross(sides[0], sides[1]), axis=1)
     # The least one lies opposite the shortest side, between the two others: their cross and scalar product, doubled.
-    cross = 2.0 * np.abs(dx[0] * dy[1] - dy[0] * dx[1])
+    cross = 2.0 * area
     angles: FloatArray = np.degrees(np.arctan2(cross, squares.sum(axis=0) - 2.0 * squares.min(axis=0)))
     return angles
 

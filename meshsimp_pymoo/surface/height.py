@@ -65,7 +65,7 @@ class HeightSurface:
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
         if rules.break_lines is not None:
             self.model = lined_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
-        self.rules = rules
+        self.rules = rules.of_heights
         self.pinned: BoolArray = pinned_vertices(self.model, rules.pin)
         is_small = self.n_vertices < LARGE
         self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)

@@ -180,6 +180,10 @@ class Mesh:
         """Turn points (M, 3) of the file's frame into this model's upright local frame [model units]."""
         return (np.asarray(points, float) * self.scale - self.pivot) @ self.rotation.T - self.offset
 
+    def to_file(self, points: npt.ArrayLike) -> FloatArray:
+        """Turn points (M, 3) of this model's frame back into the file's [file units]."""
+        return ((np.asarray(points, float) + self.offset) @ self.rotation + self.pivot) / self.scale
+
     def __len__(self) -> int:
         return self.n_vertices
 

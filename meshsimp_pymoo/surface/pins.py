@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.model import Mesh, OpenModel
 from meshsimp_pymoo.surface.rules import PINS
 
 # A landmark given by position is the nearest vertex, but not one farther away than this share of the diagonal.
@@ -30,17 +30,40 @@ def pinned_vertices(model: OpenModel, pin: str | Sequence[Any] | AnyArray | None
     if model.lines is not None:
         pinned[model.lines.vertices] = True
     for part in _pin_parts(pin):
-        if isinstance(part, str):
-            if part not in PINS:
-                names = ", ".join(map(repr, PINS))
-                raise ModelError(f"pin={part!r} is unknown; use {names}, file rows or positions")
-            if part != "corners":
-                pinned[getattr(model, part)] = True
-        elif part.ndim == 1:
-            pinned[_rows_of_file(model, part)] = True
-        else:
-            pinned[_vertices_near(model, part)] = True
+        if not isinstance(part, str):
+            pinned[_named(model, part)] = True
+        elif part not in PINS:
+            names = ", ".join(map(repr, PINS))
+            raise ModelError(f"pin={part!r} is unknown; use {names}, file rows or positions")
+        elif part != "corners":
+            pinned[getattr(model, part)] = True
     return pinned
+
+
+def named_vertices(model: Mesh, pin: str | Sequence[Any] | AnyArray | None = None) -> BoolArray:
+    """Return which vertices ``pin`` names by file rows or positions in space: all that it can on a closed surface.
+
+    Raises
+    ------
+    ModelError
+        As :func:`pinned_vertices` does, and of any other name.
+    """
+    pinned = np.zeros(model.n_vertices, bool)
+    for part in _pin_parts(pin):
+        if isinstance(part, str):
+            raise ModelError(
+                f"{model.name}: pin={part!r} describes height surfaces, and this is a closed one; name file rows or "
+                "positions [x, y, z], or leave it out"
+            )
+        if part.ndim == 2 and part.shape[1] == 2:
+            raise ModelError(f"{model.name}: pin holds positions [x, y] on a closed surface; give [x, y, z]")
+        pinned[_named(model, part)] = True
+    return pinned
+
+
+def _named(model: Any, part: AnyArray) -> IntArray:
+    """Return the vertices at file rows (K,) or positions (K, 2) or (K, 3)."""
+    return _rows_of_file(model, part) if part.ndim == 1 else _vertices_near(model, part)
 
 
 def _pin_parts(pin: Any) -> list[Any]:
@@ -73,7 +96,7 @@ def _pin_parts(pin: Any) -> list[Any]:
     return parts
 
 
-def _rows_of_file(model: OpenModel, rows: AnyArray) -> IntArray:
+def _rows_of_file(model: Mesh, rows: AnyArray) -> IntArray:
     if not np.issubdtype(rows.dtype, np.integer):
         raise ModelError(
             f"pin holds {rows[0]!r}, which is no row of the file; give whole numbers, or positions as [x, y, z]"
@@ -102,7 +125,7 @@ def _looked_up(among: IntArray, rows: AnyArray) -> tuple[IntArray, BoolArray]:
     return place, found
 
 
-def _vertices_near(model: OpenModel, positions: FloatArray) -> IntArray:
+def _vertices_near(model: Any, positions: FloatArray) -> IntArray:
     if positions.shape[1] == 3:
         wanted, vertices = positions * model.scale, model.file_points * model.scale
     else:

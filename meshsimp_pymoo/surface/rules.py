@@ -13,6 +13,8 @@ from meshsimp_pymoo.surface.measures import OBJECTIVES
 FOOTPRINTS = ("model", "hull")
 OUTSIDES = ("nearest", "ignore")
 PINS = ("corners", "hull", "border")
+# What height surfaces alone know, and what holds there where nothing is said.
+OF_HEIGHTS = {"footprint": "model", "outside": "nearest"}
 # What names break lines that are found in the original: its outline, or (with an angle behind it) its sharp edges.
 OUTLINE, SHARP = "outline", "sharp:"
 # Least height of the triangles that free meshes come to have, as a share of their longest edge, where nothing is said;
@@ -36,21 +38,22 @@ class Rules:
         If a value is none that the setting takes.
     """  # noqa: D205
 
-    footprint: str = setting(
-        "model",
+    footprint: str | None = setting(
+        None,
         kind=Choice(FOOTPRINTS),
-        accepts='{"model", "hull"}',
-        doc="Emit only the triangles whose centroid lies inside the original mesh's projection, or all of them (the "
-        "paper).",
-        help="model: bays and holes stay open; hull: all of the convex hull is covered",
+        accepts='{"model", "hull"}, optional',
+        doc="Of a height surface: emit only the triangles whose centroid lies inside the original mesh's projection, as "
+        "by default, or all of them (the paper).",
+        help="of height surfaces: model (default): bays and holes stay open; hull: all of the convex hull is covered",
     )
-    outside: str = setting(
-        "nearest",
+    outside: str | None = setting(
+        None,
         kind=Choice(OUTSIDES),
-        accepts='{"nearest", "ignore"}',
-        doc="What a vertex costs that no triangle covers: its distance to the nearest point of the mesh, or nothing "
-        "(the paper).",
-        help="what a vertex that no triangle covers costs: its distance to the mesh, or nothing",
+        accepts='{"nearest", "ignore"}, optional',
+        doc="Of a height surface: what a vertex costs that no triangle covers: its distance to the nearest point of the "
+        "mesh, as by default, or nothing (the paper).",
+        help="of height surfaces: what a vertex that no triangle covers costs: its distance to the mesh (default), or "
+        "nothing",
     )
     pin: Any = setting(
         None,
@@ -125,7 +128,7 @@ class Rules:
     @property
     def in_words(self) -> str:
         """What people are told beside a model: what of it differs from the usual, and where the error counts."""
-        said = [f"footprint {self.footprint}", f"outside {self.outside}"]
+        said = [f"{name} {value}" for name in OF_HEIGHTS if (value := getattr(self, name)) is not None]
         if self.pin is not None:
             said.append(f"pinned {self.pin}" if isinstance(self.pin, str) else "some vertices pinned")
         if self.weights is not None:
@@ -135,6 +138,11 @@ class Rules:
             within = "" if self.line_tolerance is None else f" within {self.line_tolerance:g}"
             said.append(f"break lines{named}{within}")
         return ", ".join(said)
+
+    @property
+    def of_heights(self) -> Rules:
+        """These rules for a height surface: what is not said is what is usual there."""
+        return replace(self, **{name: usual for name, usual in OF_HEIGHTS.items() if getattr(self, name) is None})
 
     @property
     def of_the_model(self) -> Rules:

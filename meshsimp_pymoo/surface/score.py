@@ -48,7 +48,7 @@ def mesh_quality(
 
 
 def measured_angles(xy: FloatArray, faces: IntArray) -> dict[str, float]:
-    """Return what is said of the least angles of triangles (M, 3) of vertices (V, 2) in the plane."""
+    """Return what is said of the least angles of triangles (M, 3) of vertices in the plane (V, 2) or space (V, 3)."""
     angles = least_angles(xy, faces)
     return {"min_angle_median": float(np.median(angles)), "below_5_degrees": float((angles < THIN_DEGREES).mean())}
 

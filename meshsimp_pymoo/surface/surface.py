@@ -152,18 +152,21 @@ class View:
         The point that the page turns about, scaled.
     scale : (3,) float array
         Model units to a unit of the file along its axes.
+    is_closed : bool
+        Whether it is seen from all sides alike: nothing is drawn higher.
     """
 
     extent: FloatArray
     rotation: FloatArray
     pivot: FloatArray
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
+    is_closed: bool = False
 
     @property
     def exaggeration(self) -> float:
         """Factor by which z is drawn higher, so that a flat relief shows."""
         least, height = LEAST_RELIEF * float(self.extent[:2].max()), float(self.extent[2])
-        return max(1.0, least / height) if height > 0 else 1.0
+        return max(1.0, least / height) if height > 0 and not self.is_closed else 1.0
 
 
 class Original(Protocol):

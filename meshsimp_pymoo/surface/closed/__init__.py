@@ -1,0 +1,8 @@
+"""The closed surface: a mesh without a border and of genus 0, where a subset means the convex hull of its images on a
+sphere.
+
+Bottom up: `embedding` flattens the original once, `model` holds it in vector order, `distance` says how far a vertex is
+from a triangle, `nearest` from a whole mesh, `ground` and `books` are the records of compiled functions, `evaluate`
+measures a subset from scratch, `live` by moves, `refit` moves the vertices off the original ones, and `surface` is all
+that together, as the search knows it.
+"""  # noqa: D205

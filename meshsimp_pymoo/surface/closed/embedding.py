@@ -1,0 +1,173 @@
+"""A closed mesh of genus 0 flattened once: every vertex gets an image in the plane, and no face is turned over.
+
+One original face, the *pole*, is the outside: its vertices are the corners of a triangle that holds all other images,
+each of which is the weighted mean of those of its neighbours. With positive weights no face flips (Tutte [1]_); these
+are the cotangent weights, which make angles in the plane like those on the surface (Pinkall and Polthier [2]_), bounded
+from below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
+
+Seen from the centre of a sphere that touches the plane these are images on the sphere; the Delaunay triangulation of
+any of them with the outside as one more triangle is the convex hull there.
+
+References
+----------
+.. [1] W. T. Tutte, "How to draw a graph", Proceedings of the London Mathematical Society 13, 1963.
+.. [2] U. Pinkall, K. Polthier, "Computing discrete minimal surfaces and their conjugates", Experimental Mathematics 2,
+   1993.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg
+
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.plane.order import unit_square
+from meshsimp_pymoo.plane.predicates import orient_sign
+
+# Weights are at least this share of their median, and at most its inverse.
+LEAST_SHARE = 1e-3
+# Faces whose images are sheared more than this (the sum of both squared stretches over the area's) say nothing of the
+# affine map: they lie where the triangle is cut off by the outside.
+MOST_SHEAR = 50.0
+# What is left outside when images are scaled into the unit square.
+MARGIN = 2.0**-10
+
+
+class Embedding(NamedTuple):
+    """The images of the vertices.
+
+    Attributes
+    ----------
+    xy : (N, 2) float array
+        In the unit square, multiples of 2**-52; those of the pole are the corners of the hull.
+    pole : (3,) int array
+        The vertices of the face that is the outside, clockwise in the plane.
+    """
+
+    xy: FloatArray
+    pole: IntArray
+
+
+def embed(points: FloatArray, faces: IntArray) -> Embedding:
+    """Flatten a closed mesh of genus 0.
+
+    Parameters
+    ----------
+    points : (N, 3) float array
+        The vertices, in an order that does not depend on the file: the last bits of the images do.
+    faces : (T, 3) int array
+        The triangles, wound alike.
+
+    Returns
+    -------
+    Embedding
+        The images that floating point gives; see :func:`faults` for whether they are an embedding.
+    """
+    pole = faces[_pole_face(points, faces)].astype(np.int64)
+    inner = np.ones(len(points), bool)
+    inner[pole] = False
+    rows = np.flatnonzero(inner)
+    weights = _weights(points, faces)
+    laplacian = (sparse.diags(np.asarray(weights.sum(axis=1)).ravel()) - weights).tocsr()
+    # clockwise: the face is seen from its back
+    angle = -2.0 * np.pi / 3.0 * np.arange(3)
+    corners = np.column_stack([np.cos(angle), np.sin(angle)])
+    matrix = laplacian[rows][:, rows].tocsc()
+    known = -(laplacian[rows][:, pole] @ corners)
+    solver = linalg.splu(matrix)
+    found = solver.solve(known)
+    found += solver.solve(known - matrix @ found)
+    xy = np.empty((len(points), 2))
+    xy[pole], xy[rows] = corners, found
+    xy = xy @ _unsheared(points, faces, xy, pole)
+    xy -= xy[pole].min(axis=0)
+    xy *= (1.0 - MARGIN) / xy[pole].max()
+    return Embedding(unit_square(xy)[1], pole)
+
+
+def faults(xy: FloatArray, faces: IntArray, pole: IntArray) -> tuple[int, int]:
+    """Return how many faces are flat or flipped in the plane, and how many images coincide with another one.
+
+    Parameters
+    ----------
+    xy : (N, 2) float array
+        Images, multiples of 2**-52 in the unit square.
+    faces : (T, 3) int array
+    pole : (3,) int array
+        The face that is the outside.
+    """
+    outside = (np.sort(faces, axis=1) == np.sort(pole)).all(axis=1)
+    flipped = _n_flipped(np.ascontiguousarray(xy).ravel(), np.ascontiguousarray(faces[~outside], np.int64))
+    return int(flipped), len(xy) - len(np.unique(np.ascontiguousarray(xy).view(np.complex128)))
+
+
+@entry
+def _n_flipped(xy: np.ndarray, faces: np.ndarray) -> int:
+    n = 0
+    for k in range(len(faces)):
+        a, b, c = faces[k, 0], faces[k, 1], faces[k, 2]
+        x, y = xy[2 * c], xy[2 * c + 1]
+        n += orient_sign(xy[2 * a] - x, xy[2 * a + 1] - y, xy[2 * b] - x, xy[2 * b + 1] - y, 0.0) <= 0
+    return n
+
+
+def _pole_face(points: FloatArray, faces: IntArray) -> int:
+    """Return the face nearest to the centroid of the surface: seen from a trunk limbs shrink least."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    centres = (a + b + c) / 3.0
+    away = centres - (area[:, None] * centres).sum(axis=0) / area.sum()
+    return int(np.argmin((away**2).sum(axis=1)))
+
+
+def _weights(points: FloatArray, faces: IntArray) -> sparse.csr_matrix:
+    """Return the symmetric matrix (N, N) of bounded cotangent weights of the edges."""
+    n = len(points)
+    rows, columns, cotangents = [], [], []
+    for k in range(3):
+        i, j, opposite = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        u, v = points[i] - points[opposite], points[j] - points[opposite]
+        cross = np.linalg.norm(np.cross(u, v), axis=1)
+        rows.append(i)
+        columns.append(j)
+        cotangents.append(0.5 * (u * v).sum(axis=1) / np.maximum(cross, 1e-300))
+    half = sparse.coo_matrix((np.concatenate(cotangents), (np.concatenate(rows), np.concatenate(columns))), (n, n))
+    weights = (half + half.T).tocsr()
+    median = float(np.median(weights.data))
+    # meshes whose angles are mostly obtuse have no such median
+    usual = median if median > 0.0 else float(np.abs(weights.data).mean())
+    weights.data = np.clip(weights.data, LEAST_SHARE * usual, usual / LEAST_SHARE)
+    return weights
+
+
+def _unsheared(points: FloatArray, faces: IntArray, xy: FloatArray, pole: IntArray) -> FloatArray:
+    """Return the matrix (2, 2) that images are multiplied by from the right, so that shapes are kept in the mean.
+
+    With J the derivative of the image on a face, J J^T / det J is the identity where shapes are kept. Its mean over the
+    surface becomes that.
+    """
+    inside = ~(np.sort(faces, axis=1) == np.sort(pole)).all(axis=1)
+    a, b, c = (points[faces[inside, k]] for k in range(3))
+    pa, pb, pc = (xy[faces[inside, k]] for k in range(3))
+    u, v = b - a, c - a
+    length = np.linalg.norm(u, axis=1)
+    along = (u * v).sum(axis=1) / np.maximum(length, 1e-300)
+    height = np.sqrt(np.maximum((v**2).sum(axis=1) - along**2, 0.0))
+    solid = (length > 0.0) & (height > 1e-12 * length)
+    first = (pb - pa)[solid] / length[solid, None]
+    second = ((pc - pa)[solid] - first * along[solid, None]) / height[solid, None]
+    determinant = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    fair = determinant > 1e-300
+    J = np.stack([first[fair], second[fair]], axis=2)
+    shear = (J @ J.transpose(0, 2, 1)) / determinant[fair][:, None, None]
+    area = (length * height)[solid][fair]
+    usual = np.trace(shear, axis1=1, axis2=2) < MOST_SHEAR
+    if not usual.any():
+        return np.eye(2)
+    mean = (area[usual][:, None, None] * shear[usual]).sum(axis=0)
+    values, vectors = np.linalg.eigh(mean)
+    return np.asarray(vectors @ np.diag((values / np.sqrt(values.prod())) ** -0.5) @ vectors.T)

@@ -1,0 +1,327 @@
+"""The original mesh of a closed surface, flattened and in vector order: what a chromosome is a chromosome of."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.formats.material import Material
+from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.plane.faces import canonical_faces
+from meshsimp_pymoo.plane.hilbert import HILBERT_BITS, hilbert_keys
+from meshsimp_pymoo.surface.closed.embedding import embed, faults
+from meshsimp_pymoo.surface.edges import Edges, border_loops, components, next_corner
+from meshsimp_pymoo.surface.model import Mesh, checksum
+from meshsimp_pymoo.surface.units import length_unit
+
+# A mesh of fewer vertices is none.
+LEAST_VERTICES = 4
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What a mesh is, whatever its shape.
+
+    Attributes
+    ----------
+    components : int
+        Parts that no edge connects.
+    loops : int
+        Closed rows of edges with one face only: the rims of holes.
+    crowded : int
+        Edges of more than two faces.
+    touching : int
+        Vertices in which more than one fan of faces meets.
+    mismatched : int
+        Edges whose two faces are wound against each other.
+    genus : int or None
+        Number of handles of all parts, if they are closed and manifold.
+    """
+
+    components: int
+    loops: int
+    crowded: int
+    touching: int
+    mismatched: int
+    genus: int | None
+
+    @property
+    def is_sphere(self) -> bool:
+        """Whether it is one closed surface of genus 0."""
+        return self.refusal is None
+
+    @property
+    def refusal(self) -> str | None:
+        """Why it is none, in a few words."""
+        if self.crowded:
+            return f"is not manifold ({_count(self.crowded, 'edge')} of more than two faces)"
+        if self.loops:
+            return f"has {_count(self.loops, 'hole')}"
+        if self.components > 1:
+            return f"has {self.components} parts"
+        if self.touching:
+            return f"is not manifold ({_count(self.touching, 'vertex', 'vertices')} in which several fans of faces meet)"
+        if self.mismatched:
+            return f"has one side only ({_count(self.mismatched, 'edge')} between faces wound against each other)"
+        if self.genus:
+            return f"has genus {self.genus} ({_count(self.genus, 'handle')}, as a ring has one)"
+        return None
+
+
+def topology(faces: IntArray) -> Topology:
+    """Return what triangles (F, 3) of vertices are, those that no face uses left out.
+
+    Examples
+    --------
+    >>> topology(np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])).is_sphere
+    True
+    """
+    faces = np.asarray(faces, np.int64)
+    edges = Edges.of(faces)
+    first, second = edges.pairs
+    part = components(len(faces), first // 3, second // 3)
+    flat = faces.ravel()
+    mismatched = int((flat[first] == flat[second]).sum())
+    # corners of faces that meet along an edge at a vertex are one fan
+    fans = _fans(faces, first, second)
+    used = len(np.unique(flat))
+    n_parts = int(part.max()) + 1
+    n_crowded, n_border = len(edges.crowded), len(edges.border)
+    touching = int(fans - used) if n_crowded == 0 else 0
+    genus = None
+    if not n_crowded and not n_border and not mismatched:
+        genus = (2 * n_parts - (fans - len(edges.counts) + len(faces))) // 2
+    return Topology(n_parts, border_loops(edges)[0], n_crowded, touching, mismatched, genus)
+
+
+def _fans(faces: IntArray, first: IntArray, second: IntArray) -> int:
+    """Return the number of fans of faces around vertices: corners joined across edges."""
+    flat = faces.ravel()
+    ends = [np.stack([half, next_corner(half)]) for half in (first, second)]
+    alike = flat[first] == flat[second]  # wound against each other: start lies on start
+    other = np.where(alike, ends[1], ends[1][::-1])
+    return int(components(3 * len(faces), ends[0].ravel(), other.ravel()).max()) + 1
+
+
+def _count(n: int, what: str, many: str | None = None) -> str:
+    return f"{n:,} {what if n == 1 else many or what + 's'}"
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedModel(Mesh):
+    """A closed mesh of genus 0 in vector order.
+
+    The vertices are stored along a Hilbert curve over their images in the plane, so that neighbours on the vector are
+    neighbours on the surface. Order and images are a function of the positions and faces alone, whatever order the file
+    lists them in.
+
+    Attributes
+    ----------
+    name : str
+        Where it came from, for messages.
+    points : (N, 3) float array
+        Vertices as they are drawn, z to the viewer, from a local origin [model units].
+    faces : (T, 3) int32 array
+        Triangles of the original mesh, wound alike, as rows of ``points``.
+    xy : (N, 2) float array
+        Their images in the plane, multiples of 2**-52 in the unit square; see
+        :mod:`~meshsimp_pymoo.surface.closed.embedding`.
+    pole : (3,) int array
+        The vertices of the face that is the outside of the plane, clockwise there. Every mesh keeps them.
+    source_index : (N,) int array
+        Row of each vertex in the file.
+    file_points : (N, 3) float array
+        The vertices exactly as in the file, in vector order [file units].
+    attributes : dict of str to (N, ...) array
+        Colours and other per-vertex attributes of the file, in vector order.
+    rotation : (3, 3) float array
+        ``points`` are ``(scale * file_points - pivot) @ rotation.T``; axes are exchanged, nothing is rounded.
+    pivot : (3,) float array
+        The lowest corner of the box [model units].
+    weights : (N,) float array, optional
+        How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
+    repeats : (R, 2) int array
+        Rows of the file that repeat another one, and the rows that they were merged into.
+    found : dict of str to int
+        How many vertices were merged and how many faces were mended, as far as there are any; for run.json.
+    georeference : dict
+        Where on Earth it is and how it was read, as far as the file says.
+    scale : (3,) float array
+        Model units to a unit of the file along its axes.
+    material : Material, optional
+        What all faces look like, as far as the file says.
+    """
+
+    name: str
+    points: FloatArray
+    faces: npt.NDArray[np.int32]
+    xy: FloatArray
+    pole: IntArray
+    source_index: IntArray
+    file_points: FloatArray
+    attributes: dict[str, npt.NDArray[Any]]
+    rotation: FloatArray
+    pivot: FloatArray
+    weights: FloatArray | None = None
+    repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64), repr=False)
+    found: dict[str, int] = field(default_factory=dict, repr=False)
+    georeference: dict[str, Any] = field(default_factory=dict, repr=False)
+    scale: FloatArray = field(default_factory=lambda: np.ones(3))
+    material: Material | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        weighted = "" if self.weights is None else ", weighted"
+        size = " x ".join(f"{side:.4g}" for side in np.ptp(self.points, axis=0))
+        return (
+            f"<ClosedModel {self.name}: {self.n_vertices:,} vertices, {len(self.faces):,} triangles{weighted}, "
+            f"{size} {length_unit(self.georeference)}>"
+        )
+
+    @property
+    def offset(self) -> FloatArray:  # type: ignore[override]
+        """What is subtracted after turning: nothing."""
+        return np.zeros(3)
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of geometry and weights: the same for the same vertices and faces in the same file order.
+
+        The images are left out: their last bits depend on the versions of libraries.
+        """
+        order = np.argsort(self.source_index, kind="stable")
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        weights = None if self.weights is None else self.weights[order]
+        return checksum(self.points[order], canonical_faces(place[self.faces]), self.source_index[order], weights)
+
+    def with_images(self, xy: FloatArray, source_index: IntArray) -> ClosedModel:
+        """Return the model with images (N, 2) that were stored, and in the vector order of the rows stored with them.
+
+        Raises
+        ------
+        ModelError
+            If these are other rows, or no images of this mesh.
+        """
+        here, there = np.argsort(self.source_index), np.argsort(source_index)
+        if not np.array_equal(self.source_index[here], np.asarray(source_index)[there]):
+            raise ModelError(f"{self.name}: has other vertices than those whose images were stored")
+        order = np.empty_like(here)
+        order[there] = here
+        moved = self._reordered(order, np.ascontiguousarray(xy, float))
+        _refuse_faults(moved.name, moved.xy, moved.faces, moved.pole)
+        return moved
+
+    def _reordered(self, order: IntArray, xy: FloatArray) -> ClosedModel:
+        place = np.empty(len(order), np.int32)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        return replace(
+            self,
+            points=self.points[order],
+            faces=place[self.faces],
+            xy=xy,
+            pole=place[self.pole].astype(np.int64),
+            source_index=self.source_index[order],
+            file_points=self.file_points[order],
+            attributes={name: values[order] for name, values in self.attributes.items()},
+            weights=None if self.weights is None else self.weights[order],
+        )
+
+
+def closed_model(source: SourceMesh) -> ClosedModel:
+    """Check that a source mesh is one closed surface of genus 0, flatten it and put it in vector order.
+
+    Raises
+    ------
+    ModelError
+        If it is something else, or too long and thin to be flattened; the message says what.
+
+    Warns
+    -----
+    ModelWarning
+        Of vertices that belong to no face.
+    """
+    used = np.zeros(len(source.points), bool)
+    used[source.faces] = True
+    n_unused = len(used) - int(used.sum())
+    if n_unused:
+        warnings.warn(
+            f"{source.name}: {n_unused} of {len(used)} vertices belong to no face and are left out",
+            ModelWarning,
+            stacklevel=3,
+        )
+    what = topology(source.faces).refusal
+    if what is not None:
+        raise ModelError(
+            f"{source.name}: {what}; a closed surface is one part without holes, like a sphere: split or fill it in a "
+            "mesh program, or cut out one side as a height surface with --patch front (patch='front')"
+        )
+    measured = source.measured.points
+    rows = np.flatnonzero(used)
+    rows = rows[np.lexsort(source.points[rows].T[::-1])]
+    place = np.full(len(used), -1, np.int64)
+    place[rows] = np.arange(len(rows))
+    faces = canonical_faces(place[source.faces])
+    pivot = measured[rows].min(axis=0)
+    local = measured[rows] - pivot
+    if not local.any(axis=0).all() or np.linalg.matrix_rank(local - local.mean(axis=0)) < 3:
+        raise ModelError(f"{source.name}: all {len(rows)} vertices lie in one plane; a closed surface has a volume")
+    found = embed(local, faces)
+    _refuse_faults(source.name, found.xy, faces, found.pole)
+    rotation = _shown_side(local)
+    n = {"merged": len(source.repeats)}
+    model = ClosedModel(
+        name=source.name,
+        points=local @ rotation.T,
+        faces=faces.astype(np.int32),
+        xy=found.xy,
+        pole=found.pole,
+        source_index=source.rows[rows],
+        file_points=source.points[rows],
+        attributes={name: values[rows] for name, values in source.attributes.items()},
+        rotation=rotation,
+        pivot=pivot,
+        repeats=source.repeats,
+        found={what: count for what, count in n.items() if count},
+        georeference=source.georeference,
+        scale=source.scale,
+        material=source.material,
+    )
+    order = _vector_order(found.xy)
+    return model._reordered(order, np.ascontiguousarray(found.xy[order]))
+
+
+def _vector_order(xy: FloatArray) -> IntArray:
+    """Return the order of images along a Hilbert curve, and within its cells along others: limbs are tiny there."""
+    cells = np.floor(xy * 2.0**HILBERT_BITS)
+    within = np.ascontiguousarray(xy * 2.0**HILBERT_BITS - cells)
+    return np.lexsort((hilbert_keys(within), hilbert_keys(np.ascontiguousarray(xy))))
+
+
+def _refuse_faults(name: str, xy: FloatArray, faces: IntArray, pole: IntArray) -> None:
+    flipped, coinciding = faults(xy, faces, pole)
+    if flipped or coinciding:
+        raise ModelError(
+            f"{name}: cannot be flattened: {_count(coinciding, 'image coincides', 'images coincide')} and "
+            f"{_count(flipped, 'face is', 'faces are')} flipped of {len(faces):,}, since limbs longer than some 28 of "
+            "their radii shrink below what double precision tells apart; cut them off, or cut out one side as a height "
+            "surface with --patch front (patch='front')"
+        )
+
+
+def _shown_side(local: FloatArray) -> FloatArray:
+    """Return the rotation that has the viewer look along the thinnest side of the box, y upwards, or z if that is y."""
+    thinnest = int(np.argmin(np.ptp(local, axis=0)))
+    return np.array(
+        [
+            [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
+            [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        ][thinnest]
+    )

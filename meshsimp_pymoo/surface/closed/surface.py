@@ -1,0 +1,306 @@
+"""The closed surface: a mesh of genus 0 without a border, where a subset means the convex hull of its images."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.plane.faces import used_rows
+from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspace, triangulate_closed
+from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
+from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
+from meshsimp_pymoo.surface.closed.refit import moved_vertices
+from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
+from meshsimp_pymoo.surface.pins import named_vertices
+from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
+from meshsimp_pymoo.surface.score import measured_angles, mesh_quality
+from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, checked_faces
+from meshsimp_pymoo.workers import Reserve
+
+# From so many vertices on, books and workspaces that are not used are given back: hundreds of bytes a vertex each.
+LARGE = 300_000
+
+
+class ClosedSurface:
+    """A closed model and the rules for it; see `Surface` for what its attributes are.
+
+    The mesh of a subset is the Delaunay triangulation of its images and the outside as one more triangle: it is
+    watertight, of genus 0, uses all n vertices and has 2 n - 4 triangles. The deviation d_p of a vertex is its distance
+    in space to the triangle that holds its image and to those across its edges.
+
+    Parameters
+    ----------
+    model : ClosedModel
+        The original mesh of N vertices. Its weights are replaced by those of the rules, if they name some.
+    rules : Rules
+        What counts; what describes height surfaces is refused.
+
+    Raises
+    ------
+    ModelError
+        If the rules do not fit the model, or a closed surface.
+    """
+
+    def __init__(self, model: ClosedModel, rules: Rules = DEFAULT) -> None:
+        _refuse_rules(model.name, rules)
+        self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        self.rules = rules
+        self.pinned: BoolArray = named_vertices(self.model, rules.pin)
+        self.pinned[self.model.pole] = True
+        is_small = self.n_vertices < LARGE
+        self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)
+
+    def __repr__(self) -> str:
+        return (
+            f"<ClosedSurface of {self.model.name}: {self.n_vertices:,} vertices, {int(self.pinned.sum()):,} pinned, "
+            f"{self.rules.measure} measured>"
+        )
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of original vertices."""
+        return self.model.n_vertices
+
+    @property
+    def points(self) -> FloatArray:
+        """The original vertices (N, 3) as they are drawn, z to the viewer [model units]."""
+        return self.model.points
+
+    @property
+    def faces(self) -> IntArray:
+        """The original triangles (T, 3)."""
+        return self.model.faces
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box in space [model units]."""
+        return self.model.diagonal
+
+    @property
+    def total_weight(self) -> float:
+        """Sum of the weights; N without any."""
+        return self.model.total_weight
+
+    @property
+    def neighbours(self) -> Csr:
+        """One-rings of the original, (indptr, indices): those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``."""
+        return self.model.neighbours
+
+    @property
+    def border(self) -> IntArray:
+        """There is none."""
+        return np.empty(0, np.int64)
+
+    @property
+    def places(self) -> FloatArray:
+        """The vertices (N, 3), for cuts through the surface."""
+        return self.points
+
+    @cached_property
+    def view(self) -> View:
+        """The model from the side on which it is thinnest."""
+        model = self.model
+        return View(np.ptp(self.points, axis=0), model.rotation, model.pivot, model.scale, is_closed=True)
+
+    @cached_property
+    def _ground(self) -> ClosedGround:
+        return make_ground(self.model, self.rules)
+
+    @cached_property
+    def _between(self) -> tuple[FloatArray, FloatArray]:
+        """Centroids of the original faces (T, 3) and the area of each as a share of all."""
+        a, b, c = (self.points[self.faces[:, k]] for k in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return (a + b + c) / 3.0, area / area.sum()
+
+    def ground(self) -> ClosedGround | None:
+        """Return the model's arrays and the rules for compiled functions."""
+        return None
+
+    def free_ground(self, *, centroids: bool = True) -> None:
+        """Return nothing: the edges of closed meshes follow from their vertices."""
+
+    def measuring(self, measure: str) -> ClosedSurface:
+        """Return this surface with another measure of the error, or itself."""
+        if measure == self.rules.measure:
+            return self
+        other = copy.copy(self)
+        other.rules = replace(self.rules, measure=measure)
+        other.__dict__.pop("_ground", None)
+        return other
+
+    def bounded(self, most: float, *, own: float = 0.0) -> ClosedSurface:
+        """Return this surface with another cost of moves: what exceeds ``most``, and ``own`` times its own.
+
+        See `Surface.bounded`.
+
+        Raises
+        ------
+        ValueError
+            If ``most`` or ``own`` is negative or no number.
+        """
+        numbers: dict[str, Any] = {"most": most, "own": own}
+        for name, value in numbers.items():
+            if not isinstance(value, (int, float, np.number)) or not value >= 0:
+                raise ValueError(f"{name} = {value!r} is no number of at least 0")
+        other = copy.copy(self)
+        other.rules = replace(self.rules, measure="error")  # the sum of these costs
+        other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
+        return other
+
+    @contextmanager
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Any]:
+        """Lend the live triangulation of a subset."""
+        raise NotImplementedError
+        yield
+
+    def selection(self, most: int) -> BoolArray:
+        """Return about ``most`` vertices (N,): they lie along a curve over the surface, so every k-th."""
+        selected = self.pinned.copy()
+        selected[:: -(-self.n_vertices // most)] = True
+        return selected
+
+    def triangles(self, kept: BoolArray) -> IntArray:
+        """Return the triangles (M, 3) of one subset (N,)."""
+        return self._triangulated(kept)[0]
+
+    def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
+        """Return the table (P, 6) of numbers of subsets (P, N); a closed surface knows no ``regions``."""
+        if regions:
+            raise ValueError(
+                f"regions={regions}: errors by region are for height surfaces, and {self.model.name} is a closed one; "
+                "leave regions (and what is made of them, such as RegionCrossover) out"
+            )
+        return evaluate_closed(self._ground, self._workspaces, kept, n_threads=threads)
+
+    def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
+        """Return the mesh of the kept vertices and its measures: the phenotype of one chromosome (N,).
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than 4, or the pole is not among them.
+        """
+        faces, numbers, deviation = self._triangulated(kept)
+        quality = as_quality(numbers, self.total_weight, **self._of_mesh(self.points, faces))
+        at = slice(None) if rows is None else rows
+        return Simplified(faces, quality, deviation[at], np.ones(len(deviation[at]), bool))
+
+    def _triangulated(self, kept: Any) -> tuple[IntArray, FloatArray, FloatArray]:
+        row = np.array(require_bool(kept, "a subset is a bool array, one entry a vertex"), order="C")
+        if row.shape != (self.n_vertices,):
+            raise ValueError(
+                f"a subset of {self.model.name} has shape ({self.n_vertices},), one entry a vertex, not {row.shape}"
+            )
+        found = triangulate_closed(self._ground, self._workspaces, row)
+        if found[1][TRIANGLES] == 0:
+            raise ValueError(
+                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4, those that "
+                "are pinned among them"
+            )
+        return found
+
+    def _of_mesh(self, vertices: FloatArray, faces: IntArray) -> dict[str, float]:
+        """Return what is said of a mesh of vertices (V, 3) in the frame of the points beside the deviations."""
+        centres, share = self._between
+        away, _ = distances_to_mesh(centres, vertices, faces)
+        return {"surface_error": float((share * away).sum())} | measured_angles(vertices, faces)
+
+    def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
+        """Measure a mesh of the model's own vertices with any edges, by true distance; see :meth:`score`."""
+        faces = checked_faces(faces, self.n_vertices)
+        found = self._scored(self.points, faces)
+        used, _ = used_rows(faces)
+        found.deviation[used] = 0.0
+        at = slice(None) if rows is None else rows
+        return Simplified(faces, found.quality, found.deviation[at], found.covered[at])
+
+    def score(self, points: FloatArray, faces: IntArray) -> Scored:
+        """Measure any mesh by true distance in space: that of each original vertex to the nearest point of the mesh.
+
+        What is said of a subset is at least that, and as a rule hardly more: its d_p are distances to four triangles.
+
+        Parameters
+        ----------
+        points : (V, 3) float array
+            Vertices in the frame of the model's file [file units].
+        faces : (M, 3) int array
+
+        Raises
+        ------
+        ValueError
+            If there is no face, or the arrays do not fit together.
+        """
+        points, faces = np.asarray(points, float), np.asarray(faces)
+        if points.ndim != 2 or points.shape[1:] != (3,) or faces.ndim != 2 or faces.shape[1:] != (3,):
+            raise ValueError(
+                f"a mesh has vertices (V, 3) and faces (M, 3), not arrays of shape {points.shape} and {faces.shape}"
+            )
+        if not len(faces):
+            raise ValueError("a mesh without faces has no error; it needs at least one triangle")
+        if faces.min() < 0 or faces.max() >= len(points):
+            raise ValueError(f"faces index rows {faces.min()} to {faces.max()} of {len(points)} vertices")
+        if not np.isfinite(points[faces]).all():
+            raise ValueError("vertices of faces are not finite")
+        return self._scored(self.model.to_local(points), faces)
+
+    def _scored(self, vertices: FloatArray, faces: IntArray) -> Scored:
+        deviation, _ = distances_to_mesh(self.points, vertices, faces)
+        covered = np.ones(len(deviation), bool)
+        quality = mesh_quality(
+            deviation, covered, faces, self.model.weights, self.total_weight, **self._of_mesh(vertices, faces)
+        )
+        return Scored(quality, deviation, covered)
+
+    def refit(self, mesh: Simplified, *, until: float | None = None) -> Refitted:
+        """Move a mesh's vertices to where it fits the vertices and face centres of the original best.
+
+        See :mod:`~meshsimp_pymoo.surface.closed.refit`. The measure is the true distance of the vertices, as
+        :meth:`score` has it; the mesh of the least error of all rounds is returned, or the one given where none has
+        less. There is no proved bound: it is 0.
+        """
+        rows, compact = used_rows(mesh.faces)
+        own = self.model.file_points[rows]
+        start = self._scored(self.points[rows], compact).quality.error
+        weights = np.ones(self.n_vertices) if self.model.weights is None else self.model.weights
+        centres, share = self._between
+        samples = np.concatenate([self.points, centres])
+        counts = np.concatenate([weights, share * weights.sum()])
+        best, error = own, start
+        for moved in moved_vertices(self.points[rows], compact, samples[counts > 0], counts[counts > 0], until=until):
+            there = self._scored(moved, compact).quality.error
+            if there < error:
+                best, error = self.model.to_file(moved), there
+        return Refitted(mesh.faces, rows, best, min(error, mesh.quality.error), mesh.quality.error, 0.0)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> ClosedSurface:
+        return self
+
+    def __getstate__(self) -> dict[str, Any]:
+        unstored = ("_ground", "_between", "view")
+        return {name: value for name, value in self.__dict__.items() if name not in unstored}
+
+
+def _refuse_rules(name: str, rules: Rules) -> None:
+    """Refuse what describes height surfaces."""
+    given: list[AnyArray | str] = [what for what in OF_HEIGHTS if getattr(rules, what) is not None]
+    if given:
+        what = str(given[0])
+        raise ModelError(
+            f"{name}: {what}={getattr(rules, what)!r} (--{what} {getattr(rules, what)}) describes height surfaces, and "
+            "this is a closed one, whose meshes cover all of it; leave it out"
+        )
+    if rules.break_lines is not None:
+        raise ModelError(
+            f"{name}: break lines are for height surfaces, and this is a closed one; leave break_lines "
+            "(--break-lines) out"
+        )
