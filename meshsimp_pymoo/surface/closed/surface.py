@@ -14,8 +14,10 @@ import numpy as np
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.plane.faces import used_rows
+from meshsimp_pymoo.surface.closed.books import ClosedLive, make_live, with_peaks
 from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspace, triangulate_closed
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
+from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 from meshsimp_pymoo.surface.closed.refit import moved_vertices
@@ -58,6 +60,7 @@ class ClosedSurface:
         self.pinned[self.model.pole] = True
         is_small = self.n_vertices < LARGE
         self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)
+        self._books = Reserve(partial(make_live, self.n_vertices), is_small)
 
     def __repr__(self) -> str:
         return (
@@ -122,9 +125,9 @@ class ClosedSurface:
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         return (a + b + c) / 3.0, area / area.sum()
 
-    def ground(self) -> ClosedGround | None:
+    def ground(self) -> ClosedGround:
         """Return the model's arrays and the rules for compiled functions."""
-        return None
+        return self._ground
 
     def free_ground(self, *, centroids: bool = True) -> None:
         """Return nothing: the edges of closed meshes follow from their vertices."""
@@ -158,10 +161,13 @@ class ClosedSurface:
         return other
 
     @contextmanager
-    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Any]:
-        """Lend the live triangulation of a subset."""
-        raise NotImplementedError
-        yield
+    def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[ClosedLive]:
+        """Lend the live mesh of a subset; no two images coincide, so ``fixed`` decides nothing."""
+        with self._books.one() as lent:
+            ground = self._ground
+            live = with_peaks(lent) if ground.by_peak else lent
+            build(ground, live, np.flatnonzero(kept), self.model.name)
+            yield live
 
     def selection(self, most: int) -> BoolArray:
         """Return about ``most`` vertices (N,): they lie along a curve over the surface, so every k-th."""
