@@ -566,6 +566,7 @@ class OpenModel(Mesh):
             lines=None,
         )
 
+
 def placed_model(
     name: str,
     points: FloatArray,

@@ -59,9 +59,7 @@ def holder(xy: np.ndarray, mesh: np.ndarray, t: int, x: float, y: float, exact_a
 
 
 @inner(inline=True)
-def corners_in_space(
-    mesh: np.ndarray, s: int, sites: np.ndarray, pole: np.ndarray
-) -> tuple[int, int, int]:
+def corners_in_space(mesh: np.ndarray, s: int, sites: np.ndarray, pole: np.ndarray) -> tuple[int, int, int]:
     """Return the vertices of triangle s of sites; those of the outside where it is a ghost."""
     if (mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
         return np.int64(pole[0]), np.int64(pole[1]), np.int64(pole[2])

@@ -192,9 +192,7 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
                 t0 = np.int64(gone[k])
                 if conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
                     break
-        n_cavity, n_rim = cavity_of(
-            g.xy, mesh, t0, w, cavity, rim, live.stack, g.lines, g.exact_area, g.exact_lift
-        )
+        n_cavity, n_rim = cavity_of(g.xy, mesh, t0, w, cavity, rim, live.stack, g.lines, g.exact_area, g.exact_lift)
         for k in range(n_cavity):
             t = np.int64(cavity[k])
             if not mark[t >> 3] & GONE:
