@@ -42,10 +42,11 @@ class Part(NamedTuple):
 
 
 def _reading() -> None:
-    from meshsimp_pymoo.opening import open_model
+    from meshsimp_pymoo.datasets import load
+    from meshsimp_pymoo.surface.model import build_model
 
     # a scan with bays: its order, the look for folds, the cells of its footprint
-    _ = open_model("horseshoe:60").footprint
+    _ = build_model(load("horseshoe:60")).footprint
 
 
 def _square() -> Any:

@@ -8,6 +8,8 @@ on an edge belongs to the triangle on the left of the edge from its first to its
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
@@ -181,7 +183,7 @@ def evaluate_closed(
 
     n_parts = min(max(1 if n_threads <= 1 else 4 * n_threads, -(-rows.size // AT_ONCE)), max(len(rows), 1))
     edges = np.linspace(0, len(rows), n_parts + 1).astype(int)
-    on_threads(evaluate, [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)], n_threads=n_threads)
+    on_threads(evaluate, [slice(a, b) for a, b in itertools.pairwise(edges)], n_threads=n_threads)
     return table
 
 

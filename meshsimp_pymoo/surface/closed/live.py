@@ -1,9 +1,9 @@
 """A closed mesh that lives: insert a vertex, remove one, move one, and know the exact change of the error.
 
-The triangulation of the images changes as that of a height surface does (:mod:`~meshsimp_pymoo.plane.stars`), but there
-is no outline: the corners of the hull are pinned, so a vertex never leaves a gap and all triangles are part of the mesh.
-What a vertex costs depends on the triangles across the edges of its own too: those *beside* the changed ones are costed
-again, for the sides that have changed alone.
+The triangulation of the images changes as that of a height surface does (:mod:`~meshsimp_pymoo.plane.stars`), but
+there is no outline: the corners of the hull are pinned, so all triangles are part of the mesh. What a vertex costs
+depends on the triangles across the edges of its own too: those *beside* the changed ones are costed again, for the
+sides that have changed alone.
 
 A change that is tried is made in the records of the triangles, every write into which is logged, and taken back; the
 lists of the vertices are left as they are.
