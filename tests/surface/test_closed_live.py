@@ -16,7 +16,7 @@ from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
-from meshsimp_pymoo.search.local_search import relocate
+from meshsimp_pymoo.search.local_search import MoveShares, relocate
 from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, SQUARES, TRIANGLES
@@ -199,3 +199,12 @@ def open_cone(n):
     sides = [(k, after, tip), (after, k, n + k), (after, n + k, n + after), (n + after, n + k, bottom)]
     faces = np.concatenate([np.column_stack(side) for side in sides])
     return open_model(trimesh.Trimesh(points, faces, process=False), Options(surface="closed"))
+
+
+def test_where_there_is_no_border_room_for_one_triangle_stays_empty():
+    surface = surface_of("bumpy")
+    kept = surface.pinned.copy()
+    kept[::9] = True
+    most = 2 * int(kept.sum()) - 3
+    moved = relocate(surface, kept, moves=2_000, seed=1, triangles=most, shares=MoveShares(border=0.9))
+    assert surface.evaluate(moved)[0, TRIANGLES] == most - 1
