@@ -1110,7 +1110,9 @@ class Front(Sequence[FrontSolution]):
         try:
             return as_stored(surface, self._images)
         except ModelError as trouble:
-            raise ResultError(f"{where}: is not of this model ({trouble}); {way_out}") from None
+            if surface.model.hash != (self.run.get("model") or {}).get("hash"):
+                return surface  # which is what is wrong
+            raise ResultError(f"{where}: its front.npz cannot be used ({trouble}); write the front again") from None
 
     def _with_lines(self, model: Model, rules: Rules, where: Any) -> Surface:
         """Make the surface of a model; a file of break lines is looked for beside the results first."""

@@ -400,7 +400,8 @@ def write_front(
                 "source_index": np.asarray(model.source_index, np.int64),
                 "faces": parts,
                 "face_start": np.cumsum([0, *map(len, parts)]),
-            } | stored_arrays(surface)
+            }
+            arrays_of |= stored_arrays(surface)
         write_npz(partial / "front.npz", F=F[order], **arrays_of)
         shape = getattr(model, "shape", None)  # of a height grid
         record = dict(run or {}) | {

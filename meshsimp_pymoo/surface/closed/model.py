@@ -23,6 +23,7 @@ from meshsimp_pymoo.surface.units import length_unit
 
 # A mesh of fewer vertices is none.
 LEAST_VERTICES = 4
+LEAST_TRIANGLES = 2 * LEAST_VERTICES - 4
 
 
 @dataclass(frozen=True)
