@@ -97,7 +97,7 @@ def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
         try:
             built = build_model(source, up=options.up)
         except ModelError as trouble:
-            raise ModelError(f"{trouble}{_not_closed_either(source, options)}") from None
+            raise ModelError(f"{trouble}{not_closed_either(source, options)}") from None
     if mended != Mended():
         warn_of(f"{source.name}: {mended} (--repair none (repair='none') leaves them)")
         built = replace(built, found=built.found | {f"faces_{what}": n for what, n in vars(mended).items() if n})
@@ -144,8 +144,8 @@ def _refuse_side(name: str, options: Options) -> None:
         )
 
 
-def _not_closed_either(source: SourceMesh, options: Options) -> str:
-    """Return why a mesh without a border, which was refused as a height field, is not taken as a closed surface."""
+def not_closed_either(source: SourceMesh, options: Options) -> str:
+    """Return why a mesh without a border, which is refused as a height field, is no closed surface; for behind that."""
     if options.surface != "auto" or not _can_be_closed(source, options):
         return ""
     what = topology(source.faces)
