@@ -54,7 +54,7 @@ from meshsimp_pymoo.storage import (
     write_solution,
 )
 from meshsimp_pymoo.surface.grid_surface import GridSurface
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -69,7 +69,6 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     quality_of,
 )
-from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
 from meshsimp_pymoo.surface.surface import (
@@ -313,6 +312,8 @@ class Front(Sequence[FrontSolution]):
         self._meshes = tuple(meshes) or ("",) * len(self.quality)
         self._problem = problem
         self._surface = problem.surface if problem is not None else surface
+        #: Of a stored front of a closed surface: the images that its chromosomes are of, see `surface.kinds`.
+        self._images: Mapping[str, npt.NDArray[Any]] = {}
         if not self.quality:
             raise ValueError("a front has at least one solution; this one has none")
         shape = (len(self._kept), 1) if isinstance(self._kept, Nested) else self._kept.shape
@@ -524,7 +525,7 @@ class Front(Sequence[FrontSolution]):
         ----------
         folder : path
             The folder.
-        model : path, built-in name, trimesh.Trimesh, OpenModel or Surface, optional
+        model : path, built-in name, trimesh.Trimesh, OpenModel, ClosedModel or Surface, optional
             The original mesh, if it is no longer where the record says; of a front made by tiles what
             :func:`~meshsimp_pymoo.opening.open_grid` takes, or its surface.
 
@@ -546,6 +547,8 @@ class Front(Sequence[FrontSolution]):
             meshes=stored.meshes,
             series=stored.series,
         )
+        if stored.images is not None:
+            front._images = {"source_index": stored.source_index, "xy": stored.images}
         if model is not None:
             front._surface = front._surface_of(model)
         return front
@@ -565,7 +568,7 @@ class Front(Sequence[FrontSolution]):
             if not rows:
                 raise IndexError(f"{item} leaves nothing of a front of {len(self)} solutions")
             rows = range(len(self))[min(rows) : max(rows) + 1 : abs(item.step or 1)]  # sorted by triangles, always
-            return Front(
+            part = Front(
                 [self.quality[row] for row in rows],
                 self._kept.take(rows) if isinstance(self._kept, Nested) else self._kept[list(rows)],
                 faces=[self.faces[row] for row in rows],
@@ -576,6 +579,8 @@ class Front(Sequence[FrontSolution]):
                 meshes=[self._meshes[row] for row in rows],
                 series=self.series,
             )
+            part._images = self._images
+            return part
         row = operator.index(item)
         if not -len(self) <= row < len(self):
             raise IndexError(f"the front has the solutions 0 to {len(self) - 1}; there is no {row}")
@@ -625,7 +630,7 @@ class Front(Sequence[FrontSolution]):
 
     @property
     def model(self) -> Any:
-        """The original mesh: an OpenModel, or the HeightGrid of tiles."""
+        """The original mesh: an OpenModel, a ClosedModel, or the HeightGrid of tiles."""
         return self.surface.model
 
     @property
@@ -879,8 +884,9 @@ class Front(Sequence[FrontSolution]):
         piece : int, optional
             Write the chosen mesh of a height grid in pieces of about so many samples a side, in the folder ``chosen``.
         refit : bool or mapping
-            Write each of the meshes once more with its best heights, and their error to ``front.csv``; see
-            :func:`~meshsimp_pymoo.surface.height.refit_heights`. Or only those of these solutions, found already.
+            Write each of the meshes once more refitted, and their error to ``front.csv``: with its best heights, see
+            :func:`~meshsimp_pymoo.surface.height.refit_heights`, or of a closed surface its best vertices. Or only
+            those of these solutions, found already.
         pictures : bool
             Go on to :meth:`draw`, once all else is in place.
         page : bool
@@ -1079,6 +1085,7 @@ class Front(Sequence[FrontSolution]):
             else:
                 found = open_model(source, applicable(source, options))
                 surface = self._with_lines(found, rules, where)
+            surface = self._with_images(surface, where, way_out)
         except ModelError as trouble:
             if model is not None:
                 raise
@@ -1094,7 +1101,20 @@ class Front(Sequence[FrontSolution]):
             )
         return surface
 
-    def _with_lines(self, model: OpenModel, rules: Rules, where: Any) -> HeightSurface:
+    def _with_images(self, surface: Surface, where: Any, way_out: str) -> Surface:
+        """Return the surface with the images of its vertices that the chromosomes are of, if it has any."""
+        if not stored_arrays(surface):
+            return surface
+        if not self._images:
+            raise ResultError(f"{where}: holds no images of the vertices (xy of front.npz); {way_out}")
+        try:
+            return as_stored(surface, self._images)
+        except ModelError as trouble:
+            if surface.model.hash != (self.run.get("model") or {}).get("hash"):
+                return surface  # which is what is wrong
+            raise ResultError(f"{where}: its front.npz cannot be used ({trouble}); write the front again") from None
+
+    def _with_lines(self, model: Model, rules: Rules, where: Any) -> Surface:
         """Make the surface of a model; a file of break lines is looked for beside the results first."""
         file = ((self.run.get("model") or {}).get("lines") or {}).get("file")
         if is_file_of_lines(rules.break_lines) and self.folder is not None and isinstance(file, str):
@@ -1102,7 +1122,7 @@ class Front(Sequence[FrontSolution]):
             if beside.is_file():
                 rules = replace(rules, break_lines=str(beside))
         try:
-            return HeightSurface(model, rules)
+            return surface_of(model, rules)
         except ModelError as trouble:
             if rules.break_lines is None:
                 raise

@@ -94,7 +94,10 @@ def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
                 "(surface='closed') says so; --patch front (patch='front') takes one side of it)"
             )
     else:
-        built = build_model(source, up=options.up)
+        try:
+            built = build_model(source, up=options.up)
+        except ModelError as trouble:
+            raise ModelError(f"{trouble}{not_closed_either(source, options)}") from None
     if mended != Mended():
         warn_of(f"{source.name}: {mended} (--repair none (repair='none') leaves them)")
         built = replace(built, found=built.found | {f"faces_{what}": n for what, n in vars(mended).items() if n})
@@ -105,22 +108,10 @@ def kind_of(source: SourceMesh, options: Options = DEFAULT) -> str:
     """Return what a mesh is taken for, "height" or "closed": what the options say, else what it passes for.
 
     A mesh that passes for neither is a height field, whose refusal says why.
-
-    Raises
-    ------
-    ModelError
-        If the options say that it is closed, and something else that only height fields have.
     """
-    side = next((name for name in ("patch", "up") if getattr(options, name) != getattr(DEFAULT, name)), None)
-    if options.surface == "closed" and side is not None:
-        value = getattr(options, side)
-        raise ModelError(
-            f"{source.name}: --{side} {value} ({side}={value!r}) describes height surfaces, and --surface closed "
-            f"(surface='closed') a closed one; leave one of them out"
-        )
     if options.surface != "auto":
         return options.surface
-    if side is not None or source.sort != "mesh" or source.up is not None:
+    if not _can_be_closed(source, options):
         return "height"
     what = topology(source.faces)
     if not what.is_sphere:
@@ -130,6 +121,36 @@ def kind_of(source: SourceMesh, options: Options = DEFAULT) -> str:
     except ModelError:
         refused = True
     return "closed" if refused else "height"
+
+
+def _can_be_closed(source: SourceMesh, options: Options) -> bool:
+    """Tell whether nothing says that a mesh is a height field."""
+    return _side(options) is None and source.sort == "mesh" and source.up is None
+
+
+def _side(options: Options) -> str | None:
+    """Return which option says from where a mesh is seen, as only height fields are, if one does."""
+    return next((name for name in ("patch", "up") if getattr(options, name) != getattr(DEFAULT, name)), None)
+
+
+def _refuse_side(name: str, options: Options) -> None:
+    """Refuse a side to see a closed surface from."""
+    side = _side(options)
+    if options.surface == "closed" and side is not None:
+        value = getattr(options, side)
+        raise ModelError(
+            f"{name}: --{side} {value} ({side}={value!r}) describes height surfaces, and --surface closed "
+            f"(surface='closed') a closed one; leave one of them out"
+        )
+
+
+def not_closed_either(source: SourceMesh, options: Options) -> str:
+    """Return why a mesh without a border, which is refused as a height field, is no closed surface; for behind that."""
+    if options.surface != "auto" or not _can_be_closed(source, options):
+        return ""
+    what = topology(source.faces)
+    has_border = what.loops or what.crowded
+    return "" if what.refusal is None or has_border else f"; as a closed surface it is refused too: it {what.refusal}"
 
 
 def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
@@ -143,7 +164,8 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
     Raises
     ------
     ModelError
-        If there is neither a file nor a built-in model of this name, or it cannot be used.
+        If there is neither a file nor a built-in model of this name, or it cannot be used; also if the options say that
+        it is closed, and something else that only height fields have.
 
     Warns
     -----
@@ -156,6 +178,7 @@ def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:
 def mended_source(model: Source, options: Options = DEFAULT) -> tuple[SourceMesh, Mended]:
     """Read a mesh as :func:`open_source` does, and return what was mended in it, too."""
     source = _source_of(model, options)
+    _refuse_side(source.name, options)
     mended = Mended()
     if options.repair == "mend":
         source, mended = mend(source)

@@ -5,14 +5,15 @@
     OUT/front.csv      one row per solution, sorted by triangles; the columns are FRONT_COLUMNS
     OUT/meshes/        007_412.ply is solution 7, of 412 triangles; see the column ``mesh``
     OUT/chosen.ply     the solution that was asked for, if one was
-    OUT/refitted/      the meshes with their best heights, if asked for, and OUT/chosen_refitted.ply; front.csv then has
-                       the columns REFIT_COLUMNS too
+    OUT/refitted/      the meshes with their best heights (of a closed surface: their best vertices), if asked for, and
+                       OUT/chosen_refitted.ply; front.csv then has the columns REFIT_COLUMNS too
     OUT/break_lines.geojson  the thinned break lines, which every mesh has as chains of edges, if the model has lines;
                        front.csv then has the columns OF_LINES too
     OUT/series.csv     other fronts to compare with, if there are some (what the search started from); SERIES_COLUMNS
     OUT/front.npz      F (S, 2), kept (S, ceil(N / 8)) as packed bits, source_index (N,); faces (M, 3), the triangles of
                        all free meshes, of which solution s has those from face_start[s] to face_start[s + 1],
-                       face_start (S + 1,); none: it is the Delaunay mesh of what it keeps. Of a nested front (one made
+                       face_start (S + 1,); none: it is the mesh that its surface makes of what it keeps. Of a closed
+                       surface xy (N, 2) too, the images of its vertices. Of a nested front (one made
                        by tiles) F and rows (V,), which the largest solution keeps, level (V,), at which each goes,
                        slope (S,): solution s keeps the rows of higher level, unless moved_start (S + 1,) gives it a
                        part of moved. No pickles
@@ -74,6 +75,7 @@ from meshsimp_pymoo.formats.table import (
     write_mesh,
 )
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
+from meshsimp_pymoo.surface.kinds import stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
@@ -87,7 +89,7 @@ FRONT_COLUMNS = (
     "solution", *(name for name, measure in MEASURES.items() if measure.of is not None), "mesh", *OF_MESH, "free",
 )  # fmt: skip
 # Behind them, only where the model has break lines: OF_LINES. Then
-REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where heights were fitted; empty where no mesh was written
+REFIT_COLUMNS = ("refitted_error", "refitted_mesh")  # only where meshes were refitted; empty where none was written
 # The error of other fronts is what was minimised: the sum, or another measure if one was asked for.
 SERIES_COLUMNS = ("series", "minimised", "triangles")
 INT_COLUMNS = ("solution", *COUNTED, "free")
@@ -128,13 +130,15 @@ class StoredFront:
     run : dict
         The content of run.json.
     refitted_error : (S,) float array, optional
-        The error with the best heights, NaN where it was not computed; None if heights were not fitted.
+        The error of the refitted meshes, NaN where it was not computed; None if none was refitted.
     refitted_meshes : tuple of str
-        Path of each mesh with its best heights, relative to the folder; empty where there is none.
+        Path of each refitted mesh, relative to the folder; empty where there is none.
     series : dict of str to (n, 2) float array
         Other fronts to compare with: the error that was minimised [model units] and triangles, by name.
     faces : tuple of (M, 3) int32 array or None
         The triangles of each solution that is a free mesh, as rows of the model's vertices; None of the others.
+    images : (N, 2) float array, optional
+        The images of the vertices of a closed surface in the plane, in vector order.
     """
 
     folder: Path
@@ -147,6 +151,7 @@ class StoredFront:
     refitted_meshes: tuple[str, ...] = ()
     series: dict[str, FloatArray] = field(default_factory=dict)
     faces: tuple[IntArray | None, ...] = ()
+    images: FloatArray | None = None
 
     def __repr__(self) -> str:
         T, error = self.quality["triangles"], self.quality["error"]
@@ -273,9 +278,9 @@ def write_front(
         Cuts the triangles (M, 3) of the chosen mesh into pieces, each with a name: they are written to a folder
         ``chosen`` instead.
     refit : callable, optional
-        The best heights for the solution in this row of ``kept`` (see
-        :func:`~meshsimp_pymoo.surface.height.refit_heights`). Each mesh that is written is then written with them
-        too, as a file of its own, and ``front.csv`` has two more columns, REFIT_COLUMNS. None where there are none.
+        The refitted mesh of the solution in this row of ``kept`` (see ``refit`` of its surface). Each mesh that is
+        written is then written refitted too, as a file of its own, and ``front.csv`` has two more columns,
+        REFIT_COLUMNS. None where there is none.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
         written to ``series.csv``.
@@ -396,6 +401,7 @@ def write_front(
                 "faces": parts,
                 "face_start": np.cumsum([0, *map(len, parts)]),
             }
+            arrays_of |= stored_arrays(surface)
         write_npz(partial / "front.npz", F=F[order], **arrays_of)
         shape = getattr(model, "shape", None)  # of a height grid
         record = dict(run or {}) | {
@@ -446,7 +452,7 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     quality, meshes, refitted_meshes = read_front_csv(folder / "front.csv")
     refitted_error = quality.pop("refitted_error", None)
     count = len(meshes)
-    F, kept, source_index, parts = _read_npz(folder / "front.npz", count)
+    F, kept, source_index, parts, images = _read_npz(folder / "front.npz", count)
     if F.shape != (count, 2) or not (
         np.array_equal(F[:, 0], quality["error"]) and np.array_equal(F[:, 1], quality["triangles"])
     ):
@@ -461,7 +467,9 @@ def read_front(folder: str | os.PathLike[str]) -> StoredFront:
     faces = tuple(_own_faces(folder / "front.npz", quality, kept, parts))
     run = read_record(folder / "run.json", count)
     series = _read_series(folder / "series.csv")
-    return StoredFront(folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series, faces)
+    return StoredFront(
+        folder, quality, kept, source_index, meshes, run, refitted_error, refitted_meshes, series, faces, images
+    )
 
 
 def _own_faces(
@@ -733,19 +741,22 @@ def read_front_csv(path: Path) -> tuple[dict[str, npt.NDArray[Any]], tuple[str, 
     return columns, meshes, refitted
 
 
-def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, IntArray, list[IntArray]]:
-    """Return F, the subsets of ``count`` solutions and the faces of each that is free.
+def _read_npz(
+    path: Path, count: int
+) -> tuple[FloatArray, BoolArray | Nested, IntArray, list[IntArray], FloatArray | None]:
+    """Return F, the subsets of ``count`` solutions, the faces of each that is free, and the images of the vertices.
 
-    The subsets are chromosomes with their rows in the file, or nested.
+    The subsets are chromosomes with their rows in the file, or nested; images are those of a closed surface.
     """
     try:
         with path.open("rb") as stream:
             arrays = read_npz(stream, path.name)
         F = _of_type(path, "F", arrays, "f", 2)
         if "level" in arrays:
-            return F, _nested(path, arrays, count), np.empty(0, np.int64), [np.empty((0, 3), np.int32)] * count
+            return F, _nested(path, arrays, count), np.empty(0, np.int64), [np.empty((0, 3), np.int32)] * count, None
         packed, source_index = _of_type(path, "kept", arrays, "u", 2), _of_type(path, "source_index", arrays, "i", 1)
         faces, start = _of_type(path, "faces", arrays, "i", 2), _of_type(path, "face_start", arrays, "i", 1)
+        images = _of_type(path, "xy", arrays, "f", 2) if "xy" in arrays else None
     except KeyError as problem:
         raise ResultError(
             f"{path}: holds no array {problem}; the file is of an earlier version or not ours: simplify again"
@@ -773,7 +784,9 @@ def _read_npz(path: Path, count: int) -> tuple[FloatArray, BoolArray | Nested, I
             f"{path}: face_start does not cut its {len(faces)} faces into those of {count} solutions, one after the "
             "other; write the front again"
         )
-    return F, bits[:, :n], source_index, [faces[a:b] for a, b in itertools.pairwise(start)]
+    if images is not None and images.shape != (n, 2):
+        raise ResultError(f"{path}: xy has the shape {images.shape}; {n} vertices have images of the shape {(n, 2)}")
+    return F, bits[:, :n], source_index, [faces[a:b] for a, b in itertools.pairwise(start)], images
 
 
 def _nested(path: Path, arrays: Mapping[str, AnyArray], count: int) -> Nested:

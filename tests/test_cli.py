@@ -443,10 +443,11 @@ def test_the_front_of_a_closed_surface_is_cut_out_when_asked(tmp_path, capsys):
     ball = trimesh.creation.icosphere(subdivisions=3)
     write_mesh(tmp_path / "ball.ply", ball.vertices, ball.faces)
     assert run("simplify", tmp_path / "ball.ply", "-o", tmp_path / "no", "--up", "z") == 2
-    assert one_line(capsys).endswith("cut out the patch that faces the viewer with --patch front\n")
-    assert run("info", tmp_path / "ball.ply") == 2
+    both = "take it as it is with --surface closed and without --up, or cut out the patch that faces the viewer with"
+    assert one_line(capsys).endswith(f"{both} --patch front\n")
+    assert run("info", tmp_path / "ball.ply") == 0
     said = "name the viewing side with --up z and cut the patch that faces it with --patch front"
-    assert said in capsys.readouterr().err
+    assert said in capsys.readouterr().out
     assert run("simplify", tmp_path / "ball.ply", "-o", tmp_path / "out", "--up", "z", "--patch", "front", *QUICK) == 0
     mesh = trimesh.load(tmp_path / "out" / read_front(tmp_path / "out").meshes[-1], process=False)
     assert mesh.vertices[:, 2].min() > -0.2
@@ -659,7 +660,7 @@ def folded():
     return points
 
 
-BOX = trimesh.creation.box()
+RING = trimesh.creation.annulus(1.0, 2.0, 1.0, sections=8)
 BAD_FILES = {
     "empty": (b"", r"bad\.ply: is empty"),
     "text": (b"Dear reviewer,\n", r"bad\.ply: "),
@@ -672,7 +673,7 @@ BAD_FILES = {
     "three vertices": (text_ply(ROOF.points[:3], [[0, 1, 2]]), r"bad\.ply: has 3 vertices; at least 4"),
     "collinear": (text_ply([[k, 2 * k, 3 * k] for k in range(4)], [[0, 1, 2], [1, 2, 3]]), r"bad\.ply: .* line"),
     "past the end": (text_ply(ROOF.points, [*ROOF.faces.tolist(), [0, 1, 25]]), r"bad\.ply: 1 of 33 faces name"),
-    "closed": (text_ply(BOX.vertices, BOX.faces), r"bad\.ply: .*closed.*--patch front"),
+    "closed": (text_ply(RING.vertices, RING.faces), r"bad\.ply: .*closed.*--patch front.*genus 1"),
     "non-manifold": (
         text_ply([*ROOF.points.tolist(), [0, 0, 9]], [*ROOF.faces.tolist(), [0, 6, 25], [6, 0, 25]]),
         r"bad\.ply: \d+ edges belong to more than two faces",
@@ -1339,12 +1340,12 @@ def test_info_says_what_was_mended(tmp_path, capsys):
 
 
 def test_info_describes_even_what_would_be_refused(tmp_path, capsys):
-    (tmp_path / "box.ply").write_bytes(BAD_FILES["closed"][0])
-    assert run("info", tmp_path / "box.ply") == 2
+    (tmp_path / "ring.ply").write_bytes(BAD_FILES["closed"][0])
+    assert run("info", tmp_path / "ring.ply") == 2
     out, err = capsys.readouterr()
-    assert re.search(r"triangles +12\n", out)
+    assert re.search(rf"triangles +{len(RING.faces)}\n", out)
     assert re.search(r"verdict +refused", out)
-    assert err.startswith(f"meshsimp: {tmp_path / 'box.ply'}: ")
+    assert err.startswith(f"meshsimp: {tmp_path / 'ring.ply'}: ")
 
 
 def test_a_mesh_is_described_by_every_measure_that_means_something(monkeypatch):

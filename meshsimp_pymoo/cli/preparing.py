@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from meshsimp_pymoo.cli.terminal import Stages, await_interruption, say
 from meshsimp_pymoo.compiling.store import place, told_of_compiling
@@ -17,13 +17,28 @@ ONCE = "compiling once for this machine"
 class Compiling:
     """The compiling of a command: :meth:`finish` ends it; ``seconds`` says how long it has taken so far."""
 
-    def __init__(self, warming: Warming, shown: Stages) -> None:
-        self._warming = warming
+    def __init__(self, shown: Stages, stack: ExitStack) -> None:
         self._shown = shown
+        self._stack = stack
+        self._names: set[str] = set()
         self.seconds = 0.0
 
-    def finish(self) -> None:
-        """Compile what is missing still."""
+    def begin(self, names: Iterable[str]) -> None:
+        """Begin to compile what is missing of these parts, and say so; what else was begun is left."""
+        self._stack.close()
+        self._names = set(names)
+        warming = self._warming = Warming(self._names)
+        self._shown.expect("compiling", warming.expected)
+        if warming.parts and not self._shown.quiet:
+            if not sys.stderr.isatty():
+                say(f"{_once(warming)} (longer on a busy machine)")
+            _say_where()
+        self._stack.enter_context(warming)
+
+    def finish(self, names: Iterable[str] | None = None) -> None:
+        """Compile what is missing still; of these parts, where it turned out that others are needed than were begun."""
+        if names is not None and set(names) != self._names:
+            self.begin(names)
         if not self._warming.parts:
             return
         before = self.seconds
@@ -39,19 +54,15 @@ class Compiling:
 @contextmanager
 def compiling(names: Iterable[str], shown: Stages) -> Iterator[Compiling]:
     """Begin to compile what is missing of these parts, and say so; whatever is compiled in here is counted."""
-    warming = Warming(names)
-    shown.expect("compiling", warming.expected)
-    if warming.parts and not shown.quiet:
-        if not sys.stderr.isatty():
-            say(f"{_once(warming)} (longer on a busy machine)")
-        _say_where()
-    found = Compiling(warming, shown)
+    with ExitStack() as stack:
+        found = Compiling(shown, stack)
 
-    def told(_: object, seconds: float | None) -> None:
-        found.seconds += seconds or 0.0
+        def told(_: object, seconds: float | None) -> None:
+            found.seconds += seconds or 0.0
 
-    with warming, told_of_compiling(told):
-        yield found
+        found.begin(names)
+        with told_of_compiling(told):
+            yield found
 
 
 def compile_first(names: Iterable[str], *, quiet: bool) -> None:

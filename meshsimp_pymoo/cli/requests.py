@@ -20,6 +20,8 @@ from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
 
 Part = TypeVar("Part")
 
+# What says so, or what the model turned out to be.
+CLOSED = "a closed surface (--surface closed)"
 # From this many samples on, a grid is thinned tile by tile without being asked.
 TILED_FROM = 2_000_000
 
@@ -178,15 +180,20 @@ def request_of(args: argparse.Namespace) -> Request:
         tiling=_part(Tiling, args),
         measure=measure,
     )
+    refuse(request)
+    if not request.is_targeted:
+        return request
+    return replace(request, rules=replace(request.rules, measure=measure_for(request.wish.limits, measure)))
+
+
+def refuse(request: Request) -> None:
+    """Refuse what does not go with each other; once more when ``request.options.surface`` is what the model is."""
     for (one, other), (meets, why) in REFUSED.items():
         if meets(request):
             do = "do" if one == "{wish}" and len(request.wish.limits) > 1 else "does"
             raise UsageError(
                 f"{_filled(one, request)} {do} not go with {_filled(other, request)}: {_filled(why, request)}"
             )
-    if not request.is_targeted:
-        return request
-    return replace(request, rules=replace(request.rules, measure=measure_for(request.wish.limits, measure)))
 
 
 def _refuse_file(folder: str) -> None:
@@ -214,8 +221,13 @@ def _is_free_alone(name: str) -> Callable[[Request], bool]:
     return lambda request: not request.free.free and getattr(request.free, name) != getattr(Free(), name)
 
 
+def _is_closed_and(meets: Callable[[Request], bool]) -> Callable[[Request], bool]:
+    """Return what tells whether something is said of a closed surface."""
+    return lambda request: request.options.surface == "closed" and meets(request)
+
+
 # What does not go with what, whatever the model is: two options, when that is so, and why, with the way out. What tiles
-# do not know is said in cli/tiling.py.
+# do not know is said in cli/tiling.py; rules and options that describe height surfaces a closed one refuses itself.
 REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
     ("{wish}", "--pick knee"): (
         lambda request: bool(request.wish.limits) and request.wish.knee,
@@ -233,6 +245,14 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
         )
         for name in ("free_height", "no_centroids")
     },
+    ("--free", CLOSED): (
+        _is_closed_and(lambda request: request.free.free),
+        "its meshes follow from their vertices; leave --free out (--refit lowers the error further)",
+    ),
+    ("--format landxml", CLOSED): (
+        _is_closed_and(lambda request: request.output.format == "landxml"),
+        "LandXML holds surfaces with one height at each place; write another format, such as ply",
+    ),
 }
 
 

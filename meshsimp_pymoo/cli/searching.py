@@ -19,7 +19,7 @@ from pymoo.termination.max_time import TimeBasedTermination
 
 from meshsimp_pymoo.arrays import spread
 from meshsimp_pymoo.cli.preparing import compiling
-from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish
+from meshsimp_pymoo.cli.requests import Output, Request, Search, Wish, refuse
 from meshsimp_pymoo.cli.results import WAIT_SECONDS, hand_over, hand_over_stored, lacks_pictures
 from meshsimp_pymoo.cli.terminal import (
     BAD_INPUT,
@@ -33,7 +33,7 @@ from meshsimp_pymoo.cli.terminal import (
     stop_if_interrupted,
 )
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
-from meshsimp_pymoo.errors import NoFullGrid, ResultError, UsageError
+from meshsimp_pymoo.errors import ModelError, NoFullGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, listed
 from meshsimp_pymoo.front import Freeing, Front, FrontSolution, starting_front
@@ -43,6 +43,7 @@ from meshsimp_pymoo.search.checkpoint import (
     CheckpointError,
     Checkpoints,
     NotResumable,
+    Stored,
     difference,
     read_checkpoint,
     restore,
@@ -64,15 +65,18 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
+from meshsimp_pymoo.surface.closed.model import LEAST_TRIANGLES, ClosedModel
 from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import as_stored, stored_arrays
+from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.smallest import tolerance_for
 from meshsimp_pymoo.surface.surface import Refitted
-from meshsimp_pymoo.warming import FREE, LINED, SEARCH, WISH
+from meshsimp_pymoo.warming import CLOSED_SEARCH, CLOSED_WISH, FREE, LINED, SEARCH, WISH, missing
 
 # Seconds that freeing a front is thought to take where nobody says how long.
 FREEING_SECONDS = 15.0
-# Of the time that is given, the share kept for the best heights of the meshes.
+# Of the time that is given, the share kept for refitting the meshes.
 REFIT_SHARE = 0.3
 # Of that time, the share for measuring what a search was to start from.
 MEASURED_SHARE = 0.4
@@ -113,17 +117,14 @@ def _simplify(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what)
     if not is_drawn_only:
         _claim(output, search)
-    parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
-    if output.refit or request.free.no_centroids:
-        parts.append("scores")
-    if request.rules.break_lines is not None:
-        parts.extend(LINED)
-    with compiling(parts, shown) as compiled:
+    with compiling(_parts(_guessed(request)), shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             problem = MeshProblem(request.model, options=request.options, rules=request.rules, n_threads=search.threads)
+            as_found = _of_kind(request, "closed" if isinstance(problem.model, ClosedModel) else "height")
+            refuse(as_found)
             format_to_write(output.format).check(problem.model)
         read_seconds = shown.seconds["reading"] - compiled.seconds
-        compiled.finish()
+        compiled.finish(_parts(as_found))
         request = replace(request, wish=request.wish.among(lambda: len(problem.model.faces)))
         _refuse_impossible(problem, request.wish, quiet=output.quiet)
     if search.time is not None:
@@ -135,16 +136,44 @@ def _simplify(request: Request, shown: Stages) -> int:
     if is_drawn_only:
         return hand_over_stored(request, problem.surface, shown)
     with answering(*WRITING):
-        found = _search(problem, keeper, shown)
+        found = _search(keeper, shown)
         if found is None:
             say("interrupted before the first generation was complete; nothing is written")
             return INTERRUPTED
-        ended = _write(found, keeper, shown)
+        ended, surface = _write(found, keeper, shown), keeper.problem.surface
         # its subsets, and with the checkpoints those of the search, whose objects refer to each other, take more memory
         # than the model
         del found, keeper
         gc.collect()
-        return hand_over(request, problem.surface, shown) if ended is None else ended
+        return hand_over(request, surface, shown) if ended is None else ended
+
+
+def _of_kind(request: Request, kind: str) -> Request:
+    """Return a request of a model that is of this kind."""
+    return replace(request, options=replace(request.options, surface=kind))
+
+
+def _guessed(request: Request) -> Request:
+    """Return a request with what the model is taken for until it is read, while a second process compiles already.
+
+    That is a kind of which nothing has to be compiled, so that nothing is begun in vain again and again.
+    """
+    if request.options.surface != "auto":
+        return request
+    kinds = [_of_kind(request, kind) for kind in ("height", "closed")]
+    return next((one for one in kinds if not missing(_parts(one))), kinds[0])
+
+
+def _parts(request: Request) -> list[str]:
+    """Return what has to be compiled for a request of a model of a kind that is known."""
+    if request.options.surface == "closed":
+        return list(CLOSED_WISH if request.is_targeted else CLOSED_SEARCH)
+    parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
+    if request.output.refit or request.free.no_centroids:
+        parts.append("scores")
+    if request.rules.break_lines is not None:
+        parts.extend(LINED)
+    return parts
 
 
 def _claim(output: Output, search: Search) -> None:
@@ -179,14 +208,14 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
             f"{problem.surface.view.rotation[2].tolist()}; choose another viewing side with --up"
         )
     # With open bays, more vertices can mean fewer triangles, but never none.
-    bays = problem.surface.rules.footprint != "hull"
-    if problem.model.lines is not None and wish.triangles is not None and wish.triangles < bare.triangles:
+    bays = problem.surface.rules.footprint == "model"
+    if _lines_of(problem) is not None and wish.triangles is not None and wish.triangles < bare.triangles:
         said = _below_lines(problem, wish.triangles, bare.triangles)
         if not bays or problem.model.footprint.side == 0:
             raise UsageError(said)
         if not quiet:
             say(f"{said}; looking for one all the same, as open bays may allow it")
-    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles
+    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles or LEAST_TRIANGLES
     if wish.triangles is not None and wish.triangles < least:
         raise UsageError(
             f"--triangles {wish.triangles} is impossible: {problem.model.name} has {least} to "
@@ -202,7 +231,7 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
 
 def _below_lines(problem: MeshProblem, wished: int, smallest: int) -> str:
     """Return that a mesh is wished for that is smaller than break lines allow, and which tolerance would allow it."""
-    surface, lines = problem.surface, problem.model.lines
+    surface, lines = problem.surface, _lines_of(problem)
     assert isinstance(surface, HeightSurface)
     assert lines is not None
     tolerance = tolerance_for(surface, wished) if surface.rules.break_lines is not None else None
@@ -213,6 +242,12 @@ def _below_lines(problem: MeshProblem, wished: int, smallest: int) -> str:
         f"--triangles {wished}: with break lines within {lines.tolerance:g} the smallest mesh of "
         f"{problem.model.name} has {smallest:,} triangles; {way_out}"
     )
+
+
+def _lines_of(problem: MeshProblem) -> ModelLines | None:
+    """Return the break lines, which height surfaces can have."""
+    surface = problem.surface
+    return surface.model.lines if isinstance(surface, HeightSurface) else None
 
 
 # ----------------------------------------------------------------------------------------------------------- the search
@@ -276,7 +311,7 @@ def _set_up(problem: MeshProblem, request: Request) -> Any:
 
 
 def _search_seconds(request: Request, seconds: float) -> float:
-    """Return what is left of the time without that for the best heights."""
+    """Return what is left of the time without that for refitting."""
     return seconds * (1.0 - REFIT_SHARE) if request.output.refit else seconds
 
 
@@ -285,7 +320,7 @@ def _free_moves(moves: float) -> int:
     return int((1.0 - SUBSETS_SHARE) * (moves - 1))
 
 
-def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | None:
+def _search(keeper: Keeper, shown: Stages) -> _Found | None:
     """Run the algorithm to its budget or to Ctrl-C; None if there is no front yet."""
     timed = keeper.request.search.time is not None
     found, generations, interrupted = None, 0, False
@@ -293,6 +328,7 @@ def _search(problem: MeshProblem, keeper: Keeper, shown: Stages) -> _Found | Non
     try:
         with answering("stopping: the front so far is written next"), shown.stage("searching", "searching") as show:
             algorithm, before = keeper.begin()
+            problem = keeper.problem
             start = time.perf_counter()
             found, generations = algorithm.opt, (algorithm.n_iter or 1) - 1
             while algorithm.has_next():
@@ -445,7 +481,7 @@ class Keeper:
     Parameters
     ----------
     problem : MeshProblem
-        What is searched.
+        What is searched; after :meth:`begin`, with the images that its checkpoint has of a closed surface.
     request : Request
         How, where the results go, and whether old ones give way.
     before : mapping
@@ -469,7 +505,7 @@ class Keeper:
     @property
     def what(self) -> dict[str, Any]:
         """What the search is: all that decides its results."""
-        search, versions, lines = self.search, package_versions(), self.problem.model.lines
+        search, versions, lines = self.search, package_versions(), _lines_of(self.problem)
         return {
             # the lines, of which the model's hash says only that it is another
             **plain(self.problem.surface.rules),
@@ -487,30 +523,37 @@ class Keeper:
 
     def begin(self) -> tuple[Any, float]:
         """Return the algorithm, where its checkpoint left it if there is one, and the seconds it took before."""
-        algorithm, before, interval = _set_up(self.problem, self.request), 0.0, self.search.checkpoint
-        if interval is None:
-            return algorithm, before
-        if self.path.exists():
+        algorithm, before, interval, problem = None, 0.0, self.search.checkpoint, self.problem
+        if interval is not None and self.path.exists():
             try:
-                before = self._go_on(algorithm)
+                algorithm, before = self._go_on()
                 self.is_kept = True
-            except CheckpointError as problem:
+            except CheckpointError as trouble:
                 if not self.output.overwrite:
                     raise ResultError(
-                        f"{problem}; name another folder, or allow overwriting (--overwrite) to begin anew"
+                        f"{trouble}; name another folder, or allow overwriting (--overwrite) to begin anew"
                     ) from None
-                algorithm = _set_up(self.problem, self.request)
+                algorithm, self.problem = None, problem
+        if algorithm is None:
+            algorithm = _set_up(self.problem, self.request)
+        if interval is None:
+            return algorithm, before
+        arrays = stored_arrays(self.problem.surface)
         try:
-            self._checkpoints = Checkpoints(self.path, algorithm, self.what, interval=interval, before=before)
-        except NotResumable as problem:
-            self._warn(problem)
+            self._checkpoints = Checkpoints(
+                self.path, algorithm, self.what, interval=interval, before=before, arrays=arrays
+            )
+        except NotResumable as trouble:
+            self._warn(trouble)
         return algorithm, before
 
-    def _go_on(self, algorithm: Any) -> float:
-        """Bring the algorithm to where the checkpoint left it; return the seconds that took."""
+    def _go_on(self) -> tuple[Any, float]:
+        """Return the algorithm where the checkpoint left it, and the seconds that took."""
         stored = read_checkpoint(self.path)
-        if other := difference(stored.what, self.what):
+        reason = self._take_images(stored)
+        if other := difference(stored.what, self.what) or reason:
             raise CheckpointError(f"{self.path}: belongs to another search ({other})")
+        algorithm = _set_up(self.problem, self.request)
         restore(stored, algorithm)
         self.begun = stored.facts.get("begun", self.begun)
         if not self.output.quiet:
@@ -518,7 +561,21 @@ class Keeper:
                 f"{self.output.folder} holds a search that was stopped after {algorithm.n_iter - 1} generations, "
                 f"{algorithm.evaluator.n_eval:,} evaluations, {stored.seconds:.0f} s; going on from there"
             )
-        return stored.seconds
+        return algorithm, stored.seconds
+
+    def _take_images(self, stored: Stored) -> str:
+        """Give the problem the images that a checkpoint has of a closed surface; return why not, if they are others."""
+        try:
+            surface = as_stored(self.problem.surface, stored.arrays)
+        except KeyError as name:
+            return f"it holds no {name}"
+        except ModelError as trouble:
+            return str(trouble)
+        if surface is not self.problem.surface:
+            options, objectives = self.problem.options, self.problem.objectives
+            self.problem = MeshProblem(surface, objectives=objectives, n_threads=self.search.threads)
+            self.problem.options = options  # a surface is given as it is, but was read so
+        return ""
 
     def keep(self, *, last: bool = False) -> None:
         """Save the state if it is time; at the end of the search, if it was long enough to be worth it."""
@@ -585,9 +642,9 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
 
 
 def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown: Stages) -> dict[int, Refitted]:
-    """Return the best heights of the meshes to be written, as many as the time allows, the chosen one first.
+    """Return the meshes to be written with their best vertices, as many as the time allows, the chosen one first.
 
-    A mesh of which they raise an error that is wished for keeps its own.
+    A mesh of which these raise an error that is wished for keeps its own.
     """
     wished = [name for name in request.wish.limits if MEASURES[name].unit]
     front, limit = found.front, request.search.time
@@ -623,13 +680,14 @@ def _refit(found: _Found, chosen: FrontSolution | None, request: Request, shown:
     if len(fitted) < done:
         raised = listed([MEASURES[name].label for name in wished], "or")
         say(
-            f"{done - len(fitted)} of {done} meshes are not refitted: heights of less error in all raise their {raised}"
+            f"{done - len(fitted)} of {done} meshes are not refitted: vertices moved for less error in all raise their "
+            f"{raised}"
         )
     return fitted
 
 
 def _raises(solution: FrontSolution, refitted: Refitted, wished: list[str]) -> bool:
-    """Tell whether other heights raise one of these measures of a mesh, by more than rounding."""
+    """Tell whether moved vertices raise one of these measures of a mesh, by more than rounding."""
     others = [name for name in wished if name != "mean_error"]  # which they lower
     if not others:
         return False

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
+    from meshsimp_pymoo.surface.kinds import Model
     from meshsimp_pymoo.surface.measures import Quality
-    from meshsimp_pymoo.surface.model import OpenModel
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -227,7 +227,7 @@ def stop_if_interrupted() -> None:
         raise KeyboardInterrupt
 
 
-def front_in_words(model: OpenModel, evaluations: int, F: FloatArray) -> str:
+def front_in_words(model: Model, evaluations: int, F: FloatArray) -> str:
     """Return what a search has found so far, for the line of its progress."""
     from meshsimp_pymoo.search.display import errors_at, usual_sizes
 
@@ -472,13 +472,13 @@ def in_unit(unit: str) -> str:
 
 def say(line: str) -> None:
     """Print one line on stderr."""
-    print(f"meshsimp: {printable(_with_options(line))}", file=sys.stderr)
+    print(f"meshsimp: {printable(with_options(line))}", file=sys.stderr)
 
 
-def _with_options(line: str) -> str:
+def with_options(line: str) -> str:
     """Return what a message of the package says with the options, without what Python calls them.
 
-    >>> _with_options("cut it with --patch front (patch='front')"), _with_options("say classes=2 (--classes 2)")
+    >>> with_options("cut it with --patch front (patch='front')"), with_options("say classes=2 (--classes 2)")
     ('cut it with --patch front', 'say --classes 2')
     """
     line = re.sub(r"(--[a-z-]+ \S+) \([a-z_]+='[^']*'\)", r"\1", line)

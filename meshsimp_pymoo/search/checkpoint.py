@@ -123,7 +123,7 @@ class Stored:
     content : dict
         The state in JSON's types.
     arrays : dict of str to array
-        The arrays that it names.
+        The arrays that it names, and those that the caller stored beside.
     """
 
     path: Path
@@ -150,6 +150,10 @@ class Checkpoints:
         so that checkpoints cost at most 2 %.
     before : float
         Seconds that the search took before this process.
+    arrays : mapping of str to array, optional
+        What has to be stored besides, under names that are words: of a closed surface what
+        :func:`~meshsimp_pymoo.surface.kinds.stored_arrays` says, with which the problem is made again before
+        :func:`restore`.
 
     Raises
     ------
@@ -165,12 +169,14 @@ class Checkpoints:
         *,
         interval: float = INTERVAL,
         before: float = 0.0,
+        arrays: Mapping[str, npt.NDArray[Any]] | None = None,
     ) -> None:
         self.path = path
         self.algorithm = algorithm
         self.what = dict(what)
         self.interval = interval
         self.before = before
+        self.arrays = dict(arrays or {})
         self.saved = 0
         self._parts = frozenset(_Writer().state(algorithm)[1])
         self._began = time.perf_counter()
@@ -215,7 +221,7 @@ class Checkpoints:
             writer = _Writer(self._parts)
             state, _ = writer.state(self.algorithm)
             head = {"format": FORMAT, "what": self.what, "facts": facts, "seconds": self.seconds, "clock": time.time()}
-            _write(self.path, head | state, writer.arrays)
+            _write(self.path, head | state, self.arrays | writer.arrays)
             self.saved += 1
         finally:
             now = time.perf_counter()

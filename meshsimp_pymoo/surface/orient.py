@@ -307,7 +307,9 @@ class SurfaceFacts:
     def refusal(self) -> str | None:
         """Why this cannot be used as an open model, with the way out; None if it can."""
         if self.border_edges == 0 and self.nonmanifold_edges == 0:
-            return f"{self.name}: the surface is closed (no border edge among {self.n_faces} faces); {CUT}"
+            return (
+                f"{self.name}: the surface is closed (no border edge among {self.n_faces} faces); {self._as_body}{CUT}"
+            )
         if self.nonmanifold_example is not None and self.width_share > WIDTH_SHARE:
             a, b, count = self.nonmanifold_example
             return (
@@ -315,6 +317,12 @@ class SurfaceFacts:
                 f"{a} and {b}, {count} faces); repair them in a mesh editor or {CUT}"
             )
         return self.refusal_from_there
+
+    @property
+    def _as_body(self) -> str:
+        """The way out of a closed surface that is like a sphere; empty of others."""
+        is_like_a_sphere = self.components == 1 and 2 * self.n_vertices - self.n_faces == 4
+        return "take it as it is with --surface closed (surface='closed') and without --up, or " * is_like_a_sphere
 
     @property
     def refusal_from_there(self) -> str | None:

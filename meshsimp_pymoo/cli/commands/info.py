@@ -7,18 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.formats.options import Options
+    from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.surface.closed.model import Topology
     from meshsimp_pymoo.surface.rules import Rules
 
+# What is said of a model whatever it is taken for; None where it is not known, or there is none.
+OF_SURFACES = ("components", "genus", "loops", "caps", "flips", "least_image_edge", "not_height", "not_closed")
 HELP = "say what a model is and whether it can be simplified"
 DESCRIPTION = """\
-Say what MODEL is, whether it is a height field, and what would be refused. Without a
-MODEL: list the built-in models."""
+Say what MODEL is, whether it is a height field or a closed surface, and what would be
+refused. Without a MODEL: list the built-in models."""
 EXAMPLES = """\
 examples:
   meshsimp info
       the built-in models
   meshsimp info face.ply
-      is it a height field, and seen from where?
+      is it a height field, and seen from where, or a closed surface?
   meshsimp info dem.asc --break-lines rivers.geojson --line-tolerance 0.5
       how many edges the lines force, and the smallest mesh they allow
   meshsimp info head.ply --patch front --up y
@@ -65,15 +69,9 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
     import numpy as np
 
     from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
-    from meshsimp_pymoo.errors import ModelError
     from meshsimp_pymoo.formats.source.classes import classes_in_words
     from meshsimp_pymoo.formats.source.missing import suspects
-    from meshsimp_pymoo.opening import mended_source
-    from meshsimp_pymoo.surface.height import HeightSurface
-    from meshsimp_pymoo.surface.model import build_model
-    from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
-    from meshsimp_pymoo.surface.places import count_places
-    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
+    from meshsimp_pymoo.opening import kind_of, mended_source
     from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source, mended = mended_source(model, options)
@@ -91,6 +89,8 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
         **known_units(source.georeference),
         "attributes": sorted(source.attributes),
         "mended": asdict(mended),
+        "surface": None,
+        **dict.fromkeys(OF_SURFACES),
     }
     rows = {
         "vertices": f"{len(used):,}",
@@ -119,6 +119,44 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
     if classes := source.georeference.get("classes"):
         content["classes"] = classes
         rows["classes"] = classes_in_words(classes)
+    kind = rows["surface"] = kind_of(source, options)
+    refusal = (_as_closed if kind == "closed" else _as_height)(source, options, rules, content, rows)
+    if refusal:
+        rows["surface"] = "none"
+    else:
+        content["surface"] = kind
+    usable = "usable: a closed surface of genus 0" if kind == "closed" else "usable: an open height field"
+    doubt = f"usable, but see the warning: {odd[0][1]:,} heights of {odd[0][0]:.9g}" if odd else ""
+    rows["verdict"] = "refused" if refusal else doubt or usable
+    if as_json:
+        tell(json.dumps(content | {"refusal": refusal}, indent=2))
+    else:
+        tell(source.name)
+        for label, text in rows.items():
+            tell(f"  {label:<16}{text}")
+    if refusal:
+        say(refusal)
+        return BAD_INPUT
+    return OK
+
+
+def _as_height(
+    source: SourceMesh, options: Options, rules: Rules, content: dict[str, Any], rows: dict[str, str]
+) -> str | None:
+    """Add what a model is as a height field, and why it is no closed surface; return why it is refused, if it is."""
+    from dataclasses import asdict
+
+    from meshsimp_pymoo.errors import ModelError
+    from meshsimp_pymoo.opening import not_closed_either
+    from meshsimp_pymoo.surface.closed.model import topology
+    from meshsimp_pymoo.surface.height import HeightSurface
+    from meshsimp_pymoo.surface.model import build_model
+    from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
+    from meshsimp_pymoo.surface.places import count_places
+    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
+    from meshsimp_pymoo.surface.units import length_unit
+
+    measured = source.measured
     try:
         up, facts = seen_upright(measured, options.up)
     except ModelError as problem:
@@ -141,23 +179,63 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
             "vertical": f"{facts.vertical_faces:,} faces",
             "folded over": f"{'' if facts.complete else 'at least '}{facts.n_folded:,} faces ({facts.fold_share:.2%})",
         }
-    doubt = f"usable, but see the warning: {odd[0][1]:,} heights of {odd[0][0]:.9g}" if odd else ""
     if rules.break_lines is not None and not refusal:
         lined = HeightSurface(build_model(source, up=options.up), rules)
         assert lined.model.lines is not None
         content["lines"] = facts_of_lines(lined, lined.model.lines)
         rows["break lines"] = lines_in_words(content["lines"], length_unit(source.georeference))
-    rows["verdict"] = "refused" if refusal else doubt or "usable: an open height field"
-    if as_json:
-        tell(json.dumps(content | {"refusal": refusal}, indent=2))
-    else:
-        tell(source.name)
-        for label, text in rows.items():
-            tell(f"  {label:<16}{text}")
-    if refusal:
-        say(refusal)
-        return BAD_INPUT
-    return OK
+    why_not: str | None = f"is a {source.sort}"
+    if source.sort == "mesh":
+        what = topology(source.faces)
+        content |= _facts_of(what)
+        why_not = what.refusal
+        if refusal or why_not is None:
+            rows["not closed"] = why_not or "it could be taken as a closed surface (--surface closed)"
+    content["not_closed"] = why_not
+    return refusal and refusal + not_closed_either(source, options)
+
+
+def _as_closed(
+    source: SourceMesh, options: Options, rules: Rules, content: dict[str, Any], rows: dict[str, str]
+) -> str | None:
+    """Add what a model is as a closed surface, and why it is no height field; return why it is refused, if it is."""
+    import numpy as np
+
+    from meshsimp_pymoo.cli.terminal import with_options
+    from meshsimp_pymoo.errors import ModelError
+    from meshsimp_pymoo.surface.closed.embedding import faults
+    from meshsimp_pymoo.surface.closed.model import closed_model, topology
+    from meshsimp_pymoo.surface.closed.surface import ClosedSurface
+    from meshsimp_pymoo.surface.orient import seen_upright
+
+    what = topology(source.faces)
+    content |= _facts_of(what)
+    rows["parts"] = f"{what.components}"
+    rows["genus"] = "not known" if what.genus is None else f"{what.genus}"
+    rows["holes"] = f"{what.loops}"
+    try:
+        why_not = seen_upright(source.measured, options.up)[1].refusal
+    except ModelError as problem:
+        why_not = str(problem)
+    content["not_height"] = why_not
+    said = with_options((why_not or "").removeprefix(f"{source.name}: "))
+    rows["no height field"] = said or "it could be taken as one (--surface height)"
+    try:
+        model = closed_model(source)
+        ClosedSurface(model, rules)
+    except ModelError as problem:
+        return str(problem)
+    ends = model.xy[np.concatenate([model.faces[:, [0, 1]], model.faces[:, [1, 2]], model.faces[:, [2, 0]]])]
+    least = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
+    flips, _ = faults(model.xy, model.faces, model.pole)
+    content |= {"flips": flips, "least_image_edge": least}
+    rows["flattened"] = f"{flips} faces flipped, the shortest edge {least:.3g} of the plane's side"
+    return None
+
+
+def _facts_of(what: Topology) -> dict[str, Any]:
+    """Return what closed surfaces are judged by; no holes are capped."""
+    return {"components": what.components, "genus": what.genus, "loops": what.loops, "caps": 0}
 
 
 def _sides(extent: Any) -> str:

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from meshsimp_pymoo.formats.options import Options
-    from meshsimp_pymoo.front import Front
+    from meshsimp_pymoo.front import Front, FrontSolution
     from meshsimp_pymoo.surface.rules import Rules
 
 HELP = "measure a mesh that another tool simplified"
@@ -78,11 +78,11 @@ def _scored(
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.opening import open_model, open_source
-    from meshsimp_pymoo.surface.height import HeightSurface
+    from meshsimp_pymoo.surface.kinds import surface_of
     from meshsimp_pymoo.surface.units import known_units, length_unit
 
     front = None if folder is None else _front_of(folder, model, options, rules, outside)
-    surface: Any = HeightSurface(open_model(model, options), rules) if front is None else front.surface
+    surface: Any = surface_of(open_model(model, options), rules) if front is None else front.surface
     # judged as it is, in the frame of the model's file, which is measured
     source = open_source(other, Options(repair="none", scale="none"))
     try:
@@ -148,21 +148,42 @@ def _against(front: Front, triangles: int, error: float) -> tuple[dict[str, Any]
     except LookupError:
         smallest = f"its smallest has {front[0].triangles}"
         return {"solution": None}, f"holds no mesh of at most {triangles:,} triangles; {smallest}"
-    ratio = error / rival.error if rival.error > 0 else None
+    stated = _error_of(rival)
+    ratio = error / stated if stated > 0 else None
     stored = rival.front is front  # else it was made between two that are
     facts = {
         "solution": rival.solution if stored else None,
         "triangles": rival.triangles,
-        "error": rival.error,
+        "error": stated,
         "error_ratio": ratio,
     }
-    smaller = next((s for s in front if s.error <= error * (1 + ROUNDING)), None)
+    smaller = _smallest_within(front, error * (1 + ROUNDING))
     facts["triangles_for_this_error"] = None if smaller is None else smaller.triangles
     which = f"solution {rival.solution}" if stored else "a mesh between two solutions"
-    own = f"{which}, with {rival.triangles:,} triangles, has the error {rival.error:.6g}"
+    own = f"{which}, with {rival.triangles:,} triangles, has the error {stated:.6g}"
     if ratio is None:
         compared = "both are exact" if error == 0 else "that is exact"
     else:
         compared = f"the error of this mesh is {ratio:.3g} times that"
     needed = "" if smaller is None else f"; for this error the front needs {smaller.triangles:,} triangles"
     return facts, f"{own}; {compared}{needed}"
+
+
+def _error_of(solution: FrontSolution) -> float:
+    """Return the error of a solution as that of any mesh is measured.
+
+    What is said of a mesh of a closed surface is measured by the images of its vertices, which no other tool's has, and
+    is a little more than by the distance in space.
+    """
+    from meshsimp_pymoo.surface.closed.surface import ClosedSurface
+
+    surface = solution.front.surface
+    return surface.of_faces(solution.faces).quality.error if isinstance(surface, ClosedSurface) else solution.error
+
+
+def _smallest_within(front: Front, most: float) -> FrontSolution | None:
+    """Return the smallest solution of at most this error, if there is one."""
+    at = next((number for number, solution in enumerate(front) if solution.error <= most), len(front))
+    while at > 0 and _error_of(front[at - 1]) <= most:
+        at -= 1
+    return front[at] if at < len(front) else None

@@ -23,6 +23,7 @@ from meshsimp_pymoo.surface.units import length_unit
 
 # A mesh of fewer vertices is none.
 LEAST_VERTICES = 4
+LEAST_TRIANGLES = 2 * LEAST_VERTICES - 4
 
 
 @dataclass(frozen=True)
@@ -211,12 +212,19 @@ class ClosedModel(Mesh):
         ModelError
             If these are other rows, or no images of this mesh.
         """
+        xy = np.ascontiguousarray(xy, float)
+        if xy.shape != (self.n_vertices, 2) or not (np.floor(xy * 2.0**52) == xy * 2.0**52).all() or not _fit(xy):
+            raise ModelError(f"{self.name}: what was stored are no images of {self.n_vertices:,} vertices in a plane")
         here, there = np.argsort(self.source_index), np.argsort(source_index)
         if not np.array_equal(self.source_index[here], np.asarray(source_index)[there]):
             raise ModelError(f"{self.name}: has other vertices than those whose images were stored")
         order = np.empty_like(here)
         order[there] = here
-        moved = self._reordered(order, np.ascontiguousarray(xy, float))
+        moved = self._reordered(order, xy)
+        # which face the outside is may hang on last bits too; it is the one that is turned over
+        a, b, c = (xy[moved.faces[:, k]] for k in range(3))
+        turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+        moved = replace(moved, pole=moved.faces[np.argmin(turned)].astype(np.int64))
         _refuse_faults(moved.name, moved.xy, moved.faces, moved.pole)
         return moved
 
@@ -304,6 +312,11 @@ def _vector_order(xy: FloatArray) -> IntArray:
     cells = np.floor(xy * 2.0**HILBERT_BITS)
     within = np.ascontiguousarray(xy * 2.0**HILBERT_BITS - cells)
     return np.lexsort((hilbert_keys(within), hilbert_keys(np.ascontiguousarray(xy))))
+
+
+def _fit(xy: FloatArray) -> bool:
+    """Tell whether images lie in the unit square."""
+    return bool((xy >= 0.0).all() and (xy <= 1.0).all())
 
 
 def _refuse_faults(name: str, xy: FloatArray, faces: IntArray, pole: IntArray) -> None:
