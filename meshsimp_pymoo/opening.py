@@ -29,7 +29,7 @@ from meshsimp_pymoo.formats.table import (
     refuse_foreign,
 )
 from meshsimp_pymoo.settings import by_name, settings_of, taken
-from meshsimp_pymoo.surface.closed.model import closed_model, topology
+from meshsimp_pymoo.surface.closed.model import ClosedModel, closed_model, topology
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.kinds import Model
 from meshsimp_pymoo.surface.model import Mesh, OpenModel, build_model
@@ -77,7 +77,7 @@ def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
     >>> open_model("roof:3").n_vertices, len(open_model("roof:3").faces)
     (9, 8)
     """
-    if isinstance(model, Mesh):
+    if isinstance(model, (OpenModel, ClosedModel)):
         if options != DEFAULT:
             raise ModelError(
                 f"{model.name}: is a model that was read already, so that nothing can be said of how to read it; leave "

@@ -12,6 +12,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,16 +34,19 @@ class Part(NamedTuple):
     seconds: float
     #: Whether the second process does it, where there is one: what stands on the moves of the live triangulation.
     beside: bool
+    #: For surfaces of which kind, as file:class of their ground, where the entries are for several.
+    ground: str | None = None
 
 
 # ------------------------------------------------------------------------------------------------------------ the calls
 
 
 def _reading() -> None:
-    from meshsimp_pymoo.opening import open_model
+    from meshsimp_pymoo.datasets import load
+    from meshsimp_pymoo.surface.model import build_model
 
     # a scan with bays: its order, the look for folds, the cells of its footprint
-    _ = open_model("horseshoe:60").footprint
+    _ = build_model(load("horseshoe:60")).footprint
 
 
 def _square() -> Any:
@@ -75,48 +79,79 @@ def _compile_for(function: Any, *arguments: Any) -> None:
     function.compile(tuple(map(typeof, arguments)))
 
 
+def _body() -> Any:
+    """Return the surface of a tetrahedron with a vertex on one of its edges, seen from within the face opposite."""
+    import numpy as np
+
+    from meshsimp_pymoo.surface.closed.model import ClosedModel
+    from meshsimp_pymoo.surface.closed.surface import ClosedSurface
+
+    points = np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 4], [0.6, 0.5, 2]])
+    faces = np.array([[0, 2, 1], [0, 1, 4], [1, 3, 4], [1, 2, 3], [0, 4, 2], [4, 3, 2]], np.int32)
+    xy = np.array([[0.0, 0.0], [0.75, 0.0], [0.0, 0.75], [0.25, 0.25], [0.125, 0.125]])
+    rows, same = np.arange(5), np.eye(3)
+    model = ClosedModel("body", points, faces, xy, np.array([0, 2, 1]), rows, points, {}, same, np.zeros(3))
+    return ClosedSurface(model)
+
+
 def _records(surface: Any) -> tuple[Any, Any]:
-    from meshsimp_pymoo.surface.books import make_live
+    from meshsimp_pymoo.surface import books
+    from meshsimp_pymoo.surface.closed import books as closed_books
+    from meshsimp_pymoo.surface.ground import Ground
 
-    return surface.ground(), make_live(surface.n_vertices)
+    ground = surface.ground()
+    make = books.make_live if isinstance(ground, Ground) else closed_books.make_live
+    return ground, make(surface.n_vertices)
 
 
-def _building() -> None:
+def _building(make: Callable[[], Any] = _square) -> None:
     from meshsimp_pymoo.surface.moves import snapshot
 
-    surface = _square()
+    surface = make()
     with surface.books(surface.pinned) as books:
         snapshot(surface.ground(), books, surface.n_vertices)
 
 
-def _thinning() -> None:
+def _thinning(make: Callable[[], Any] = _square) -> None:
     import numpy as np
 
     from meshsimp_pymoo.search.greedy import thin
 
-    surface = _square()
+    surface = make()
     n, rows, numbers = surface.n_vertices, np.zeros(9, np.int32), np.zeros(9)
     _compile_for(
         thin, *_records(surface), n, surface.pinned, 0, np.inf, np.inf, np.zeros(1, np.bool_), rows, numbers, rows
     )
 
 
-def _moves() -> None:
+def _moves(make: Callable[[], Any] = _square) -> None:
     import numpy as np
 
     from meshsimp_pymoo.search.local_search import USUAL_MOVES, anneal, fit_size
 
-    surface = _square()
+    surface = make()
     records, n, rows, state = _records(surface), surface.n_vertices, np.zeros(9, np.int64), np.zeros(1, np.uint64)
     graph, shares, stop = (surface.border, *surface.neighbours), tuple(map(float, USUAL_MOVES)), np.zeros(1, np.bool_)
     _compile_for(anneal, *records, n, rows, n, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows, rows)
     _compile_for(fit_size, *records, n, surface.pinned, True, 8, state, stop)
 
 
-def _insertion() -> None:
+def _insertion(make: Callable[[], Any] = _square) -> None:
     from meshsimp_pymoo.search.greedy import greedy_insertion
 
-    greedy_insertion(_square())
+    greedy_insertion(make())
+
+
+def _closed() -> None:
+    from meshsimp_pymoo.plane.hilbert import hilbert_keys
+    from meshsimp_pymoo.surface.closed.embedding import faults
+
+    surface = _body()
+    model = surface.model
+    faults(model.xy, model.faces, model.pole)
+    hilbert_keys(model.xy)
+    surface.evaluate(surface.pinned[None])
+    surface.score(surface.points, surface.faces)
 
 
 def _single_moves() -> None:
@@ -192,6 +227,9 @@ def _files() -> None:
 
 # ------------------------------------------------------------------------------------------------------------ the table
 
+#: Grounds, as file:class.
+HEIGHT, CLOSED = "surface.ground:Ground", "surface.closed.ground:ClosedGround"
+
 PARTS = (
     Part(
         "reading",
@@ -203,13 +241,13 @@ PARTS = (
     Part(
         "evaluation", ("surface.evaluate:_evaluate", "surface.evaluate:measure_between"), _evaluation, 6.2, False
     ),
-    Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 6.6, False),
-    Part("thinning", ("search.greedy:thin",), _thinning, 16.6, True),
-    Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True),
+    Part("building", ("surface.live:_build", "surface.moves:snapshot"), _building, 6.6, False, HEIGHT),
+    Part("thinning", ("search.greedy:thin",), _thinning, 16.6, True, HEIGHT),
+    Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True, HEIGHT),
     Part(
         "free meshes", ("surface.free:_open", "surface.free:anneal_freely", "search.free:_thin"), _free, 12.0, False
     ),
-    Part("insertion", ("search.greedy:_grow",), _insertion, 4.5, False),
+    Part("insertion", ("search.greedy:_grow",), _insertion, 4.5, False, HEIGHT),
     Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 3.4, True),
     Part(
         "tiles",
@@ -229,31 +267,54 @@ PARTS = (
         ),
         _lining, 4.0, False,
     ),
+    Part(
+        "closed surfaces",
+        (
+            "surface.closed.embedding:_n_flipped", "surface.closed.evaluate:_evaluate",
+            "surface.closed.nearest:_nearest_triangles",
+        ),
+        _closed, 3.7, False,
+    ),
+    Part(
+        "their meshes", ("surface.closed.live:_build_closed", "surface.moves:snapshot"),
+        partial(_building, _body), 1.5, False, CLOSED,
+    ),
+    Part("their thinning", ("search.greedy:thin",), partial(_thinning, _body), 5.3, True, CLOSED),
+    Part(
+        "their moves", ("search.local_search:anneal", "search.local_search:fit_size"),
+        partial(_moves, _body), 2.8, True, CLOSED,
+    ),
+    Part("their insertion", ("search.greedy:_grow",), partial(_insertion, _body), 1.5, False, CLOSED),
     Part("folded scans", ("surface.overlap:_mark_hidden", "surface.orient:_seen_sides"), _folds, 3.0, False),
     Part("files", ("formats.source.rows:_scan_bytes", "formats.source.rows:_scan_numbers"), _files, 1.0, False),
 )  # fmt: skip
 
-#: What a search with the default algorithm needs.
+#: What a search with the default algorithm needs: of a height surface, and of a closed one.
 SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
+CLOSED_SEARCH = ("closed surfaces", "their meshes", "their thinning", "their moves")
 #: What free meshes need besides.
 FREE = ("free meshes",)
 #: What break lines need besides: their errors are measured as scores are.
 LINED = ("break lines", "scores")
 #: What a search for one mesh needs: its first answer is inserted.
 WISH = (*SEARCH, "insertion")
+CLOSED_WISH = (*CLOSED_SEARCH, "their insertion")
 
 
 def missing(names: Iterable[str] | None = None) -> list[Part]:
     """Return those parts, of all, that have functions without machine code on this machine."""
-    # all answers of all surfaces are part of what an entry is made from, so they have to be there before it is known
-    import_module(f"{PACKAGE}.surface.height")
     wanted = {part.name for part in PARTS} if names is None else set(names)
-    return [part for part in PARTS if part.name in wanted and not all(map(_has_code, part.entries))]
+    return [part for part in PARTS if part.name in wanted and not _has_code(part)]
 
 
-def _has_code(entry: str) -> bool:
-    file, _, name = entry.partition(":")
-    return has_code(getattr(import_module(f"{PACKAGE}.{file}"), name))
+def _has_code(part: Part) -> bool:
+    record = None if part.ground is None else _item(part.ground)
+    return all(has_code(_item(entry), record) for entry in part.entries)
+
+
+def _item(named: str) -> Any:
+    file, _, name = named.partition(":")
+    return getattr(import_module(f"{PACKAGE}.{file}"), name)
 
 
 class Warming:

@@ -121,8 +121,7 @@ def parts_of(function: Any) -> Iterator[Any]:
         yield item
         if not hasattr(item, "__code__"):
             continue
-        # answers of others change nothing on disk: code for their records is not kept
-        waiting += [part for part in getattr(item, "parts", []) if part.__module__.startswith(f"{PACKAGE}.")]
+        waiting += getattr(item, "parts", [])
         found = getclosurevars(item)
         for value in (*found.globals.values(), *found.nonlocals.values()):
             owner = getattr(value, "__module__", None)
@@ -275,12 +274,12 @@ class Stored:
                 f"compiled code cannot be kept in {self.cache_path} ({reason_of(problem)}); it is made each time"
             )
 
-    def is_stored(self, target_context: Any) -> bool:
-        """Tell whether there is code on disk for this machine, whatever the types."""
+    def is_stored(self, target_context: Any, record: type | None = None) -> bool:
+        """Tell whether there is code on disk for this machine, whatever the types, or for a record of this class."""
         machine = target_context.codegen().magic_tuple()
         for files in self.files:
             with suppress(Exception):  # see load_overload, which says so
-                if any(key[1] == machine for key in files.keys()):
+                if any(key[1] == machine and _is_for(key[0], record) for key in files.keys()):
                     return True
         return False
 
@@ -300,11 +299,20 @@ class Stored:
             files.flush()
 
 
-def has_code(function: Any) -> bool:
-    """Tell whether there is machine code of an entry, in this process or on disk for this machine."""
-    if config.DISABLE_JIT or function.overloads:
+def _is_for(sig: Any, record: type | None) -> bool:
+    """Tell whether a record of this class is among the arguments; None is any."""
+    kinds = getattr(sig, "args", sig)
+    return record is None or any(getattr(kind, "instance_class", None) is record for kind in kinds)
+
+
+def has_code(function: Any, record: type | None = None) -> bool:
+    """Tell whether there is machine code of an entry, in this process or on disk for this machine.
+
+    With a class of records: code for arguments of which one is such a record.
+    """
+    if config.DISABLE_JIT or any(_is_for(sig, record) for sig in function.overloads):
         return True
-    return bool(function._cache.is_stored(function.targetctx))
+    return bool(function._cache.is_stored(function.targetctx, record))
 
 
 _warned: set[str] = set()

@@ -1,6 +1,12 @@
-"""What one vertex costs in one triangle, and whether that triangle is part of the mesh."""
+"""What one vertex costs in one triangle, and whether that triangle is part of the mesh.
+
+What a deviation costs is the same on surfaces of all kinds: these functions take the records of any, whose members
+have the names that height surfaces give them.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +20,7 @@ from meshsimp_pymoo.surface.ground import Ground
 
 
 @inner
-def weighed_cost(g: Ground, d: float, i: int) -> float:
+def weighed_cost(g: Any, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, if that is not d itself (``g.weighed``)."""
     beyond = max(d - g.bound, 0.0)
     if g.power > 1:
@@ -30,13 +36,13 @@ def weighed_cost(g: Ground, d: float, i: int) -> float:
 
 
 @inner(inline=True)
-def counts(g: Ground, i: int) -> bool:
+def counts(g: Any, i: int) -> bool:
     """Whether vertex i counts in the maximum: its weight is not 0."""
     return len(g.weight) == 0 or g.weight[i] > 0.0
 
 
 @inner
-def noted_cost(g: Ground, live: Live, d: float, i: int) -> float:
+def noted_cost(g: Any, live: Any, d: float, i: int) -> float:
     """Return what vertex i adds to the total where d_p = d, and note d if it is the largest so far (``LARGEST``)."""
     if not g.weighed:
         return d
@@ -46,7 +52,7 @@ def noted_cost(g: Ground, live: Live, d: float, i: int) -> float:
 
 
 @inner
-def enter_peak(live: Live, place: int, d: float) -> None:
+def enter_peak(live: Any, place: int, d: float) -> None:
     """Write the largest deviation of a place into the tree of ``peaks``, up to where nothing changes."""
     peaks = live.peaks
     node = len(peaks) // 2 + place

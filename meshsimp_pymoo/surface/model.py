@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -106,8 +106,8 @@ class Mesh:
         Parameters
         ----------
         weights : str or array
-            ``"area"`` for a third of the area, in space, of the faces around each vertex, scaled so that they add up to
-            N; the name of a numeric per-vertex attribute of the file; or one number for each row of the file (a grid's
+            ``"area"`` for a third of the area in space of the faces around each vertex, scaled to add up to N; the name
+            of a numeric per-vertex attribute of the file; or one number for each row of the file (a grid's
             rows and columns are accepted too): finite, at least 0, not all of them 0. A weight of 0 means that a vertex
             does not count; it may be kept all the same. Feet of vertical faces never count; of rows that repeat a
             vertex the first one's weight does.
@@ -127,8 +127,8 @@ class Mesh:
         if isinstance(weights, str) and weights == AREA:
             if AREA in self.attributes:
                 raise ModelError(
-                    f"{self.name}: weights {AREA!r} may mean the area around each vertex or the file's own attribute of "
-                    "that name; give the array of either, or rename the attribute"
+                    f"{self.name}: weights {AREA!r} may mean the area around each vertex or the file's own attribute "
+                    "of that name; give the array of either, or rename the attribute"
                 )
             label, values = f"weights {AREA!r}", self.area_shares
         elif isinstance(weights, str):
@@ -174,7 +174,7 @@ class Mesh:
                 f"{self.name}: the {len(values)} {label} add up to {total:g}, beyond {MOST_WEIGHT:g}; "
                 "divide them all by one number"
             )
-        return dataclasses.replace(self, weights=values)
+        return cast("AnyMesh", dataclasses.replace(cast("Any", self), weights=values))
 
     def to_local(self, points: npt.ArrayLike) -> FloatArray:
         """Turn points (M, 3) of the file's frame into this model's upright local frame [model units]."""
@@ -191,7 +191,7 @@ class Mesh:
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        return {item.name: getattr(self, item.name) for item in dataclasses.fields(cast("Any", self))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,223 +291,6 @@ class OpenModel(Mesh):
     def origin(self) -> FloatArray:
         """The local origin in the upright frame [model units]."""
         return self.pivot @ self.rotation.T + self.offset
-
-    @cached_property
-    def neighbours(self) -> Csr:
-        """Mesh one-rings in CSR form: those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``, ascending."""
-        return one_rings(self.faces, self.n_vertices)
-
-    @property
-    def weightless(self) -> IntArray:
-        """Vertices that count in no error, whatever their weight."""
-        return np.empty(0, np.int64)
-
-    @property
-    def area_shares(self) -> FloatArray:
-        """A third of the area of the faces around each vertex (N,), scaled so that they add up to N."""
-        a, b, c = (self.points[self.faces[:, k]] for k in range(3))
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        around = np.bincount(self.faces.ravel(), np.repeat(area, 3), minlength=self.n_vertices)
-        return np.asarray(around * (self.n_vertices / around.sum()))
-
-    def with_weights(self: AnyMesh, weights: str | npt.ArrayLike) -> AnyMesh:
-        """Return the same model with another weight for each vertex: its share in the error.
-
-        Parameters
-        ----------
-        weights : str or array
-            ``"area"`` for a third of the area, in space, of the faces around each vertex, scaled so that they add up to
-            N; the name of a numeric per-vertex attribute of the file; or one number for each row of the file (a grid's
-            rows and columns are accepted too): finite, at least 0, not all of them 0. A weight of 0 means that a vertex
-            does not count; it may be kept all the same. Feet of vertical faces never count; of rows that repeat a
-            vertex the first one's weight does.
-
-        Raises
-        ------
-        ModelError
-            If there is no such attribute, or the numbers cannot be weights.
-
-        Examples
-        --------
-        >>> from meshsimp_pymoo.datasets import load
-        >>> roof = build_model(load("roof:3"))
-        >>> roof.with_weights(np.full(9, 2.0)).total_weight
-        18.0
-        """
-        if isinstance(weights, str) and weights == AREA:
-            if AREA in self.attributes:
-                raise ModelError(
-                    f"{self.name}: weights {AREA!r} may mean the area around each vertex or the file's own attribute of "
-                    "that name; give the array of either, or rename the attribute"
-                )
-            label, values = f"weights {AREA!r}", self.area_shares
-        elif isinstance(weights, str):
-            if weights not in self.attributes:
-                known = ", ".join(sorted(self.attributes)) or "none"
-                raise ModelError(f"{self.name}: has no per-vertex attribute {weights!r} to weigh by; it has: {known}")
-            label, values = f"weights {weights!r}", np.asarray(self.attributes[weights])
-            if values.ndim != 1 or values.dtype.kind not in "biuf":
-                raise ModelError(
-                    f"{self.name}: {label} are of type {values.dtype} and shape {values.shape}; a weight is one number"
-                )
-        else:
-            label, values = "weights", np.asarray(weights)
-            if values.dtype.kind not in "biuf":
-                raise ModelError(f"{self.name}: {label} are of type {values.dtype}; give one number for each vertex")
-            values = values.ravel()
-            n_rows = int(max(self.source_index.max(), self.repeats.max(initial=0))) + 1
-            if len(values) < n_rows:
-                raise ModelError(
-                    f"{self.name}: there are {len(values)} {label} for {n_rows} rows of the file; give one for each row"
-                )
-            n_others = int((values[self.repeats[:, 0]] != values[self.repeats[:, 1]]).sum())
-            if n_others:
-                warn_of(
-                    f"{self.name}: {n_others} {label} of rows that repeat another vertex differ from its own, "
-                    "which counts"
-                )
-            values = values[self.source_index]
-        values = np.ascontiguousarray(values, float)
-        wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0)))
-        if len(wrong):
-            raise ModelError(
-                f"{self.name}: {len(wrong)} of {len(values)} {label} are negative or not finite (first: row "
-                f"{self.source_index[wrong[0]]}, {values[wrong[0]]}); give finite numbers of at least 0"
-            )
-        values[self.weightless] = 0.0
-        if not values.any():
-            raise ModelError(f"{self.name}: all {len(values)} {label} are 0; nothing would count")
-        with np.errstate(over="ignore"):
-            total = values.sum()
-        if not total <= MOST_WEIGHT:
-            raise ModelError(
-                f"{self.name}: the {len(values)} {label} add up to {total:g}, beyond {MOST_WEIGHT:g}; "
-                "divide them all by one number"
-            )
-        return dataclasses.replace(self, weights=values)
-
-    def to_local(self, points: npt.ArrayLike) -> FloatArray:
-        """Turn points (M, 3) of the file's frame into this model's upright local frame [model units]."""
-        return (np.asarray(points, float) * self.scale - self.pivot) @ self.rotation.T - self.offset
-
-    def __len__(self) -> int:
-        return self.n_vertices
-
-    def __deepcopy__(self: AnyMesh, memo: dict[int, Any]) -> AnyMesh:
-        return self
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-
-
-@dataclass(frozen=True, eq=False)
-class OpenModel(Mesh):
-    """An open mesh that is nearly a height field z = f(x, y), in vector order.
-
-    The vertices are stored along a Hilbert curve over (x, y), so that a neighbour on the vector is a neighbour in
-    space, a contiguous segment is a patch, and triangulating needs no sorting. The order is a function of the positions
-    alone: listing the same vertices otherwise in the file gives the same model but for ``source_index``.
-
-    Vertices that share one (x, y) stay apart: each has a place in the chromosome and a share in the error, but for the
-    feet of vertical faces, which are no samples of what is seen from above. Where several of them are kept, the first
-    in vector order (the highest) carries the surface.
-
-    Attributes
-    ----------
-    name : str
-        Where it came from, for messages.
-    points : (N, 3) float array
-        Vertices, upright (height along z), from a local origin [model units].
-    faces : (T, 3) int32 array
-        Triangles of the original mesh, counter-clockwise from above, as rows of ``points``.
-    corners : (4,) int array
-        The vertices extreme in the directions (+-1, +-1) after scaling the bounding box to a square, ascending; fewer
-        where one vertex is extreme in several directions.
-    source_index : (N,) int array
-        Row of each vertex in the file.
-    file_points : (N, 3) float array
-        The vertices exactly as in the file, in vector order [file units].
-    attributes : dict of str to (N, ...) array
-        Colours and other per-vertex attributes of the file, in vector order.
-    up : (3,) float array
-        Unit vector of the file's frame that points to +z here.
-    rotation : (3, 3) float array
-        Upright coordinates are ``(scale * file_points - pivot) @ rotation.T - offset``.
-    pivot, offset : (3,) float arrays
-        What is subtracted before and after turning, so that far-off coordinates lose nothing [model units].
-    xy : (N, 2) float array
-        ``points[:, :2] / unit``, rounded to multiples of 2**-52: the coordinates all predicates work on.
-    unit : float
-        Side of the unit square, a power of two [model units].
-    facts : dict
-        What was found while checking the surface (see :class:`~meshsimp_pymoo.surface.orient.SurfaceFacts`).
-    weights : (N,) float array, optional
-        How much each vertex counts in the error, in vector order; None: all the same, 1. See :meth:`with_weights`.
-    feet : (K,) int array
-        Vertices below another one at their place that vertical faces alone hold, ascending; their weight is 0.
-    repeats : (R, 2) int array
-        Rows of the file that repeat another one, and the rows that they were merged into.
-    found : dict of str to int
-        How many vertices were merged, lie below others, and are feet, and how many faces were mended, as far as there
-        are any; for run.json.
-    georeference : dict
-        Where on Earth it is and how it was read, as far as the file says (see
-        :class:`~meshsimp_pymoo.formats.source.SourceMesh`).
-    scale : (3,) float array
-        Model units to a unit of the file along its axes: 1, but metres to a degree of x and y where the file has
-        degrees.
-    material : Material, optional
-        What all faces look like, as far as the file says.
-    lines : ModelLines, optional
-        Break lines, whose vertices are among the points; see :func:`~meshsimp_pymoo.surface.lining.lined_model`.
-    """
-
-    name: str
-    points: FloatArray
-    faces: npt.NDArray[np.int32]
-    corners: IntArray
-    source_index: IntArray
-    file_points: FloatArray
-    attributes: dict[str, npt.NDArray[Any]]
-    up: FloatArray
-    rotation: FloatArray
-    pivot: FloatArray
-    offset: FloatArray
-    xy: FloatArray
-    unit: float
-    facts: Any = field(default=None, repr=False)
-    weights: FloatArray | None = None
-    georeference: dict[str, Any] = field(default_factory=dict, repr=False)
-    feet: IntArray = field(default_factory=lambda: np.empty(0, np.int64), repr=False)
-    repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64), repr=False)
-    found: dict[str, int] = field(default_factory=dict, repr=False)
-    scale: FloatArray = field(default_factory=lambda: np.ones(3))
-    material: Material | None = field(default=None, repr=False)
-    lines: ModelLines | None = field(default=None, repr=False)
-
-    def __repr__(self) -> str:
-        weighted = "" if self.weights is None else ", weighted"
-        size = " x ".join(f"{side:.4g}" for side in np.ptp(self.points, axis=0))
-        return (
-            f"<OpenModel {self.name}: {self.n_vertices:,} vertices, {len(self.faces):,} triangles{weighted}, "
-            f"{size} {length_unit(self.georeference)}>"
-        )
-
-    @property
-    def origin(self) -> FloatArray:
-        """The local origin in the upright frame [model units]."""
-        return self.pivot @ self.rotation.T + self.offset
-
-    @cached_property
-    def hash(self) -> str:
-        """SHA-256 of geometry, weights and lines: the same for the same vertices and faces in the same file order."""
-        digest = hashlib.sha256()
-        for array in (self.points, self.faces, self.source_index, self.weights):
-            if array is not None:
-                digest.update(np.ascontiguousarray(array).tobytes())
-        if self.lines is not None:
-            digest.update(self.lines.hash.encode())
-        return digest.hexdigest()
 
     @property
     def weightless(self) -> IntArray:
@@ -565,6 +348,7 @@ class OpenModel(Mesh):
             feet=place[self.feet],
             lines=None,
         )
+
 
 def placed_model(
     name: str,

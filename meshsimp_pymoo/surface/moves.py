@@ -31,7 +31,8 @@ Examples
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from importlib import import_module
 from typing import Any, TypeVar
 
 import numpy as np
@@ -41,6 +42,29 @@ from meshsimp_pymoo.compiling.functions import ANSWER_OPTIONS, entry
 from meshsimp_pymoo.plane.borrow import borrowed
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+# The files of this package with answers.
+ANSWERING = tuple(f"meshsimp_pymoo.surface.{name}" for name in ("live", "free", "closed.live"))
+
+
+class Answers:
+    """The answers to one question; to look at them is to look at all of this package, and at no others.
+
+    They decide by what the machine code of a loop is known on disk. Code for the records of others is not kept there.
+    """
+
+    def __init__(self) -> None:
+        self._found: list[Any] = []
+
+    def add(self, answer: Any) -> None:
+        """Take one more."""
+        self._found.append(answer)
+
+    def __iter__(self) -> Iterator[Any]:
+        for name in ANSWERING:
+            import_module(name)
+        own = [answer for answer in self._found if answer.__module__ in ANSWERING]
+        return iter(sorted(own, key=lambda answer: (answer.__module__, answer.__name__)))  # whoever came first
 
 
 def answers(question: Callable[..., Any], record: type) -> Callable[[Function], Function]:
@@ -68,26 +92,35 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
 
         # inlined: a call of a call
         overload(question, strict=False, jit_options=ANSWER_OPTIONS)(choose)
-        question.__dict__.setdefault("parts", []).append(function)
+        question.__dict__["parts"].add(function)
         return function
 
     return register
+
+
+def question(function: Function) -> Function:
+    """Make a question of a function: it has answers."""
+    function.__dict__["parts"] = Answers()
+    return function
 
 
 def _unanswered() -> Any:
     raise TypeError("a surface answers this inside compiled functions only; ask in a function compiled with numba.njit")
 
 
+@question
 def total_cost(ground: Any, books: Any) -> float:
     """Return the sum of the costs; infinite where there is no mesh."""
     return float(_unanswered())
 
 
+@question
 def error_now(ground: Any, books: Any) -> float:
     """Return what the measure says: the sum of the costs, or the largest deviation; infinite where there is no mesh."""
     return float(_unanswered())
 
 
+@question
 def ranked(ground: Any, books: Any, change: float) -> tuple[float, float]:
     """Return the rank of a removal whose `try_exchange`, the last one, has found this change: lowest first, and ties.
 
@@ -97,31 +130,37 @@ def ranked(ground: Any, books: Any, change: float) -> tuple[float, float]:
     return _unanswered()
 
 
+@question
 def n_triangles(ground: Any, books: Any) -> int:
     """Return the number of triangles of the mesh."""
     return int(_unanswered())
 
 
+@question
 def n_sites(ground: Any, books: Any) -> int:
     """Return the number of sites."""
     return int(_unanswered())
 
 
+@question
 def is_site(ground: Any, books: Any, v: int) -> bool:
     """Tell whether vertex v is a site."""
     return bool(_unanswered())
 
 
+@question
 def is_taken(ground: Any, books: Any, w: int) -> bool:
     """Tell whether there is a site at the place of vertex w, so that w cannot come."""
     return bool(_unanswered())
 
 
+@question
 def urgency(ground: Any, books: Any, v: int) -> float:
     """Return the cost of the cell in which vertex v, no site, lies, or its own where none covers it."""
     return float(_unanswered())
 
 
+@question
 def try_exchange(ground: Any, books: Any, v: int, w: int, limit: float) -> tuple[float, int]:
     """Return the change of cost and of the number of triangles if site v went and vertex w came.
 
@@ -130,31 +169,37 @@ def try_exchange(ground: Any, books: Any, v: int, w: int, limit: float) -> tuple
     return _unanswered()
 
 
+@question
 def exchange(ground: Any, books: Any, v: int, w: int) -> bool:
     """Let site v go and vertex w come; return False, with nothing changed, where v cannot go."""
     return bool(_unanswered())
 
 
+@question
 def sites_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     """List the sites whose removal may cost something else once site v is gone; return their number."""
     return int(_unanswered())
 
 
+@question
 def effort(ground: Any, books: Any) -> int:
     """Return how many cells at site v the last `try_exchange` has found: what trying it again takes."""
     return int(_unanswered())
 
 
+@question
 def n_cells(ground: Any, books: Any) -> int:
     """Return the number of cells there have been: all numbers are below."""
     return int(_unanswered())
 
 
+@question
 def worst_in(ground: Any, books: Any, cell: int) -> tuple[int, float, float]:
     """Return the vertex of a cell that costs most and could come (-1: none costs anything), its cost, the cell's."""
     return _unanswered()
 
 
+@question
 def cells_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     """List the cells at site v, which has just come; return their number."""
     return int(_unanswered())

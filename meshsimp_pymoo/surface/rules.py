@@ -42,16 +42,16 @@ class Rules:
         None,
         kind=Choice(FOOTPRINTS),
         accepts='{"model", "hull"}, optional',
-        doc="Of a height surface: emit only the triangles whose centroid lies inside the original mesh's projection, as "
-        "by default, or all of them (the paper).",
+        doc="Of a height surface: emit only the triangles whose centroid lies inside the original mesh's projection, "
+        "as by default, or all of them (the paper).",
         help="of height surfaces: model (default): bays and holes stay open; hull: all of the convex hull is covered",
     )
     outside: str | None = setting(
         None,
         kind=Choice(OUTSIDES),
         accepts='{"nearest", "ignore"}, optional',
-        doc="Of a height surface: what a vertex costs that no triangle covers: its distance to the nearest point of the "
-        "mesh, as by default, or nothing (the paper).",
+        doc="Of a height surface: what a vertex costs that no triangle covers: its distance to the nearest point of "
+        "the mesh, as by default, or nothing (the paper).",
         help="of height surfaces: what a vertex that no triangle covers costs: its distance to the mesh (default), or "
         "nothing",
     )
@@ -142,7 +142,8 @@ class Rules:
     @property
     def of_heights(self) -> Rules:
         """These rules for a height surface: what is not said is what is usual there."""
-        return replace(self, **{name: usual for name, usual in OF_HEIGHTS.items() if getattr(self, name) is None})
+        unsaid: dict[str, Any] = {name: usual for name, usual in OF_HEIGHTS.items() if getattr(self, name) is None}
+        return replace(self, **unsaid)
 
     @property
     def of_the_model(self) -> Rules:

@@ -7,6 +7,8 @@ sites no triangle uses any more, and what all that means for the bare vertices.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
@@ -178,7 +180,7 @@ def _holds(xy: np.ndarray, mesh: np.ndarray, t: int, w: int, exact_area: float) 
 
 
 @inner(inline=True)
-def ears_of(g: Ground, live: Live, p: int, m: int) -> int:
+def ears_of(g: Any, live: Any, p: int, m: int) -> int:
     """Fill the star of p, whose m triangles, rim and ring are listed, by ears; return their number, or 0: none do."""
     if is_on_line(g.lines, p):
         low, high = along_line(g.xy, g.lines, p, live.ring, m, g.exact_area)

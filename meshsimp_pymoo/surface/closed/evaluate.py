@@ -8,6 +8,8 @@ on an edge belongs to the triangle on the left of the edge from its first to its
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
@@ -59,9 +61,7 @@ def holder(xy: np.ndarray, mesh: np.ndarray, t: int, x: float, y: float, exact_a
 
 
 @inner(inline=True)
-def corners_in_space(
-    mesh: np.ndarray, s: int, sites: np.ndarray, pole: np.ndarray
-) -> tuple[int, int, int]:
+def corners_in_space(mesh: np.ndarray, s: int, sites: np.ndarray, pole: np.ndarray) -> tuple[int, int, int]:
     """Return the vertices of triangle s of sites; those of the outside where it is a ghost."""
     if (mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
         return np.int64(pole[0]), np.int64(pole[1]), np.int64(pole[2])
@@ -183,7 +183,7 @@ def evaluate_closed(
 
     n_parts = min(max(1 if n_threads <= 1 else 4 * n_threads, -(-rows.size // AT_ONCE)), max(len(rows), 1))
     edges = np.linspace(0, len(rows), n_parts + 1).astype(int)
-    on_threads(evaluate, [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)], n_threads=n_threads)
+    on_threads(evaluate, [slice(a, b) for a, b in itertools.pairwise(edges)], n_threads=n_threads)
     return table
 
 

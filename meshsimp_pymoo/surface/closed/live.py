@@ -1,9 +1,9 @@
 """A closed mesh that lives: insert a vertex, remove one, move one, and know the exact change of the error.
 
-The triangulation of the images changes as that of a height surface does (:mod:`~meshsimp_pymoo.plane.stars`), but there
-is no outline: the corners of the hull are pinned, so a vertex never leaves a gap and all triangles are part of the mesh.
-What a vertex costs depends on the triangles across the edges of its own too: those *beside* the changed ones are costed
-again, for the sides that have changed alone.
+The triangulation of the images changes as that of a height surface does (:mod:`~meshsimp_pymoo.plane.stars`), but
+there is no outline: the corners of the hull are pinned, so all triangles are part of the mesh. What a vertex costs
+depends on the triangles across the edges of its own too: those *beside* the changed ones are costed again, for the
+sides that have changed alone.
 
 A change that is tried is made in the records of the triangles, every write into which is logged, and taken back; the
 lists of the vertices are left as they are.
@@ -192,9 +192,7 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
                 t0 = np.int64(gone[k])
                 if conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
                     break
-        n_cavity, n_rim = cavity_of(
-            g.xy, mesh, t0, w, cavity, rim, live.stack, g.lines, g.exact_area, g.exact_lift
-        )
+        n_cavity, n_rim = cavity_of(g.xy, mesh, t0, w, cavity, rim, live.stack, g.lines, g.exact_area, g.exact_lift)
         for k in range(n_cavity):
             t = np.int64(cavity[k])
             if not mark[t >> 3] & GONE:

@@ -67,7 +67,9 @@ class Topology:
         if self.components > 1:
             return f"has {self.components} parts"
         if self.touching:
-            return f"is not manifold ({_count(self.touching, 'vertex', 'vertices')} in which several fans of faces meet)"
+            return (
+                f"is not manifold ({_count(self.touching, 'vertex', 'vertices')} in which several fans of faces meet)"
+            )
         if self.mismatched:
             return f"has one side only ({_count(self.mismatched, 'edge')} between faces wound against each other)"
         if self.genus:

@@ -94,6 +94,7 @@ def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> 
     s = np.where(solid, vv * up - uv * vp, -1.0) / np.where(solid, area, 1.0)
     t = np.where(solid, uu * vp - uv * up, -1.0) / np.where(solid, area, 1.0)
     inside = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
+
     # else the nearest point of the three sides
     def along(top: FloatArray, bottom: FloatArray) -> FloatArray:
         return np.clip(top / np.where(bottom > 0.0, bottom, 1.0), 0.0, 1.0)
