@@ -26,7 +26,7 @@ from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plain_numbers, plot_error, plot_mesh
 from meshsimp_pymoo.reprs import brief
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import OfModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -420,7 +420,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     return figure
 
 
-def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
+def _meshes(study: Study, case: Case, surface: OfModel) -> list[_Shown]:
     """Return the meshes to show."""
     chosen = selected_solutions(case.runs, optimal=case.optimal)
     trade_offs = {method: next(s for s in solutions if s.kind == "trade_off") for method, solutions in chosen.items()}
@@ -450,7 +450,7 @@ def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
     return shown
 
 
-def _subset_shown(surface: HeightSurface, method: str, run: StoredRun, row: int) -> _Shown:
+def _subset_shown(surface: OfModel, method: str, run: StoredRun, row: int) -> _Shown:
     """Return the mesh of a stored subset of the model's vertices."""
     kept = np.unpackbits(run.arrays["kept"][row])[: surface.n_vertices].astype(bool)
     mesh = surface.simplify(kept)
@@ -460,7 +460,7 @@ def _subset_shown(surface: HeightSurface, method: str, run: StoredRun, row: int)
 
 
 def _mesh_title(
-    surface: HeightSurface, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
+    surface: OfModel, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
 ) -> str:
     """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons."""
     mean = np.average(deviation, weights=surface.model.weights)
