@@ -408,7 +408,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
         below.axis("off")
         below.set_aspect("equal")
         if column == 0:
-            text = "error at every\nvertex of the original\n\nblue: vertices that\nno triangle covers"
+            text = "error at every\nvertex of the original\n\n"
+            text += "seen from the front" if surface.view.is_closed else "blue: vertices that\nno triangle covers"
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
         plot_error(surface, mesh.deviation, below, covered=mesh.covered, largest=end, bar=False)
@@ -462,10 +463,12 @@ def _subset_shown(surface: OfModel, method: str, run: StoredRun, row: int) -> _S
 def _mesh_title(
     surface: OfModel, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
 ) -> str:
-    """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons."""
+    """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons, if it can."""
     mean = np.average(deviation, weights=surface.model.weights)
-    bare = len(covered) - np.count_nonzero(covered)
-    return f"{_short(method)}\n{triangles:,} triangles, mean {mean:.3g}\n{bare:,} vertices uncovered"
+    title = f"{_short(method)}\n{triangles:,} triangles, mean {mean:.3g}"
+    if surface.view.is_closed:
+        return title
+    return f"{title}\n{len(covered) - np.count_nonzero(covered):,} vertices uncovered"
 
 
 def method_look(study: Study, case: Case, method: str) -> tuple[str, str]:

@@ -9,8 +9,9 @@ import pytest
 import trimesh
 from samples import CLOSED
 from scipy.spatial import ConvexHull
+from true_distance import distances
 
-from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.options import Options
@@ -38,25 +39,6 @@ def with_corners(surface: ClosedSurface) -> BoolArray:
 
 def random_subset(surface: ClosedSurface, share: float, seed: int) -> BoolArray:
     return surface.pinned | (np.random.default_rng(seed).random(surface.n_vertices) < share)
-
-
-def distances(points: FloatArray, vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the distance of each point (P, 3) to the nearest of all triangles: to planes, edges and corners."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    best = np.full(len(points), np.inf)
-    for start, end in ((a, b), (b, c), (c, a)):
-        along = end - start
-        share = ((points[:, None] - start) * along).sum(axis=2) / (along**2).sum(axis=1)
-        foot = start + np.clip(share, 0.0, 1.0)[:, :, None] * along
-        best = np.minimum(best, np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1))
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    unit = normal / np.where(length > 0, length, 1.0)[:, None]
-    height = ((points[:, None] - a) * unit).sum(axis=2)
-    foot = points[:, None] - height[:, :, None] * unit
-    sides = [(np.cross(e - s, foot - s) * unit).sum(axis=2) >= 0 for s, e in ((a, b), (b, c), (c, a))]
-    above = sides[0] & sides[1] & sides[2] & (length > 0)
-    return np.minimum(best, np.where(above, np.abs(height), np.inf).min(axis=1))
 
 
 # -------------------------------------------------------------------------------------------------------- known answers
