@@ -43,6 +43,7 @@ from meshsimp_pymoo.errors import ToolUnavailable, raise_if_memory, reason_of, w
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import NestedFront, greedy_insertion, thinning
+from meshsimp_pymoo.surface.kinds import Model
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, Quality, quality_of
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.surface import Surface, require_rules
@@ -102,17 +103,20 @@ class Baseline:
         Whether it chooses among the model's vertices, as the searches do, and moves none.
     in_paper : bool
         Whether the paper compares with it.
+    at_borders : bool
+        Whether it is another method at the border only, so that there is nothing of its own on closed surfaces.
     """
 
     label: str
     group: str
-    tool: Callable[[OpenModel], Simplify] | None = None
+    tool: Callable[[Model], Simplify] | None = None
     front: Callable[[Surface], NestedFront] | None = None
     package: str = ""
     extra: str = ""
     asked_once: bool = False
     own_vertices: bool = False
     in_paper: bool = False
+    at_borders: bool = False
 
 
 @brief
@@ -235,6 +239,8 @@ def baseline_meshes(surface: Surface, method: str, triangles: Iterable[int]) -> 
         if not 1 <= number <= most:
             raise ValueError(f"{number} triangles were asked for, but the model has {most}: ask for 1 to {most}")
     known = BASELINES[method]
+    if known.at_borders and surface.view.is_closed:
+        raise ToolUnavailable("a closed surface has no border that could be kept; what does not keep it is compared")
     tool: Any = known.tool
     simplify = tool(surface.model)
     none = quality_of((name, 0 if name in COUNTED else np.inf) for name, row in MEASURES.items() if row.of is not None)
@@ -316,7 +322,7 @@ def _timed(simplify: Simplify, number: int) -> tuple[Mesh, float]:
     return mesh, time.perf_counter() - start
 
 
-def _by_meshlab(simplify: Callable[[ArrayLike, ArrayLike, int], Mesh], model: OpenModel) -> Simplify:
+def _by_meshlab(simplify: Callable[[ArrayLike, ArrayLike, int], Mesh], model: Model) -> Simplify:
     load_pymeshlab()
     points = model.file_points * model.scale
 
@@ -327,7 +333,7 @@ def _by_meshlab(simplify: Callable[[ArrayLike, ArrayLike, int], Mesh], model: Op
     return make
 
 
-def _by_meshoptimizer(model: OpenModel, *, lock_border: bool) -> Simplify:
+def _by_meshoptimizer(model: Model, *, lock_border: bool) -> Simplify:
     """Collapse edges onto one of their ends. With its border locked the smallest mesh has all of the border."""
     meshoptimizer = _needed("meshoptimizer")
     points, _ = local_frame(model.file_points * model.scale, unit_diagonal=True)
@@ -349,7 +355,7 @@ def _by_meshoptimizer(model: OpenModel, *, lock_border: bool) -> Simplify:
     return make
 
 
-def _by_fast_simplification(model: OpenModel, *, preserve_border: bool) -> Simplify:
+def _by_fast_simplification(model: Model, *, preserve_border: bool) -> Simplify:
     simplify = _needed("fast-simplification").simplify
     points, back = local_frame(model.file_points * model.scale, unit_diagonal=True)
     corners = np.ascontiguousarray(model.faces, np.int32)
@@ -361,7 +367,7 @@ def _by_fast_simplification(model: OpenModel, *, preserve_border: bool) -> Simpl
     return make
 
 
-def _by_pyfqmr(model: OpenModel, *, preserve_border: bool) -> Simplify:
+def _by_pyfqmr(model: Model, *, preserve_border: bool) -> Simplify:
     simplifier = _needed("pyfqmr").Simplify
     points, back = local_frame(model.file_points * model.scale, unit_diagonal=True)
     corners = np.ascontiguousarray(model.faces, np.int32)
@@ -376,10 +382,10 @@ def _by_pyfqmr(model: OpenModel, *, preserve_border: bool) -> Simplify:
     return make
 
 
-def _by_pydelatin(model: OpenModel) -> Simplify:
+def _by_pydelatin(model: Model) -> Simplify:
     """Insert the worst pixel of a grid into a Delaunay mesh of pixels; vertices get their true places and heights."""
     delatin = _needed("pydelatin").Delatin
-    rows = grid_rows(model)
+    rows = grid_rows(model) if isinstance(model, OpenModel) else None
     if rows is None:
         raise ToolUnavailable("pydelatin needs heights on a full regular grid, one for every pixel, and this is none")
     heights = model.points[rows, 2]
@@ -395,7 +401,7 @@ def _by_pydelatin(model: OpenModel) -> Simplify:
     return make
 
 
-def _of_vertices(model: OpenModel, faces: IntArray) -> Mesh:
+def _of_vertices(model: Model, faces: IntArray) -> Mesh:
     """Return triangles of some of the model's vertices as a mesh of these alone."""
     used, corners = used_rows(faces)
     return model.file_points[used], corners
@@ -508,6 +514,7 @@ BASELINES = {
     "quadric_collapse_boundary": Baseline(
         "MeshLab quadric, border kept",
         tool=partial(_by_meshlab, partial(quadric_collapse, preserve_boundary=True, unit_diagonal=True)),
+        at_borders=True,
         **_MESHLAB,
     ),
     "vertex_clustering": Baseline(
@@ -527,18 +534,36 @@ BASELINES = {
         "meshoptimizer", tool=partial(_by_meshoptimizer, lock_border=False), **_MESHOPTIMIZER
     ),
     "meshoptimizer_border": Baseline(
-        "meshoptimizer, border locked", tool=partial(_by_meshoptimizer, lock_border=True), **_MESHOPTIMIZER
+        "meshoptimizer, border locked",
+        tool=partial(_by_meshoptimizer, lock_border=True),
+        at_borders=True,
+        **_MESHOPTIMIZER,
     ),
     "fast_simplification_free": Baseline(
         "fast-simplification", tool=partial(_by_fast_simplification, preserve_border=False), **_FAST
     ),
     "fast_simplification_border": Baseline(
-        "fast-simplification, border kept", tool=partial(_by_fast_simplification, preserve_border=True), **_FAST
+        "fast-simplification, border kept",
+        tool=partial(_by_fast_simplification, preserve_border=True),
+        at_borders=True,
+        **_FAST,
     ),
     "pyfqmr_free": Baseline("pyfqmr", tool=partial(_by_pyfqmr, preserve_border=False), **_PYFQMR),
-    "pyfqmr_border": Baseline("pyfqmr, border kept", tool=partial(_by_pyfqmr, preserve_border=True), **_PYFQMR),
+    "pyfqmr_border": Baseline(
+        "pyfqmr, border kept", tool=partial(_by_pyfqmr, preserve_border=True), at_borders=True, **_PYFQMR
+    ),
     "pydelatin": Baseline(
         "pydelatin", "pydelatin", tool=_by_pydelatin, package="pydelatin", extra="baselines", own_vertices=True
+    ),
+    # in a group of its own, so that [meshlab] is what it was; among closed surfaces the rival of subsets
+    "quadric_collapse_ends": Baseline(
+        "MeshLab quadric, onto ends",
+        tool=partial(
+            _by_meshlab,
+            partial(quadric_collapse, preserve_boundary=False, unit_diagonal=True, optimal_placement=False),
+        ),
+        own_vertices=True,
+        **_MESHLAB | {"group": "meshlab_ends"},
     ),
 }
 """The methods by what configurations call them."""

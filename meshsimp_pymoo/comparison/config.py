@@ -64,9 +64,8 @@ from meshsimp_pymoo.search.presets import PRESETS, Preset
 from meshsimp_pymoo.search.requirements import require_probability
 from meshsimp_pymoo.search.weighted import WeightedSum
 from meshsimp_pymoo.settings import Choice, Kind, Real, Whole, plain, settings_of
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import Model, surface_of
 from meshsimp_pymoo.surface.measures import OBJECTIVES
-from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.rules import Rules, is_file_of_lines, meant_word_for_lines
 
 if TYPE_CHECKING:
@@ -326,11 +325,11 @@ class ProblemConfig:
     options: Options  # how it is read
     rules: Rules  # what counts; their measure is what is minimised beside the triangles
     limits: Mapping[str, Any]  # other arguments of `MeshProblem`; see LIMITS
-    model: OpenModel  # the model, opened; it holds the weights and the break lines
+    model: Model  # the model, opened; it holds the weights and the break lines
 
     def build(self) -> MeshProblem:
         """Return the problem, evaluated by one thread: an experiment's runs are what is done in parallel."""
-        surface = HeightSurface(self.model, self.rules.of_the_model)
+        surface = surface_of(self.model, self.rules.of_the_model)
         return MeshProblem(surface, **self.limits, n_threads=1)
 
     def description(self) -> dict[str, Any]:

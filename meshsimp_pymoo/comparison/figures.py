@@ -26,7 +26,7 @@ from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study
 from meshsimp_pymoo.indicators import non_dominated
 from meshsimp_pymoo.report.figures import front_axes, plain_numbers, plot_error, plot_mesh
 from meshsimp_pymoo.reprs import brief
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import OfModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -408,7 +408,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
         below.axis("off")
         below.set_aspect("equal")
         if column == 0:
-            text = "error at every\nvertex of the original\n\nblue: vertices that\nno triangle covers"
+            text = "error at every\nvertex of the original\n\n"
+            text += "seen from the front" if surface.view.is_closed else "blue: vertices that\nno triangle covers"
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
         plot_error(surface, mesh.deviation, below, covered=mesh.covered, largest=end, bar=False)
@@ -420,7 +421,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     return figure
 
 
-def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
+def _meshes(study: Study, case: Case, surface: OfModel) -> list[_Shown]:
     """Return the meshes to show."""
     chosen = selected_solutions(case.runs, optimal=case.optimal)
     trade_offs = {method: next(s for s in solutions if s.kind == "trade_off") for method, solutions in chosen.items()}
@@ -450,7 +451,7 @@ def _meshes(study: Study, case: Case, surface: HeightSurface) -> list[_Shown]:
     return shown
 
 
-def _subset_shown(surface: HeightSurface, method: str, run: StoredRun, row: int) -> _Shown:
+def _subset_shown(surface: OfModel, method: str, run: StoredRun, row: int) -> _Shown:
     """Return the mesh of a stored subset of the model's vertices."""
     kept = np.unpackbits(run.arrays["kept"][row])[: surface.n_vertices].astype(bool)
     mesh = surface.simplify(kept)
@@ -460,12 +461,14 @@ def _subset_shown(surface: HeightSurface, method: str, run: StoredRun, row: int)
 
 
 def _mesh_title(
-    surface: HeightSurface, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
+    surface: OfModel, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
 ) -> str:
-    """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons."""
+    """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons, if it can."""
     mean = np.average(deviation, weights=surface.model.weights)
-    bare = len(covered) - np.count_nonzero(covered)
-    return f"{_short(method)}\n{triangles:,} triangles, mean {mean:.3g}\n{bare:,} vertices uncovered"
+    title = f"{_short(method)}\n{triangles:,} triangles, mean {mean:.3g}"
+    if surface.view.is_closed:
+        return title
+    return f"{title}\n{len(covered) - np.count_nonzero(covered):,} vertices uncovered"
 
 
 def method_look(study: Study, case: Case, method: str) -> tuple[str, str]:

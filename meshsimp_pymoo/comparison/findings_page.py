@@ -10,6 +10,7 @@ from meshsimp_pymoo.comparison.study import INDICATORS, PROCEDURES, SCORINGS, St
 from meshsimp_pymoo.comparison.tables import Table, markdown_text, ranking
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.surface.measures import MEASURES
+from meshsimp_pymoo.surface.model import AREA
 
 __all__ = ["findings_page", "reservations", "shown_claims", "table", "times_page", "what_was_run"]
 
@@ -243,7 +244,9 @@ def _other_errors(study: Study) -> list[str]:
 
 
 def _weighed_by(weights: Any) -> str:
-    """Return what weights are: an attribute of the file, or numbers that stand in the configuration."""
+    """Return what weights are: areas, an attribute of the file, or numbers that stand in the configuration."""
+    if isinstance(weights, str) and weights == AREA:
+        return "a third of the area of the triangles around it"
     return f"its attribute *{weights}*" if isinstance(weights, str) else "a number of its own, from the configuration"
 
 

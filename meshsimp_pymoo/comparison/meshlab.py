@@ -65,12 +65,12 @@ def quadric_collapse(
     *,
     preserve_boundary: bool,
     unit_diagonal: bool = False,
+    optimal_placement: bool = True,
 ) -> Mesh:
     """Simplify a mesh by MeshLab's quadric edge collapse.
 
-    All other parameters have the values of MeshLab's dialogue: quality threshold 0.3, optimal placement of
-    vertices, no preserved normals or topology, clean-up at the end. Vertices move, so they are not a subset
-    of the given ones.
+    All other parameters have the values of MeshLab's dialogue: quality threshold 0.3, no preserved normals or
+    topology, clean-up at the end.
 
     Parameters
     ----------
@@ -86,6 +86,9 @@ def quadric_collapse(
     unit_diagonal : bool
         Whether to scale the mesh (by a power of two, exactly) to a bounding box diagonal of 1 to 2 first. It
         matters mostly without ``preserve_boundary``, and there much: see the module's introduction.
+    optimal_placement : bool
+        Whether vertices move to where the quadrics are least, as in the dialogue; otherwise an edge is collapsed onto
+        one of its ends, so that the vertices are a subset of the given ones.
 
     Returns
     -------
@@ -114,13 +117,17 @@ def quadric_collapse(
         boundaryweight=1.0,
         preservenormal=False,
         preservetopology=False,
-        optimalplacement=True,
+        optimalplacement=bool(optimal_placement),
         planarquadric=False,
         planarweight=0.001,
         qualityweight=False,
         autoclean=True,
         selected=False,
     )
+    if not optimal_placement:  # they are given ones exactly: to the local frame and back is not
+        from scipy.spatial import cKDTree
+
+        return points[cKDTree(local).query(collapsed)[1]], remaining
     return back(collapsed), remaining
 
 

@@ -86,7 +86,7 @@ from meshsimp_pymoo.search.checkpoint import (
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.storage import machine, now, package_versions
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import surface_of
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, TRIANGLES, Quality, measured
 from meshsimp_pymoo.surface.surface import measured_meshes
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
@@ -504,8 +504,8 @@ def _subset_arrays(problem: MeshProblem, kept: BoolArray) -> dict[str, npt.NDArr
     F = np.column_stack([measured(table, measure, total), table[:, TRIANGLES]])
     quality = measured_meshes(surface, kept, [problem.as_quality(row) for row in table], n_threads=1)
     nearest = F[:, 0]
-    if surface.rules.outside != "nearest" and len(kept):
-        charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))
+    if surface.rules.spares_uncovered and len(kept):
+        charged = surface_of(problem.model, replace(surface.rules, outside="nearest"))
         nearest = measured(charged.evaluate(kept), measure, total)
     return {
         "F": F,
@@ -883,10 +883,10 @@ def _meshes_of(task: _BaselineTask, problem: MeshProblem) -> tuple[dict[str, npt
     """Let a tool simplify a model to all sizes; return arrays and facts."""
     surface = problem.surface
     measure = surface.rules.measure
-    charged = HeightSurface(problem.model, replace(surface.rules, outside="nearest"))
     meshes = baseline_meshes(surface, task.method, task.asked)
     nearest = [mesh.quality for mesh in meshes]
-    if surface.rules.outside != "nearest":
+    if surface.rules.spares_uncovered:
+        charged = surface_of(problem.model, replace(surface.rules, outside="nearest"))
         nearest = [charged.score(m.vertices, m.faces).quality if m.triangles else m.quality for m in meshes]
     arrays = {
         "asked": np.array(task.asked, dtype=np.int64),

@@ -36,6 +36,8 @@ import numpy.typing as npt
 from meshsimp_pymoo.errors import ModelError, ResultError, reason_of
 from meshsimp_pymoo.files import new_file, put_text, read_npz, stays_inside
 from meshsimp_pymoo.reprs import brief
+from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.kinds import Model
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import OpenModel
 
@@ -53,6 +55,8 @@ KEY_DIGITS = 16
 NOT_STORED = ("attributes", "facts", "georeference", "found", "material")
 # Break lines are stored as arrays whose names begin so.
 LINES = "lines_"
+# What closed models alone have.
+OF_CLOSED = "pole"
 # What a model need not have.
 OPTIONAL = ("weights", "scale")
 
@@ -288,7 +292,7 @@ class RunStore:
                     leftover.unlink(missing_ok=True)
 
 
-def write_model(out: Path, model: OpenModel) -> str:
+def write_model(out: Path, model: Model) -> str:
     """Store a model, unless it is stored already; return its path inside the folder."""
     path = out / "models" / f"{_file_name(Path(model.name).stem)}.{model.hash[:KEY_DIGITS]}.npz"
     relative = path.relative_to(out).as_posix()
@@ -296,16 +300,16 @@ def write_model(out: Path, model: OpenModel) -> str:
         read_model(out, relative, model.hash)
         return relative
     content = io.BytesIO()
-    parts = {name: getattr(model, name) for name in _stored_fields()}
+    parts = {name: getattr(model, name) for name in _stored_fields(type(model))}
     stored: dict[str, Any] = {name: np.asarray(part) for name, part in parts.items() if part is not None}
-    if model.lines is not None:
+    if isinstance(model, OpenModel) and model.lines is not None:
         stored |= {LINES + name: part for name, part in model.lines.arrays().items()}
     np.savez_compressed(content, **stored)
     _put(path, content.getvalue())
     return relative
 
 
-def read_model(out: Path, relative: object, expected: str) -> OpenModel:
+def read_model(out: Path, relative: object, expected: str) -> Model:
     """Read a stored model.
 
     Parameters
@@ -327,11 +331,15 @@ def read_model(out: Path, relative: object, expected: str) -> OpenModel:
     path = out / relative
     try:
         arrays = _arrays(path.read_bytes(), path)
-        names = [name for name in _stored_fields() if name not in OPTIONAL or name in arrays]
+        kind = ClosedModel if OF_CLOSED in arrays else OpenModel
+        names = [name for name in _stored_fields(kind) if name not in OPTIONAL or name in arrays]
         stored: dict[str, Any] = {name: arrays[name] for name in names}
         plain = {name: values.item() for name, values in stored.items() if values.ndim == 0}
         lines = {name.removeprefix(LINES): part for name, part in arrays.items() if name.startswith(LINES)}
-        model = OpenModel(**(stored | plain), attributes={}, lines=ModelLines.of_arrays(lines) if lines else None)
+        whole: dict[str, Any] = stored | plain | {"attributes": {}}
+        if lines:
+            whole["lines"] = ModelLines.of_arrays(lines)
+        model = kind(**whole)
     except (OSError, KeyError, ValueError, TypeError) as problem:
         raise ResultError(f"{path}: is damaged ({reason_of(problem)}); run the experiment again") from None
     if model.hash != expected:
@@ -339,9 +347,9 @@ def read_model(out: Path, relative: object, expected: str) -> OpenModel:
     return model
 
 
-def _stored_fields() -> list[str]:
-    """Return the parts of a model that are stored: arrays, texts and numbers."""
-    return [part.name for part in fields(OpenModel) if part.name not in (*NOT_STORED, "lines")]
+def _stored_fields(kind: type[Model]) -> list[str]:
+    """Return the parts of a model of a kind that are stored: arrays, texts and numbers."""
+    return [part.name for part in fields(kind) if part.name not in (*NOT_STORED, "lines")]
 
 
 def _put(path: Path, content: bytes) -> None:

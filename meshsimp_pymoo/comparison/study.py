@@ -68,7 +68,7 @@ from meshsimp_pymoo.indicators import hypervolume_ratio, merged_front, non_domin
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import read_back
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.kinds import OfModel, surface_of
 from meshsimp_pymoo.surface.rules import Rules
 
 __all__ = [
@@ -340,7 +340,7 @@ class Case:
             For each seed the moments (K,) and the ratio at each, 0 before anything was found. Seeds with a run
             that kept no fronts are left out; so are all if this scoring is not the one that was searched by.
         """
-        if self.scoring != "searched" and self.problem.rules.outside != "nearest":
+        if self.scoring != "searched" and self.problem.rules.spares_uncovered:
             return []
         kept = [runs for runs in self.sources[method].values() if all("trace_F" in run.arrays for run in runs)]
         return [self._progress(runs, over) for runs in kept]
@@ -477,8 +477,8 @@ class Study:
     @property
     def scorings(self) -> list[str]:
         """Keys of `SCORINGS` that this study needs."""
-        charged = all(problem.rules.outside == "nearest" for problem in self.problems)
-        return ["nearest"] if charged else ["searched", "nearest"]
+        spared = any(problem.rules.spares_uncovered for problem in self.problems)
+        return ["searched", "nearest"] if spared else ["nearest"]
 
     @cached_property
     def all_runs(self) -> list[StoredRun]:
@@ -507,12 +507,13 @@ class Study:
         wanted = [(problem.name, budget, scoring) for problem in self.problems]
         return [self.cases[key] for key in wanted if key in self.cases]
 
-    def surface(self, problem: Problem, scoring: str = "searched") -> HeightSurface:
+    def surface(self, problem: Problem, scoring: str = "searched") -> OfModel:
         """Return the stored model of a problem with its rules, or with those of a scoring."""
-        outside = "nearest" if scoring == "nearest" else problem.rules.outside
-        model = read_model(self.out, problem.stored, problem.hash)
+        rules = problem.rules.of_the_model
+        if scoring == "nearest" and rules.spares_uncovered:
+            rules = replace(rules, outside="nearest")
         # pins are in every subset that was stored
-        return HeightSurface(model, replace(problem.rules.of_the_model, outside=outside, pin=None))
+        return surface_of(read_model(self.out, problem.stored, problem.hash), replace(rules, pin=None))
 
     def comparisons(self, budget: str, scoring: str, indicator: str) -> list[Comparison]:
         """Compare every two methods with chance on all models; Holm's correction is over all of these."""

@@ -17,9 +17,11 @@ from meshsimp_pymoo.surface.surface import Surface
 
 # The original mesh of a surface of any kind.
 Model: TypeAlias = OpenModel | ClosedModel
+# What it is the original mesh of.
+OfModel: TypeAlias = HeightSurface | ClosedSurface
 
 
-def surface_of(model: Model, rules: Rules = DEFAULT) -> HeightSurface | ClosedSurface:
+def surface_of(model: Model, rules: Rules = DEFAULT) -> OfModel:
     """Return the surface that a model makes with rules.
 
     Raises

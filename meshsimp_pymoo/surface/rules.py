@@ -140,6 +140,11 @@ class Rules:
         return ", ".join(said)
 
     @property
+    def spares_uncovered(self) -> bool:
+        """Whether a vertex that no triangle covers costs nothing; on a closed surface there is none."""
+        return self.outside == "ignore"
+
+    @property
     def of_heights(self) -> Rules:
         """These rules for a height surface: what is not said is what is usual there."""
         unsaid: dict[str, Any] = {name: usual for name, usual in OF_HEIGHTS.items() if getattr(self, name) is None}

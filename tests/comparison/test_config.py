@@ -66,7 +66,7 @@ def test_every_configuration_that_comes_along_can_be_run(path, tmp_path):
         write_mesh(tmp_path / f"{name}.ply", source.points, source.faces)
     experiment = read_experiment_file(path, folder=tmp_path)
     assert {algorithm.preset for algorithm in experiment.algorithms} >= {"nsga2_v1", "nsga2_v2", "moead"}
-    assert {budget.kind for budget in experiment.budgets} == {"generations", "evaluations"}
+    assert {budget.kind for budget in experiment.budgets} >= {"generations", "evaluations"}
     assert len(experiment.problems) in (3, 6)
     assert experiment.baselines.methods[:4] == MESHLAB
 
@@ -435,7 +435,7 @@ MISTAKES = {
     ),
     "unknown key with its line and value": (
         {"title": "a\nproblem:\n  footprint: hull\n  max_edges: 3", "problem": None},
-        ["line 8", "problem.max_edges: 3: unknown key", "'max_edge'", "known here: up, "],
+        ["line 8", "problem.max_edges: 3: unknown key", "'max_edge'", "known here: surface, up, "],
     ),
     "baselines are nothing": ({"baselines": ""}, ["baselines: nothing: expected true, or a list of some of quadric_c"]),
     "no baseline": ({"baselines": "[]"}, ["baselines: expected true, or a list"]),
