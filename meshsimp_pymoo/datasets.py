@@ -12,7 +12,8 @@ or in YAML::
 
 Two are real terrain from the sample data that matplotlib installs. The others are made here: surfaces whose
 whole front is known (``plane``, ``roof``, ``pyramid``), smooth and rough test surfaces, a synthetic scan of a
-face, outlines with a hole or a bay, and an embankment with break lines (``load_lines``). Everything is a pure
+face, outlines with a hole or a bay, an embankment with break lines (``load_lines``), and closed surfaces, with flat
+faces (``tetrahedron``, ``cube``, ``icosahedron``) or smooth (``sphere``, ``ellipsoid``, ``blob``). Everything is a pure
 function of the parameters, the scan noise included.
 """
 
@@ -43,6 +44,7 @@ SPACING_STEP = (
 )  # metres; grid spacings are multiples of it, so that row and column positions are exact in binary
 MAX_SIDE = 4097  # vertices per side of a square grid: 17 million vertices, beyond any use here
 MAX_SCATTERED = 2_000_000  # vertices of a scattered model; their first triangulation takes half a minute
+MAX_EDGE = 513  # vertices along an edge of a polyhedron: 2.6 million on an icosahedron
 
 # Corners of a curved outline; far more than the vertices on it, so that no three of those lie on a line.
 OUTLINE_SAMPLES = 24_000
@@ -283,12 +285,8 @@ def _crater(side: int = 49) -> SourceMesh:
 def _square(side: int, height: Callable[[FloatArray, FloatArray], FloatArray], *, exact: bool = False) -> SourceMesh:
     """Sample a height function on a square grid over [-1, 1] x [-1, 1]."""
     _check_range("side", side, 3, MAX_SIDE)
-    if exact and (side - 1) & (side - 2):
-        below = 2 ** ((side - 2).bit_length() - 1) + 1
-        raise ValueError(
-            f"side is {side}; it must be a power of two plus one (say {below} or {2 * below - 1}), so that "
-            "every coordinate is exact"
-        )
+    if exact:
+        _check_exact(side)
     step = 2.0 / (side - 1)
     at = np.arange(side) * step
     x, y = np.meshgrid(at - 1.0, 1.0 - at)
@@ -581,6 +579,153 @@ def _near(points: FloatArray, polygons: list[FloatArray], distance: float) -> np
     return _near_points(points, np.concatenate(samples), distance)
 
 
+# ------------------------------------------------------------------------------------------ closed, with flat faces
+
+
+def _tetrahedron(side: int = 17) -> SourceMesh:
+    """Return a closed tetrahedron of flat faces, each edge of so many vertices; the mesh of its 4 corners is exact."""
+    _check_range("side", side, 3, MAX_EDGE)
+    _check_exact(side)
+    corners = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+    return _polyhedron(corners, np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), side - 1)
+
+
+def _cube(side: int = 17) -> SourceMesh:
+    """Return a closed cube of flat faces, each edge of so many vertices; the mesh of its 8 corners is exact."""
+    _check_range("side", side, 3, MAX_EDGE)
+    _check_exact(side)
+    n = side - 1
+    u, v = (grid.ravel() for grid in np.meshgrid(np.arange(side), np.arange(side), indexing="ij"))
+    cell = (u < n) & (v < n)
+    at = np.flatnonzero(cell)
+    squares = np.concatenate([[at, at + side, at + side + 1], [at, at + side + 1, at + 1]], axis=1).T
+    places = np.empty((6, side * side, 3), np.int64)
+    faces = np.empty((6, len(squares), 3), np.int64)
+    for k in range(6):
+        axis, end = divmod(k, 2)
+        places[k, :, axis], places[k, :, (axis + 1) % 3], places[k, :, (axis + 2) % 3] = end * n, u, v
+        faces[k] = (squares if end else squares[:, ::-1]) + side * side * k
+    place, joined = _joined(places.reshape(-1, 3), faces.reshape(-1, 3))
+    return _closed(2.0 * place / n - 1.0, joined)
+
+
+def _icosahedron(side: int = 9) -> SourceMesh:
+    """Return a closed icosahedron of flat faces, each edge of so many vertices; that of its 12 corners is exact."""
+    from scipy.spatial import ConvexHull
+
+    _check_range("side", side, 3, MAX_EDGE)
+    golden = 0.5 * (1.0 + math.sqrt(5.0))
+    plane = np.array([[0.0, y, z] for y in (-1.0, 1.0) for z in (-golden, golden)])
+    corners = np.concatenate([np.roll(plane, k, axis=1) for k in range(3)])
+    return _polyhedron(corners, _outwards(corners, ConvexHull(corners).simplices), side - 1)
+
+
+def _polyhedron(corners: FloatArray, faces: IntArray, n: int) -> SourceMesh:
+    """Divide triangular faces (F, 3) of corners (C, 3) into n * n triangles each; common edges get common vertices."""
+    first, second = (grid.ravel() for grid in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
+    inside = first + second <= n
+    first, second = first[inside], second[inside]
+    row = np.full((n + 2, n + 2), -1)
+    row[first, second] = np.arange(len(first))
+    upright = np.flatnonzero(first + second < n)
+    tilted = np.flatnonzero(first + second < n - 1)
+    small = np.concatenate(
+        [
+            np.column_stack([upright, row[first + 1, second][upright], row[first, second + 1][upright]]),
+            np.column_stack(
+                [row[first + 1, second][tilted], row[first + 1, second + 1][tilted], row[first, second + 1][tilted]]
+            ),
+        ]
+    )
+    # how many n-ths of each corner a vertex is: whole numbers, so that those of a common edge are the same
+    shares = np.zeros((len(faces), len(first), len(corners)), np.int64)
+    for face, (a, b, c) in enumerate(faces):
+        shares[face, :, a], shares[face, :, b], shares[face, :, c] = n - first - second, first, second
+    all_small = (small + len(first) * np.arange(len(faces))[:, None, None]).reshape(-1, 3)
+    share, joined = _joined(shares.reshape(-1, len(corners)), all_small)
+    return _closed(share @ corners / n, joined)
+
+
+def _joined(places: IntArray, faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Make vertices (n, k) in the same place one, in the order of the places."""
+    places, row = np.unique(places, axis=0, return_inverse=True)
+    return places, row.ravel()[faces]
+
+
+# ---------------------------------------------------------------------------------------------------- closed and smooth
+
+
+def _sphere(vertices: int = 1000, seed: int = 1) -> SourceMesh:
+    """Return a closed sphere of radius 1, any number of vertices, scattered evenly."""
+    return _closed(*_on_sphere(vertices, seed))
+
+
+def _ellipsoid(vertices: int = 1000, a: float = 3.0, b: float = 2.0, c: float = 1.0, seed: int = 1) -> SourceMesh:
+    """Return a closed ellipsoid of semi-axes a, b and c, any number of vertices."""
+    for name, axis in {"a": a, "b": b, "c": c}.items():
+        if not 0.0 < axis < math.inf:
+            raise ValueError(f"{name} is {axis:g}; a semi-axis must be more than 0 [model units]")
+    directions, faces = _on_sphere(vertices, seed)
+    return _closed(directions * [a, b, c], faces)
+
+
+def _blob(vertices: int = 2000, seed: int = 1, bumps: float = 0.25, stretch: float = 1.0) -> SourceMesh:
+    """Return a smooth closed blob with bumps of that standard deviation, stretched along x, any number of vertices."""
+    if not 0.0 <= bumps <= 0.5:
+        raise ValueError(f"bumps is {bumps:g}; it must be 0 to 0.5 [mean radii]")
+    if not 0.0 < stretch < math.inf:
+        raise ValueError(f"stretch is {stretch:g}; it must be more than 0")
+    directions, faces = _on_sphere(vertices, seed)
+    # plane waves in all directions, the shorter the lower
+    rng = np.random.default_rng(seed + 1)
+    height, square = np.zeros(vertices), 0.0
+    for length in np.geomspace(*BLOB_WAVES, 32):
+        wave = rng.normal(size=3)
+        wave *= 2.0 * math.pi / (length * np.linalg.norm(wave))
+        height += length * np.cos(directions @ wave + rng.uniform(0.0, 2.0 * math.pi))
+        square += 0.5 * length**2
+    radius = np.exp(bumps * height / math.sqrt(square))
+    return _closed(directions * radius[:, None] * [stretch, 1.0, 1.0], faces)
+
+
+# The longest and the shortest wave on a blob [mean radii].
+BLOB_WAVES = 4.0, 0.4
+
+
+def _on_sphere(vertices: int, seed: int) -> tuple[FloatArray, IntArray]:
+    """Scatter exactly that many vertices evenly but irregularly over the unit sphere and triangulate them."""
+    from scipy.spatial import ConvexHull
+
+    _check_range("vertices", vertices, LEAST_ON_SPHERE, MAX_SCATTERED)
+    rng = np.random.default_rng(seed)
+    k = np.arange(vertices) + 0.5
+    z = 1.0 - 2.0 * k / vertices
+    turn = math.pi * (math.sqrt(5.0) - 1.0) * k + rng.uniform(0.0, 2.0 * math.pi)
+    out = np.sqrt(1.0 - z**2)
+    points = np.column_stack([out * np.cos(turn), out * np.sin(turn), z])
+    gap = math.sqrt(8.0 * math.pi / math.sqrt(3.0) / vertices)  # edge of the equilateral triangles that would fill it
+    points += rng.uniform(-0.12 * gap, 0.12 * gap, points.shape)
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    return points, _outwards(points, ConvexHull(points).simplices)
+
+
+# Vertices on a sphere: so many that its centre is within.
+LEAST_ON_SPHERE = 12
+
+
+def _outwards(points: FloatArray, faces: npt.NDArray[Any]) -> IntArray:
+    """Wind the faces (F, 3) of a convex hull around the origin anticlockwise seen from outside."""
+    faces = faces.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inwards = (np.cross(a, b) * c).sum(axis=1) < 0
+    faces[inwards] = faces[inwards][:, ::-1]
+    return faces
+
+
+def _closed(points: FloatArray, faces: IntArray) -> SourceMesh:
+    return SourceMesh(points, faces, {}, name="closed", is_closed=True)
+
+
 # ------------------------------------------------------------------------------------------------ names and parameters
 
 _MODELS: dict[str, Callable[..., SourceMesh]] = {
@@ -597,6 +742,12 @@ _MODELS: dict[str, Callable[..., SourceMesh]] = {
     "ring": _ring,
     "horseshoe": _horseshoe,
     "embankment": _embankment,
+    "tetrahedron": _tetrahedron,
+    "cube": _cube,
+    "icosahedron": _icosahedron,
+    "sphere": _sphere,
+    "ellipsoid": _ellipsoid,
+    "blob": _blob,
 }
 # The break lines of those that have any; their parameters are the models'.
 _LINES: dict[str, Callable[..., SourceLines]] = {"embankment": _embankment_lines}
@@ -635,6 +786,16 @@ def _number(name: str, key: str, value: Any, parameter: inspect.Parameter) -> fl
 def _check_range(key: str, value: int, low: int, high: int) -> None:
     if not low <= value <= high:
         raise ValueError(f"{key} is {value}; it must be {low} to {high}")
+
+
+def _check_exact(side: int) -> None:
+    """Refuse vertices along a side that halving does not give."""
+    if (side - 1) & (side - 2):
+        below = 2 ** ((side - 2).bit_length() - 1) + 1
+        raise ValueError(
+            f"side is {side}; it must be a power of two plus one (say {below} or {2 * below - 1}), so that "
+            "every coordinate is exact"
+        )
 
 
 def _unknown(name: str, base: str) -> str:

@@ -88,7 +88,7 @@ def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
     built: Model
     if kind_of(source, options) == "closed":
         built = closed_model(source)
-        if options.surface == "auto":
+        if options.surface == "auto" and not source.is_closed:
             warn_of(
                 f"{source.name}: is no height field but a closed surface, and is taken as one (--surface closed "
                 "(surface='closed') says so; --patch front (patch='front') takes one side of it)"
@@ -122,6 +122,8 @@ def kind_of(source: SourceMesh, options: Options = DEFAULT) -> str:
         return options.surface
     if side is not None or source.sort != "mesh" or source.up is not None:
         return "height"
+    if source.is_closed:
+        return "closed"
     what = topology(source.faces)
     if not what.is_sphere:
         return "height"

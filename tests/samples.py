@@ -110,6 +110,9 @@ def coloured(source: SourceMesh) -> SourceMesh:
     return dataclasses.replace(source, attributes=attributes)
 
 
+# Built-in models that are closed surfaces; all others are height fields.
+CLOSED = ("tetrahedron", "cube", "icosahedron", "sphere", "ellipsoid", "blob")
+
 # Models so small that every triangle can look at every vertex: known ridges, holes, bays, and a scan's outline.
 SMALL = {
     "roof": lambda: load("roof:5"),

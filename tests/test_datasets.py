@@ -5,11 +5,14 @@ from __future__ import annotations
 import matplotlib.cbook
 import numpy as np
 import pytest
+import trimesh
+from samples import CLOSED
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.datasets import describe, load, names
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.surface.closed.model import ClosedModel, topology
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.rules import Rules
@@ -31,13 +34,60 @@ def subset(model, *positions):
 CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
-@pytest.mark.parametrize("name", names())
-def test_every_built_in_is_an_open_height_field_that_can_be_simplified(name):
+@pytest.mark.parametrize("name", [name for name in names() if name not in CLOSED])
+def test_every_other_built_in_is_an_open_height_field_that_can_be_simplified(name):
     model = build_model(load(SMALL.get(name, name)))
     assert model.up.tolist() == [0, 0, 1]
     everything = HeightSurface(model).simplify(np.ones(model.n_vertices, dtype=bool))
     assert everything.quality.error == pytest.approx(0, abs=1e-9 * model.diagonal * model.n_vertices)
     assert everything.quality.vertices == model.n_vertices
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_a_closed_built_in_is_one_without_a_word_and_wound_outwards(name):
+    source = load(name)
+    assert topology(source.faces).is_sphere
+    a, b, c = (source.points[source.faces[:, k]] for k in range(3))
+    assert ((np.cross(a, b) * c).sum(axis=1) > 0).all()  # all of them are stars around the origin
+    assert isinstance(open_model(name), ClosedModel)  # a warning would be an error
+    assert len(source.points) == len(np.unique(source.points, axis=0)) == len(source.faces) // 2 + 2
+
+
+@pytest.mark.parametrize(
+    ("name", "vertices", "area"),
+    [
+        ("tetrahedron:3", 10, 8 * 3**0.5),
+        ("tetrahedron:17", 514, 8 * 3**0.5),
+        ("cube:3", 26, 24.0),
+        ("cube:9", 386, 24.0),
+        ("icosahedron:3", 42, 20 * 3**0.5),
+        ("icosahedron:8", 492, 20 * 3**0.5),
+    ],
+)
+def test_a_polyhedron_has_its_vertices_and_its_area(name, vertices, area):
+    source = load(name)
+    assert len(source.points) == vertices
+    assert trimesh.Trimesh(source.points, source.faces, process=False).area == pytest.approx(area, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["sphere", "ellipsoid", "blob"])
+@pytest.mark.parametrize("vertices", [12, 13, 2000])
+def test_smooth_closed_models_have_exactly_the_wanted_number_of_vertices(name, vertices):
+    source = load(name, vertices=vertices)
+    assert len(source.points) == vertices
+    assert topology(source.faces).is_sphere
+
+
+def test_a_sphere_an_ellipsoid_and_a_blob_without_bumps_are_those():
+    sphere = load("sphere:3000")
+    np.testing.assert_allclose(np.linalg.norm(sphere.points, axis=1), 1.0, rtol=1e-14)
+    volume = trimesh.Trimesh(sphere.points, sphere.faces, process=False).volume
+    assert 0.995 * 4.0 / 3.0 * np.pi < volume < 4.0 / 3.0 * np.pi
+    np.testing.assert_allclose(load("ellipsoid:3000").points / [3.0, 2.0, 1.0], sphere.points, rtol=1e-14)
+    assert np.array_equal(load("blob:3000,bumps=0").points, sphere.points)
+    assert np.array_equal(load("blob:3000,bumps=0,stretch=4").points[:, 0], 4.0 * sphere.points[:, 0])
+    radius = np.log(np.linalg.norm(load("blob:3000").points, axis=1))
+    assert 0.1 < radius.std() < 0.4
 
 
 @pytest.mark.parametrize("name", names())
@@ -182,6 +232,12 @@ def test_parameters_by_keyword_win_over_spelled_ones():
         ("face:300,noise=nan", r"noise must be a number, not 'nan'"),
         ("jacksboro:0", r"stride is 0; a grid of 344 x 403 posts can be read at 1 to 343"),
         ("jacksboro:344", r"stride is 344; "),
+        ("tetrahedron:8", r"side is 8; it must be a power of two plus one \(say 5 or 9\)"),
+        ("icosahedron:2", r"side is 2; it must be 3 to 513"),
+        ("sphere:11", r"vertices is 11; it must be 12 to 2000000"),
+        ("ellipsoid:99,b=0", r"b is 0; a semi-axis must be more than 0"),
+        ("blob:99,bumps=1", r"bumps is 1; it must be 0 to 0.5"),
+        ("blob:99,stretch=-1", r"stretch is -1; it must be more than 0"),
         ("jacksboro:11,vertices=5000", r"vertices is 5000; it must be 4 to 1184"),
     ],
 )

@@ -64,6 +64,8 @@ class SourceMesh:
         What all faces look like.
     grid : (int, int, float, float), optional
         Of a height grid: columns, rows, and how far both are apart; NaN where that is uneven [file units].
+    is_closed : bool
+        Whether it is known to be a closed surface, as built-in ones are, so that nobody need be told.
     """
 
     points: FloatArray
@@ -77,6 +79,7 @@ class SourceMesh:
     repeats: IntArray = field(default_factory=lambda: np.empty((0, 2), np.int64))
     material: Material | None = None
     grid: tuple[int, int, float, float] | None = None
+    is_closed: bool = False
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):
