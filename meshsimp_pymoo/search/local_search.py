@@ -115,6 +115,8 @@ def anneal(
     indices = borrowed(indices)
     state = borrowed(state)
     near, fill, on_border, drop = shares
+    if len(border) == 0:  # of a closed surface: no vertex takes one triangle
+        on_border = 0.0
     now = total_cost(g, live)
     best = now
     n_best = n_movable
