@@ -50,8 +50,8 @@ View = Literal["above", "side", "front", "back"] | tuple[float, float]
 VIEWS = {
     "above": (90.0, 0.0),
     "side": (35.0, -35.0),
-    "front": (12.0, -25.0),
-    "back": (-12.0, 155.0),  # opposite to it: both together see all of a convex body
+    "front": (18.0, -32.0),
+    "back": (-18.0, 148.0),  # opposite to it: both together see all of a convex body
 }  # elevation of the viewer above the plane, turn about the upright [degrees]
 LIGHT = (-0.5, 0.6, 0.75)  # to the light, in the frame of the picture: from the upper left, in front of it
 AMBIENT = 0.22  # brightness of what faces away from the light
