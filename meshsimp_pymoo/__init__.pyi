@@ -46,8 +46,11 @@ from meshsimp_pymoo.search.weighted import weighted_ga_v1 as weighted_ga_v1
 from meshsimp_pymoo.search.weighted import weighted_ga_v2 as weighted_ga_v2
 from meshsimp_pymoo.storage import read_front as read_front
 from meshsimp_pymoo.storage import write_front as write_front
+from meshsimp_pymoo.surface.closed.model import ClosedModel as ClosedModel
+from meshsimp_pymoo.surface.closed.surface import ClosedSurface as ClosedSurface
 from meshsimp_pymoo.surface.height import HeightSurface as HeightSurface
 from meshsimp_pymoo.surface.height import refit_heights as refit_heights
+from meshsimp_pymoo.surface.kinds import surface_of as surface_of
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation as LiveTriangulation
 from meshsimp_pymoo.surface.measures import Quality as Quality
 from meshsimp_pymoo.surface.model import OpenModel as OpenModel

@@ -115,7 +115,7 @@ def anneal(
     indices = borrowed(indices)
     state = borrowed(state)
     near, fill, on_border, drop = shares
-    if len(border) == 0:  # of a closed surface: no vertex takes one triangle
+    if len(border) == 0:  # there is nowhere to make one triangle
         on_border = 0.0
     now = total_cost(g, live)
     best = now

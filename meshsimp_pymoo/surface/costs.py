@@ -14,7 +14,7 @@ from meshsimp_pymoo.compiling.functions import inner
 from meshsimp_pymoo.plane.constraints import holds_line
 from meshsimp_pymoo.plane.emission import is_sliver, sum_of_three
 from meshsimp_pymoo.plane.footprint import inside
-from meshsimp_pymoo.surface.books import LARGEST, Live
+from meshsimp_pymoo.surface.books import LARGEST
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE, REACH
 from meshsimp_pymoo.surface.ground import Ground
 

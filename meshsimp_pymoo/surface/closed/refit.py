@@ -14,30 +14,41 @@ References
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 
 # Rounds, and what holds vertices where they are: this share of what a sample weighs, times the samples a vertex.
 ROUNDS = 6
 PULL = 0.02
+# Conjugate gradients end where so much of the residual is left, or after so many steps: rounds go on from there.
+CLOSE = 1e-6
+MOST_STEPS = 200
 
 
-def moved_vertices(
-    vertices: FloatArray,
-    faces: IntArray,
-    samples: FloatArray,
-    weights: FloatArray,
-    *,
-    rounds: int = ROUNDS,
-    until: float | None = None,
-) -> list[FloatArray]:
-    """Return where the vertices are after each round.
+class Round(NamedTuple):
+    """Where the vertices are, and how far the samples of the original are from their mesh.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+    distances : (K,) float array
+    """
+
+    vertices: FloatArray
+    distances: FloatArray
+
+
+def rounds_of_refit(
+    vertices: FloatArray, faces: IntArray, samples: FloatArray, weights: FloatArray, *, until: float | None = None
+) -> Iterator[Round]:
+    """Yield where the vertices are: at the start, and after each round.
 
     Parameters
     ----------
@@ -45,22 +56,21 @@ def moved_vertices(
         Of the mesh, all used.
     faces : (M, 3) int array
     samples : (K, 3) float array
-        Of the original.
+        Of the original; consecutive ones should be close to each other.
     weights : (K,) float array
         What each counts.
-    rounds : int
     until : float, optional
         ``perf_counter()`` after which no round begins.
     """
     pull = PULL * weights.sum() / len(vertices)
-    found = []
-    for _ in range(rounds):
+    distances, nearest = distances_to_mesh(samples, vertices, faces)
+    yield Round(vertices, distances)
+    for _ in range(ROUNDS):
         if until is not None and time.perf_counter() >= until:
-            break
-        _, nearest = distances_to_mesh(samples, vertices, faces)
+            return
         vertices = _fitted(vertices, faces, samples, weights, nearest, pull)
-        found.append(vertices)
-    return found
+        distances, nearest = distances_to_mesh(samples, vertices, faces, nearest)
+        yield Round(vertices, distances)
 
 
 def _fitted(
@@ -78,10 +88,15 @@ def _fitted(
     values = (share[:, :, None] * across[:, None, :]).reshape(-1)
     columns = (3 * faces[nearest][:, :, None] + np.arange(3)).reshape(-1)
     A = sparse.csr_matrix((values, columns, np.arange(0, 9 * len(samples) + 1, 9)), shape=(len(samples), 3 * n))
-    At = (A.multiply(weights[:, None])).T.tocsr()
-    normal_matrix = (At @ A + pull * sparse.identity(3 * n)).tocsc()
-    right = At @ (across * samples).sum(axis=1) + pull * vertices.ravel()
-    return np.asarray(linalg.spsolve(normal_matrix, right)).reshape(-1, 3)
+    root = np.sqrt(weights)
+    A.data *= np.repeat(root, 9)
+    start = vertices.ravel()
+    # of what is left at the start, so that vertices which fit need not move
+    right = A.T @ (root * (across * samples).sum(axis=1) - A @ start)
+    normal_matrix = (A.T @ A + pull * sparse.identity(3 * n)).tocsr()
+    scaled = linalg.LinearOperator((3 * n, 3 * n), matvec=(1.0 / normal_matrix.diagonal()).__mul__, dtype=float)
+    step, _ = linalg.cg(normal_matrix, right, rtol=CLOSE, maxiter=MOST_STEPS, M=scaled)
+    return np.asarray(start + step).reshape(-1, 3)
 
 
 def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> FloatArray:
@@ -110,15 +125,3 @@ def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> 
     s = np.where(inside, s, on_side[:, 0])
     t = np.where(inside, t, on_side[:, 1])
     return np.column_stack([1.0 - s - t, s, t])
-
-
-def folded_edges(vertices: FloatArray, faces: IntArray, most: float) -> IntArray:
-    """Return how many edges have two faces that turn against each other by more than ``most`` degrees."""
-    table = edge_table(faces)
-    two = table.first[table.n_triangles == 2]
-    n_faces = len(faces)
-    one, other = table.order[two] % n_faces, table.order[two + 1] % n_faces
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    return np.asarray(((normal[one] * normal[other]).sum(axis=1) < np.cos(np.radians(most))).sum())
