@@ -3,7 +3,8 @@
 ``plot_front``, ``plot_mesh`` and ``plot_error`` each fill one matplotlib axes, so that they fit into
 anybody's figure; without one they make a figure of their own. ``front_figure`` puts them together as the
 ``front.png`` of a simplification, ``error_figure`` is the picture of one mesh's error. Meshes are shaded from
-their face normals and drawn back to front, which needs no graphics hardware and no display.
+their face normals and drawn back to front, which needs no graphics hardware and no display; bodies without a border
+pixel by pixel, so that what is behind is hidden.
 
 Both axes of a front are logarithmic, always, and say so: sizes and errors are compared by their ratio. The
 lowest line is 0 where a solution is exact.
@@ -12,7 +13,8 @@ lowest line is 0 where a solution is exact.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,7 +23,8 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import printable
-from meshsimp_pymoo.plane.faces import used_rows
+from meshsimp_pymoo.plane.faces import edge_table, used_rows
+from meshsimp_pymoo.report.depth import Seen, seen
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, mesh_lines, require_rules
 from meshsimp_pymoo.surface.units import length_unit, reference_system
@@ -42,12 +45,14 @@ __all__ = [
     "plot_mesh",
 ]
 
-View = Literal["above", "side"] | tuple[float, float]
+View = Literal["above", "side", "front", "back"] | tuple[float, float]
 
 VIEWS = {
     "above": (90.0, 0.0),
     "side": (35.0, -35.0),
-}  # elevation of the viewer above the plane, turn about z [degrees]
+    "front": (18.0, -32.0),
+    "back": (-18.0, 148.0),  # opposite to it: both together see all of a convex body
+}  # elevation of the viewer above the plane, turn about the upright [degrees]
 LIGHT = (-0.5, 0.6, 0.75)  # to the light, in the frame of the picture: from the upper left, in front of it
 AMBIENT = 0.22  # brightness of what faces away from the light
 CLAY = (0.90, 0.84, 0.77)  # colour of a mesh that has none of its own
@@ -60,6 +65,9 @@ LONGEST_NAME = 40  # characters of a model's name in a title: a longer one would
 # Their places on the logarithm of the size: meshes of a handful of triangles show little.
 PANEL_SHARES = (0.5, 0.7, 0.9)
 MOST_DRAWN = 500_000
+BODY_PIXELS, SAMPLES = 600, 2  # of the picture of a body, its longer side; each is the mean of so many squared
+OUTLINE = 1.1  # half the width of its edges, in samples
+ERROR_SHADE = 0.62  # the darkest shade on a body whose colours are to be read
 ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
 # Vertices of an original that are drawn; a picture shows no more of them, and a browser without a graphics card turns
 # no more of them smoothly.
@@ -196,26 +204,27 @@ def plot_mesh(
     ax: Axes | None = None,
     *,
     kept: npt.ArrayLike | None = None,
-    view: View = "above",
+    view: View | None = None,
     colour: npt.ArrayLike | None = None,
     edges: bool | None = None,
     exaggeration: float = 1.0,
     lines: bool | Sequence[npt.ArrayLike] = True,
 ) -> Axes:
-    """Draw a mesh as a shaded relief, its break lines on it.
+    """Draw a mesh as a shaded relief, its break lines on it; or as the body that it is, if it has no border.
 
     Parameters
     ----------
     mesh : MeshProblem, Surface, OpenModel, solution of a front, trimesh.Trimesh, or (points, faces)
         Vertices (V, 3), height along z, and triangles (M, 3), counter-clockwise from above. A ``Trimesh`` is
-        drawn in its own frame; a problem, a surface, a model and a solution stand upright.
+        drawn in its own frame; a problem, a surface, a model and a solution stand upright. Of a body z is to the
+        viewer and y up.
     ax : matplotlib axes, optional
         Where to draw, by default in a new figure; its frame and ticks are removed.
     kept : (N,) bool array, optional
         With a problem or a surface, which know the rules: draw the mesh of these vertices instead of the model.
-    view : "above", "side" or (elevation, turn)
+    view : "above", "side", "front", "back" or (elevation, turn), optional
         Where it is seen from; as a pair, the elevation above the (x, y) plane and the turn about z, in
-        degrees.
+        degrees; of a body above the (x, z) plane and about y. By default "above", of a body "front".
     colour : (V, 3), (V, 4) uint8 array or (3,) float array, optional
         Colour per vertex, or one for all (0 to 1); by default the mesh's own, if it has some.
     edges : bool, optional
@@ -231,19 +240,17 @@ def plot_mesh(
     matplotlib axes
         The axes.
     """
-    from matplotlib.collections import PolyCollection
-
     drawn = _lines_of(mesh, kept) if lines is True else lines or ()
-    points, faces, own = _shape(mesh, kept)
+    points, faces, own, is_body = _shape(mesh, kept)
     used, compact = np.unique(faces, return_inverse=True)
     points, faces = points[used], compact.reshape(-1, 3)
     colour = own if colour is None else np.asarray(colour)
     if colour is not None and colour.ndim > 1:
         colour = colour[used]
     ax = ax if ax is not None else _new_axes((6.4, 6.4))
-    elevation, turn = VIEWS[view] if isinstance(view, str) else view
-    seen = _turned(points * [1.0, 1.0, exaggeration], elevation, turn)
-    triangles: Any = seen[faces]
+    turned = partial(_turned, view=view or ("front" if is_body else "above"), is_body=is_body)
+    placed = turned(points * [1.0, 1.0, exaggeration])
+    triangles: Any = placed[faces]
     shade = hillshade(triangles)
     if colour is None:
         base = np.broadcast_to(CLAY, (len(faces), 3))
@@ -254,21 +261,13 @@ def plot_mesh(
             else colour[faces, :3].mean(axis=1) / (255.0 if colour.dtype.kind == "u" else 1.0)
         )
     rgb = base * shade[:, None]
-    order = np.argsort(triangles[:, :, 2].mean(axis=1), kind="stable")  # the nearest triangles last
     outlined = len(faces) <= OUTLINED_TRIANGLES if edges is None else edges
-    ax.add_collection(
-        PolyCollection(
-            triangles[order][:, :, :2],
-            facecolors=rgb[order],
-            edgecolors=rgb[order] * 0.72 if outlined else rgb[order],
-            linewidths=0.35 if outlined else 0.15,
-            joinstyle="round",
-            rasterized=True,
-        ),
-        autolim=False,
-    )
-    _draw_lines(ax, [_turned(np.asarray(line) * [1.0, 1.0, exaggeration], elevation, turn) for line in drawn])
-    _frame(ax, seen)
+    if is_body:
+        _draw_body(ax, placed, faces, lambda shown: rgb[shown.triangle], outlined=outlined)
+    else:
+        _draw_relief(ax, triangles, rgb, outlined=outlined)
+    _draw_lines(ax, [turned(np.asarray(line) * [1.0, 1.0, exaggeration]) for line in drawn])
+    _frame(ax, placed)
     return ax
 
 
@@ -282,6 +281,8 @@ def plot_error(
     bar: bool = True,
 ) -> Axes:
     """Draw the deviation of a simplified surface at every vertex of the model as a map, break lines on it.
+
+    Closed models are seen from the front and, beside it, from the back.
 
     Parameters
     ----------
@@ -310,6 +311,16 @@ def plot_error(
     ax = ax if ax is not None else _new_axes((7.0, 6.0))
     greatest = float(size.max())
     end = greatest if largest is None else largest
+    drawn = (_error_of_body if surface.view.is_closed else _error_map)(ax, surface, size, end or 1.0, covered)
+    if bar:
+        shown = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02, extend="max" if greatest > end else "neither")
+        shown.set_label(f"error [{length_unit(surface.model.georeference)}]")
+        shown.outline.set_visible(False)
+    return ax
+
+
+def _error_map(ax: Axes, surface: Surface, size: FloatArray, end: float, covered: npt.ArrayLike | None) -> Any:
+    """Draw errors (N,) in the plane, up to the end of the scale, and return what a colour bar is made of."""
     x, y = np.asarray(surface.points)[:, :2].T
     drawn = ax.tripcolor(
         x,
@@ -319,7 +330,7 @@ def plot_error(
         shading="gouraud",
         cmap="magma_r",
         vmin=0.0,
-        vmax=end or 1.0,
+        vmax=end,
         rasterized=True,
     )
     if covered is not None:
@@ -327,11 +338,30 @@ def plot_error(
         ax.plot(x[bare], y[bare], ".", color=UNCOVERED, markersize=2.5)
     _draw_lines(ax, _lines_of(surface), halo=True)
     _frame(ax, np.column_stack([x, y]))
-    if bar:
-        shown = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02, extend="max" if greatest > end else "neither")
-        shown.set_label(f"error [{length_unit(surface.model.georeference)}]")
-        shown.outline.set_visible(False)
-    return ax
+    return drawn
+
+
+def _error_of_body(ax: Axes, surface: Surface, size: FloatArray, end: float, covered: npt.ArrayLike | None) -> Any:
+    """Draw errors (N,) on a body from both sides; see :func:`_error_map`. Every vertex of one is covered."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    colours, faces = ScalarMappable(Normalize(0.0, end), "magma_r"), np.asarray(surface.faces)
+    beside, corners = np.zeros(2), []
+    for side in ("front", "back"):
+        points = _turned(surface.points, side, is_body=True)
+        shade = ERROR_SHADE + (1.0 - ERROR_SHADE) * hillshade(points[faces])
+
+        def coloured(shown: Seen, shade: FloatArray = shade) -> FloatArray:
+            values = (shown.shares * size[faces[shown.triangle]]).sum(axis=2)
+            return colours.to_rgba(values)[..., :3] * shade[shown.triangle][..., None]
+
+        points[:, :2] -= points[:, :2].min(axis=0) - beside
+        _draw_body(ax, points, faces, coloured)
+        corners += [points[:, :2].min(axis=0), points[:, :2].max(axis=0)]
+        beside[0] = 1.04 * corners[-1][0]
+    _frame(ax, np.array(corners))
+    return colours
 
 
 def short_name(name: str) -> str:
@@ -379,8 +409,8 @@ def front_figure(
 
     require_rules(surface, "front_figure")
     F = np.asarray(F, dtype=np.float64)
-    model, view = surface.model, surface.view
-    width, depth = view.extent[:2]
+    model = surface.model
+    width, depth = _picture_size(surface)
     tall = depth > 1.15 * width  # a face: its panels stand side by side; a terrain: two by two
     figure = Figure(figsize=(15.0, 5.6) if tall else (14.0, 6.6), dpi=110, layout="constrained")
     halves = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.8 if tall else 1.35), wspace=0.02)
@@ -412,6 +442,15 @@ def front_figure(
     for panel in panels[1 + len(meshes) :]:
         panel.axis("off")
     return figure
+
+
+def _picture_size(surface: Surface, sides: int = 1) -> tuple[float, float]:
+    """Return width and height of the picture of a surface, of a body seen from one side or from both."""
+    width, depth = surface.view.extent[:2]
+    if surface.view.is_closed:
+        width, depth = np.ptp(_turned(surface.points, "front", is_body=True), axis=0)[:2]
+        width *= sides
+    return float(width), float(depth)
 
 
 def original_mesh(surface: Surface) -> tuple[BoolArray, IntArray]:
@@ -478,7 +517,7 @@ def error_figure(
     from matplotlib.figure import Figure
 
     require_rules(surface, "error_figure")
-    width, depth = surface.view.extent[:2]
+    width, depth = _picture_size(surface, sides=2)
     share = float(np.clip(depth / width, 0.4, 1.6)) if width > 0 else 1.0
     figure = Figure(figsize=(7.2, 6.0 * share + 0.9), dpi=110, layout="constrained")
     ax = figure.subplots()
@@ -534,36 +573,93 @@ def _new_axes(size: tuple[float, float]) -> Axes:
     return pyplot.subplots(figsize=size, layout="constrained")[1]
 
 
-def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None]:
-    """Return points, faces and vertex colours of whatever is a mesh."""
+def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray, npt.NDArray[Any] | None, bool]:
+    """Return points, faces and vertex colours of whatever is a mesh, and whether it is a body."""
     surface = getattr(mesh, "surface", mesh)
     if hasattr(surface, "view"):  # a problem or its surface
-        if kept is None:
-            return _rows_of(surface, original_mesh(surface)[1])
-        return _rows_of(surface, surface.triangles(np.asarray(kept) | surface.pinned))
+        faces = original_mesh(surface)[1] if kept is None else surface.triangles(np.asarray(kept) | surface.pinned)
+        return *_rows_of(surface, faces), surface.view.is_closed
     if kept is not None:
         raise TypeError(
             f"kept chooses vertices by a problem's rules, which a {type(mesh).__name__} does not have; give the "
             "problem or problem.surface"
         )
     if isinstance(mesh, tuple):
-        return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1]), None
+        return np.asarray(mesh[0], dtype=np.float64), np.asarray(mesh[1]), None, _has_no_border(np.asarray(mesh[1]))
     if hasattr(mesh, "front"):  # a solution of one
-        return _rows_of(mesh.front.surface, mesh.faces)
+        return *_rows_of(mesh.front.surface, mesh.faces), mesh.front.surface.view.is_closed
     if hasattr(mesh, "points") and hasattr(mesh, "faces"):  # a model
-        return mesh.points, mesh.faces, mesh.attributes.get("color")
+        return mesh.points, mesh.faces, mesh.attributes.get("color"), _has_no_border(mesh.faces)
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         visual: Any = getattr(mesh, "visual", None)
         own = np.asarray(visual.vertex_colors) if getattr(visual, "kind", None) == "vertex" else None
-        return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces), own
+        faces = np.asarray(mesh.faces)
+        return np.asarray(mesh.vertices, dtype=np.float64), faces, own, _has_no_border(faces)
     raise TypeError(
         f"a {type(mesh).__name__} is no mesh; give a MeshProblem, an OpenModel, a trimesh.Trimesh or (points, faces)"
     )
 
 
+def _has_no_border(faces: IntArray) -> bool:
+    """Tell whether every edge of triangles (M, 3) has two of them: what they enclose is a body."""
+    return bool((edge_table(faces).n_triangles == 2).all())
+
+
 def _plot_rows(surface: Surface, faces: IntArray, ax: Axes, lines: Sequence[npt.ArrayLike]) -> None:
     points, faces, colour = _rows_of(surface, faces)
     plot_mesh((points, faces), ax, colour=colour, exaggeration=surface.view.exaggeration, lines=lines)
+
+
+def _draw_relief(ax: Axes, triangles: Any, rgb: FloatArray, *, outlined: bool) -> None:
+    """Draw triangles (M, 3, 3) as seen, the nearest last."""
+    from matplotlib.collections import PolyCollection
+
+    order = np.argsort(triangles[:, :, 2].mean(axis=1), kind="stable")
+    ax.add_collection(
+        PolyCollection(
+            triangles[order][:, :, :2],
+            facecolors=rgb[order],
+            edgecolors=rgb[order] * 0.72 if outlined else rgb[order],
+            linewidths=0.35 if outlined else 0.15,
+            joinstyle="round",
+            rasterized=True,
+        ),
+        autolim=False,
+    )
+
+
+def _draw_body(
+    ax: Axes,
+    points: FloatArray,
+    faces: IntArray,
+    coloured: Callable[[Seen], FloatArray],
+    *,
+    outlined: bool = False,
+) -> None:
+    """Draw what is seen of a body of vertices (V, 3) as they are seen, as an image.
+
+    ``coloured`` returns the colours (height, width, 3) of what is seen, whatever where nothing is.
+    """
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    size = float((high - low).max()) / BODY_PIXELS or 1.0
+    width, height = np.maximum(np.ceil((high - low) / size), 1.0).astype(int)
+    pixels = np.column_stack([(points[:, :2] - low) / (size / SAMPLES), points[:, 2]])
+    shown = seen(pixels[faces], SAMPLES * width, SAMPLES * height)
+    hit = shown.triangle >= 0
+    rgb = coloured(shown)
+    if outlined:
+        corners = pixels[faces][:, :, :2]
+        side = np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
+        (ux, uy), (vx, vy) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+        away = np.abs(ux * vy - uy * vx)[:, None] / np.maximum(side, 1e-300)  # from each corner to the side opposite
+        on_edge = (shown.shares * away[shown.triangle]).min(axis=2) < OUTLINE
+        rgb = np.where(on_edge[..., None], 0.72 * rgb, rgb)
+    rgba = np.concatenate([rgb, np.ones((*hit.shape, 1))], axis=2) * hit[..., None]
+    rgba = rgba.reshape(height, SAMPLES, width, SAMPLES, 4).mean(axis=(1, 3))
+    rgba[..., :3] /= np.maximum(rgba[..., 3:], 1e-300)
+    left, bottom = low
+    extent = (left, left + size * width, bottom, bottom + size * height)
+    ax.imshow(rgba, extent=extent, origin="lower", aspect="equal")
 
 
 def _lines_of(mesh: Any, kept: npt.ArrayLike | None = None) -> list[FloatArray]:
@@ -599,8 +695,11 @@ def _rows_of(surface: Surface, faces: IntArray) -> tuple[FloatArray, IntArray, n
     return surface.points[used], compact, None if colour is None else colour[used]
 
 
-def _turned(points: FloatArray, elevation: float, turn: float) -> FloatArray:
+def _turned(points: FloatArray, view: View, *, is_body: bool = False) -> FloatArray:
     """Turn points (V, 3) about the origin into the frame of the picture: x to the right, y up, z to the viewer."""
+    elevation, turn = VIEWS[view] if isinstance(view, str) else view
+    if is_body:  # it stands on the (x, z) plane
+        points = points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     a, b = np.radians(turn), np.radians(90.0 - elevation)
     about_z = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     about_x = np.array([[1, 0, 0], [0, np.cos(b), np.sin(b)], [0, -np.sin(b), np.cos(b)]])

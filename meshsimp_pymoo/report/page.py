@@ -21,7 +21,7 @@ from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
-from meshsimp_pymoo.report.figures import UNCOVERED, original_mesh
+from meshsimp_pymoo.report.figures import UNCOVERED, VIEWS, original_mesh
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
@@ -42,6 +42,8 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 SCRIPTS = (
     "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "simplification.js",
 )  # fmt: skip
+# Before the last one, where closed meshes are shown.
+OF_BODIES = "body.js"
 PAGE_BYTES = 15_000_000
 # The libraries, the texts and the numbers of the solutions.
 FIXED_BYTES = 700_000
@@ -141,15 +143,19 @@ def simplification_page(
     # what is not known is null
     columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
-    exaggeration = float(f"{view.exaggeration:.2g}")
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
         "folder": printable(as_argument(folder)),
         "measure": measure,
+        "closed": _closed_look() if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
-        "measures": [{"name": name, **spoken(measure, unit)} for name, measure in MEASURES.items() if name in columns],
+        "measures": [
+            {"name": name, **spoken(measure, unit, closed=view.is_closed)}
+            for name, measure in MEASURES.items()
+            if name in columns and not (view.is_closed and measure.of_heights)
+        ],
         "columns": columns,
         "meshes": _mesh_files(front, chosen),
         "refitted_meshes": front.refitted_meshes,
@@ -177,7 +183,7 @@ def simplification_page(
     }
     return html_document(
         "simplification.html",
-        SCRIPTS,
+        (*SCRIPTS[:-1], OF_BODIES, SCRIPTS[-1]) if view.is_closed else SCRIPTS,
         data,
         title=f"{PurePath(source).name}, simplified",
         model={"vertices": model.n_vertices, "triangles": len(model.faces)},
@@ -185,7 +191,7 @@ def simplification_page(
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
         thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing)],
-        heights={"value": f"{exaggeration:g}", "step": f"{exaggeration / 20:g}", "most": f"{5 * exaggeration:g}"},
+        heights=None if view.is_closed else _heights(view.exaggeration),
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
@@ -201,15 +207,28 @@ def simplification_page(
     )
 
 
+def _closed_look() -> dict[str, list[float]]:
+    """Return how a body is looked at: from where it is in the pictures, as azimuth and elevation [degrees]."""
+    elevation, turn = VIEWS["front"]
+    return {"front": [-turn, elevation]}
+
+
+def _heights(exaggeration: float) -> dict[str, str]:
+    """Return what the slider of the heights is made of."""
+    value = float(f"{exaggeration:.2g}")
+    return {"value": f"{value:g}", "step": f"{value / 20:g}", "most": f"{5 * value:g}"}
+
+
 def _errors() -> list[str]:
     """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
     errors = [name for name, measure in MEASURES.items() if measure.is_error]
     return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
 
 
-def spoken(measure: Measure, unit: str = LENGTH) -> dict[str, str]:
+def spoken(measure: Measure, unit: str = LENGTH, *, closed: bool = False) -> dict[str, str]:
     """Return what the page says of a measure, where lengths have this unit."""
-    return {"label": measure.label, "meaning": measure.meaning, "unit": unit if measure.is_error else measure.unit}
+    meaning = (closed and measure.of_closed) or measure.meaning
+    return {"label": measure.label, "meaning": meaning, "unit": unit if measure.is_error else measure.unit}
 
 
 def _embedded(

@@ -56,6 +56,10 @@ class Measure(NamedTuple):
         Whether people read it in per cent.
     of_lines : bool
         Whether only models with break lines have it.
+    of_heights : bool
+        Whether only height surfaces have it: of closed ones it is 0.
+    of_closed : str
+        What it is of a closed surface, if that differs.
     """
 
     of: Callable[[Any, float], Any] | None
@@ -70,6 +74,8 @@ class Measure(NamedTuple):
     more_is_better: bool = False
     is_share: bool = False
     of_lines: bool = False
+    of_heights: bool = False
+    of_closed: str = ""
 
     @property
     def is_error(self) -> bool:
@@ -178,6 +184,7 @@ class Quality:
         lambda table, weight: table[..., UNCOVERED],
         label="uncovered",
         meaning="original vertices that no triangle covers",
+        of_heights=True,
     )
     surface_error: float = _measure_of_mesh(
         label="surface error",
@@ -187,6 +194,7 @@ class Quality:
     min_angle_median: float = _measure_of_mesh(
         label="least angle",
         meaning="median over the triangles, in the plane",
+        of_closed="median over the triangles",
         unit="degrees",
         more_is_better=True,
     )

@@ -10,8 +10,10 @@ from matplotlib.figure import Figure
 
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.report import figures as figures_module
 from meshsimp_pymoo.report.figures import (
     AMBIENT,
+    ERROR_SHADE,
     LIGHT,
     error_figure,
     front_figure,
@@ -362,3 +364,138 @@ def test_a_mesh_of_more_triangles_than_a_panel_has_pixels_is_drawn_only_if_it_is
     assert panel_rows(sizes, None, 4) == [0, 2, 3]
     assert panel_rows(sizes, 4, 3) == [0, 3, 4]
     assert panel_rows([600_000, 700_000, 800_000]) == [0, 1, 2]  # there are no others
+
+
+# ------------------------------------------------------------------------------------------------------------ bodies
+
+
+@pytest.fixture(scope="module")
+def blob():
+    return MeshProblem("blob:300").surface
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Pictures of bodies of few pixels, to be quick."""
+    monkeypatch.setattr(figures_module, "BODY_PIXELS", 120)
+
+
+def image(ax):
+    """Return what is drawn of a body: colours and opacity (height, width, 4), row 0 the lowest."""
+    (drawn,) = ax.get_images()
+    return np.asarray(drawn.get_array())
+
+
+def box(low, high):
+    """Return a closed box: points (8, 3) and triangles (12, 3)."""
+    mesh = trimesh.creation.box(bounds=[low, high])
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_body_is_drawn_with_what_is_in_front_alone(ax):
+    """A small cube hides part of a long board behind it, whose middle is nearer to the viewer than the cube's."""
+    (near, first), (far, second) = box([0, 0, 1], [2, 2, 2]), box([-1, -1, -9], [9, 3, 0])
+    far = far @ np.array([[1, 0, 1.0], [0, 1, 0], [0, 0, 1]])  # its right end comes to the viewer
+    points, faces = np.concatenate([near, far]), np.concatenate([first, second + len(near)])
+    colour = np.repeat(np.array([[255, 0, 0], [0, 0, 255]], np.uint8), 8, axis=0)
+    plot_mesh((points, faces), ax, colour=colour, view=(0, 0), edges=False)
+    drawn = image(ax)
+    left, right, bottom, top = ax.get_images()[0].get_extent()
+    height, width = drawn.shape[:2]
+    x, y = int((1 - left) / (right - left) * width), int((1 - bottom) / (top - bottom) * height)
+    assert drawn[y, x, 0] > 0.3
+    assert drawn[y, x, 2] == 0
+    assert drawn[y, int(0.9 * width), 2] > 0.3
+    assert drawn[y, int(0.9 * width), 0] == 0
+
+
+@pytest.mark.usefixtures("coarse")
+def test_whatever_has_no_border_is_a_body_and_all_are_drawn_alike(blob):
+    mesh = trimesh.Trimesh(blob.points, blob.faces, process=False)
+    shapes = (blob, MeshProblem(blob.model), blob.model, mesh, (blob.points, blob.faces))
+    drawn = [image(plot_mesh(shape, Figure().subplots())) for shape in shapes]
+    assert all(np.array_equal(other, drawn[0]) for other in drawn[1:])
+    open_mesh = (blob.points, blob.faces[1:])
+    assert len(polygons(plot_mesh(open_mesh, Figure().subplots())).get_paths()) == len(blob.faces) - 1
+
+
+@pytest.mark.usefixtures("coarse")
+def test_the_outline_of_a_body_is_that_of_its_points(blob, ax):
+    plot_mesh(blob, ax, view=(0, 0))
+    left, right, bottom, top = ax.get_images()[0].get_extent()
+    step = (right - left) / image(ax).shape[1]
+    expected = [side(blob.points[:, k]) for k in (0, 1) for side in (np.min, np.max)]
+    np.testing.assert_allclose([left, right, bottom, top], expected, atol=2 * step)
+    opaque = image(ax)[..., 3]
+    assert 0.6 < opaque.mean() < 0.95  # of a box around something round
+    assert opaque[0, 0] == 0
+
+
+@pytest.mark.usefixtures("coarse")
+def test_turned_half_round_a_body_is_seen_in_a_mirror(blob):
+    front, back = (
+        image(plot_mesh(blob, Figure().subplots(), view=view, edges=False))[..., 3] for view in ((0, 0), (0, 180))
+    )
+    assert np.abs(front - back[:, ::-1]).mean() < 0.01
+    above = image(plot_mesh(blob, Figure().subplots(), view=(90, 0), edges=False))
+    assert above.shape[0] / above.shape[1] == pytest.approx(np.ptp(blob.points[:, 2]) / np.ptp(blob.points[:, 0]), 0.02)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_the_edges_of_a_small_body_are_outlined(blob):
+    with_edges, without = (
+        image(plot_mesh(blob, Figure().subplots(), edges=edges))[..., :3].mean() for edges in (True, False)
+    )
+    assert 0.75 * without < with_edges < 0.97 * without
+    assert np.array_equal(
+        image(plot_mesh(blob, Figure().subplots())), image(plot_mesh(blob, Figure().subplots(), edges=True))
+    )
+
+
+@pytest.mark.usefixtures("coarse")
+def test_errors_on_a_body_are_seen_from_both_sides(blob):
+    """Where the error is the height in the picture, colours change with it; and so on the other side."""
+    from matplotlib import colormaps
+
+    ax = Figure().subplots()
+    size = blob.points[:, 1] - blob.points[:, 1].min()
+    plot_error(blob, size, ax)
+    front, back = ax.get_images()
+    assert front.get_extent()[1] < back.get_extent()[0]
+    assert ax.get_xlim()[0] < front.get_extent()[0] < back.get_extent()[1] < ax.get_xlim()[1]
+    for drawn in (front, back):
+        rgba = np.asarray(drawn.get_array())
+        column = rgba[:, rgba.shape[1] // 2]
+        shown = column[column[:, 3] == 1, :3]
+        hue = [part / part.max() for part in (shown[len(shown) // 10], shown[9 * len(shown) // 10])]
+        low, high = (np.array(colormaps["magma_r"](value)[:3]) for value in (0.1, 0.9))
+        np.testing.assert_allclose(hue, [low / low.max(), high / high.max()], atol=0.25)
+        assert shown.max(axis=1).min() > 0
+    assert [text for text in (axes.get_ylabel() for axes in ax.figure.axes) if text] == ["error [model units]"]
+
+
+@pytest.mark.usefixtures("coarse")
+def test_an_exact_mesh_of_a_body_is_pale_all_over(blob):
+    ax = Figure().subplots()
+    plot_error(blob, np.zeros(blob.n_vertices), ax, bar=False)
+    rgba = np.concatenate([np.asarray(drawn.get_array()).reshape(-1, 4) for drawn in ax.get_images()])
+    shown = rgba[rgba[:, 3] == 1, :3]
+    assert (shown[:, 0] >= 0.98 * ERROR_SHADE).all()
+    hue = shown / shown.max(axis=1, keepdims=True)
+    assert np.ptp(hue, axis=0).max() < 0.01
+
+
+@pytest.mark.usefixtures("coarse")
+def test_the_front_of_a_body_stands_beside_its_meshes(tmp_path, blob):
+    kept = np.random.default_rng(3).random((3, blob.n_vertices)) < np.array([[0.2], [0.5], [0.8]])
+    simplified = [blob.simplify(row) for row in kept | blob.pinned]
+    F = [[s.quality.error, s.quality.triangles] for s in simplified]
+    figure = front_figure(blob, F, [(row, s.faces) for row, s in enumerate(simplified)], knee=1)
+    figure.savefig(tmp_path / "front.png")
+    front, *panels = figure.axes
+    assert front.get_title(loc="left").startswith("blob:300: 300 vertices, 596 triangles")
+    assert [len(panel.get_images()) for panel in panels] == [1, 1, 1, 1]
+    assert len({(panel.get_xlim(), panel.get_ylim()) for panel in panels}) == 1
+    figure = error_figure(blob, simplified[0].deviation, simplified[0].covered, title="mine")
+    assert figure.axes[0].get_title() == "mine"

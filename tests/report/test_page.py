@@ -824,3 +824,232 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
 def test_a_page_without_break_lines_says_nothing_of_any(seen):
     assert seen.page.locator("#lines").count() == 0
     assert "reak line" not in seen.page.inner_text("body")
+
+
+# ---------------------------------------------------------------------------------------------------- closed surfaces
+
+
+@pytest.fixture(scope="module")
+def closed_folder(tmp_path_factory):
+    """A front of a closed model, with its page."""
+    problem = MeshProblem("blob:300", n_threads=1)
+    front = Front.from_subsets(problem, subsets(problem, 8, np.random.default_rng(5)), ends=True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures_module, "front_figure", sketch)
+        return front.save(tmp_path_factory.mktemp("closed") / "out", meshes=0)
+
+
+@pytest.fixture(scope="module")
+def closed_surface():
+    return MeshProblem("blob:300", n_threads=1).surface
+
+
+@pytest.fixture(scope="module")
+def closed_opened(browser, closed_folder):
+    visit = Visit(browser, closed_folder / "report.html", viewport={"width": 1280, "height": 1000})
+    yield visit
+    visit.close()
+
+
+@pytest.fixture
+def closed(closed_opened):
+    """The page of a closed model, seen from where it opens."""
+    closed_opened.page.check("input[value=shaded]", force=True)
+    closed_opened.page.click("#reset")
+    yield closed_opened
+    closed_opened.check()
+
+
+def camera(page):
+    """Return where the camera is and what is up, relative to what it looks at, and its magnification."""
+    found = page.evaluate(
+        """() => { const { camera, target } = state.viewer;
+        return [camera.position.clone().sub(target).toArray(), camera.up.toArray(), camera.zoom, target.toArray()]; }"""
+    )
+    return tuple(map(np.array, found))
+
+
+def test_the_page_of_a_closed_model_says_nothing_of_heights(closed):
+    text = closed.page.inner_text("body").lower()
+    said = [word for word in ("height", "above", "vertical", "cover", "outside", "in the plane") if word in text]
+    assert said == []
+    assert "distances in space" in text
+    names = closed.page.locator("#numbers th").all_inner_texts()
+    assert names == [
+        "triangles", "vertices", "error", "mean error", "RMS error", "max error", "surface error", "least angle",
+        "thin triangles", "solution",
+    ]  # fmt: skip
+    for control in ("#heights", "#from-above", "#from-side", "#uncovered-key"):
+        assert closed.page.locator(control).count() == 0
+
+
+def test_a_closed_model_is_first_seen_whole_and_as_in_the_pictures(closed):
+    from meshsimp_pymoo.report.figures import VIEWS
+
+    arm, up, zoom, _ = camera(closed.page)
+    elevation, turn = np.radians(VIEWS["front"])
+    looks = [np.cos(elevation) * np.sin(-turn), np.sin(elevation), np.cos(elevation) * np.cos(turn)]
+    np.testing.assert_allclose(arm / np.linalg.norm(arm), looks, atol=1e-9)
+    assert up[1] > 0.9
+    assert zoom == 1
+    for window in pixels(closed.page):
+        ground = window[0, window.shape[1] // 2]
+        drawn = np.abs(window - ground).max(axis=2) > 24
+        assert not drawn[:2].any()
+        assert not drawn[-2:].any()
+        assert drawn.any(axis=1).mean() > 0.5 or drawn.any(axis=0).mean() > 0.8
+
+
+def test_a_closed_model_turns_all_the_way_round_and_over(closed):
+    page = closed.page
+
+    def press(key, times):
+        page.evaluate(
+            """([key, times]) => { for (; times > 0; times--)
+            document.getElementById("canvas").dispatchEvent(new KeyboardEvent("keydown", { key })); }""",
+            [key, times],
+        )
+
+    before, (arm, up, *_) = pixels(page), camera(page)
+    for key in ("ArrowRight", "ArrowUp"):
+        press(key, 36)
+        assert unlike(pixels(page)[0], before[0]) > 0.05, key
+        half, turned, *_ = camera(page)
+        # round the upright in the picture, which stays; over the top, which is then upside down
+        np.testing.assert_allclose(turned, up if key == "ArrowRight" else -up, atol=1e-6)
+        np.testing.assert_allclose(half, -arm, atol=1e-6)
+        press(key, 36)
+        np.testing.assert_allclose(camera(page)[0], arm, atol=1e-6)
+        assert max(unlike(*pair) for pair in zip(pixels(page), before, strict=True)) < 0.01, key
+
+
+def test_dragging_turns_both_windows_of_a_closed_model_over_the_top(closed):
+    page = closed.page
+    last = page.locator("#slider").get_attribute("max")
+    page.locator("#slider").fill(last)  # both windows show the same body, but for some edges
+    assert shown(page) == int(last)
+    for window in ("original", "simplified"):
+        box = page.locator(f"#{window}-window").bounding_box()
+        middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        before = camera(page)[1]
+        page.mouse.move(*middle)
+        page.mouse.down()
+        page.mouse.move(middle[0], middle[1] + box["height"] / 2 - 5, steps=4)
+        page.mouse.up()
+        assert camera(page)[1] @ before < -0.9  # half a turn: upside down
+        assert unlike(*pixels(page)) < 0.05
+        page.mouse.move(middle[0] + 50, middle[1])  # no button is down
+        assert camera(page)[1] @ before < -0.9
+
+
+def test_a_closed_model_is_moved_and_magnified_but_not_entered(closed):
+    page = closed.page
+    arm, _, _, target = camera(page)
+    assert not target.any()
+    box = page.locator("#original-window").bounding_box()
+    page.mouse.move(box["x"] + 80, box["y"] + 80)
+    page.mouse.down(button="right")
+    page.mouse.move(box["x"] + 110, box["y"] + 80, steps=3)
+    page.mouse.up(button="right")
+    moved, up, _, target = camera(page)
+    np.testing.assert_allclose(moved, arm)
+    right = np.cross(up, arm)
+    assert target @ right < 0  # the body went to the right, where the pointer went
+    assert abs(target @ up) < 1e-9
+    for _ in range(60):
+        page.locator("#canvas").press("+")
+    near, _, zoom, _ = camera(page)
+    assert zoom > 10
+    np.testing.assert_allclose(near, arm)
+    page.mouse.wheel(0, 500)
+    page.wait_for_function(f"state.viewer.camera.zoom < {zoom}")
+    page.click("#other-side")
+    np.testing.assert_allclose(camera(page)[0] @ up, arm @ up, atol=1e-9)
+    page.click("#reset")
+    assert camera(page)[2] == 1
+
+
+def test_the_error_on_a_simplified_body_is_that_of_the_nearest_original_vertex(closed):
+    page = closed.page
+    page.locator("#slider").fill("4")
+    assert shown(page) == 4
+    looks = {}
+    for look in ("shaded", "wireframe", "error"):
+        page.check(f"input[value={look}]", force=True)
+        looks[look] = pixels(page)
+    for window in (0, 1):
+        assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
+        assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
+    places, sources, faces, points = (
+        np.array(page.evaluate(f"Array.from({what})"))
+        for what in (
+            "state.viewer.fine.getAttribute('position').array", "state.viewer.sources",
+            "state.viewer.fine.index.array", "state.viewer.arrays.position",
+        )
+    )  # fmt: skip
+    places, points, faces = places.reshape(-1, 3), points.reshape(-1, 3), faces.reshape(-1, 3)
+    away = np.linalg.norm(places[:, None] - points[None], axis=2)
+    np.testing.assert_allclose(away[np.arange(len(places)), sources], away.min(axis=1), atol=1e-6)
+    # the parts are the whole mesh: they enclose the same
+    own = np.array(page.evaluate("Array.from(state.mesh.faces)")).reshape(-1, 3)
+    volumes = [np.linalg.det(corners.astype(float)).sum() / 6 for corners in (places[faces], points[own])]
+    assert volumes[0] == pytest.approx(volumes[1], rel=1e-5)
+    assert len(faces) > 2 * len(own)
+    # and where all vertices are kept, all is in the palest colour
+    page.locator("#slider").fill(page.locator("#slider").get_attribute("max"))
+    assert shown(page) == int(page.locator("#slider").get_attribute("max"))
+    _, drawn = pixels(page)
+    middle = drawn[drawn.shape[0] // 2 - 5 :, drawn.shape[1] // 2 - 5 :][:10, :10].reshape(-1, 3)
+    assert np.abs(middle / middle.max(axis=1, keepdims=True) - np.array([252, 253, 191]) / 253).max() < 0.05
+
+
+def test_a_downloaded_closed_mesh_is_closed_and_has_the_numbers_of_the_page(closed, closed_surface, tmp_path):
+    from meshsimp_pymoo.plane.faces import edge_table
+
+    closed.page.locator("#slider").fill("3")
+    assert shown(closed.page) == 3
+    with closed.page.expect_download() as download:
+        closed.page.click("#downloads button[value=ply]")
+    download.value.save_as(tmp_path / "small.ply")
+    vertices, faces = parsed(tmp_path / "small.ply")
+    assert len(faces) == number(closed.page, "triangles") == 2 * len(vertices) - 4
+    assert (edge_table(faces).n_triangles == 2).all()
+    found = closed_surface.score(vertices, faces).quality
+    assert found.max_error <= number(closed.page, "max_error") * (1 + 1e-9)
+    assert found.error == pytest.approx(
+        number(closed.page, "error"), rel=0.05
+    )  # of four triangles, and the nearest of all
+
+
+def test_all_of_the_page_of_a_closed_model_is_reached_with_the_keyboard(closed):
+    reached = set()
+    for _ in range(40):
+        closed.page.keyboard.press("Tab")
+        reached.add(closed.page.evaluate("document.activeElement.id || document.activeElement.value"))
+    assert {"chart", "slider", "shaded", "canvas", "quarter-turn", "other-side", "reset", "measure", "ply"} <= reached
+
+
+def test_two_fingers_magnify_and_roll_a_closed_model(browser, closed_folder):
+    look = {"viewport": {"width": 360, "height": 740}, "device_scale_factor": 1, "has_touch": True}
+    visit = Visit(browser, closed_folder / "report.html", **look)
+    try:
+        assert visit.page.evaluate("document.documentElement.scrollWidth") == 360
+        arm, up, _, _ = camera(visit.page)
+        visit.page.locator("#original-window").scroll_into_view_if_needed()
+        box = visit.page.locator("#original-window").bounding_box()
+        x, y = box["x"] + 60, box["y"] + 100
+        touch = visit.context.new_cdp_session(visit.page)
+        fingers = [[(x, y), (x + 20, y)], [(x, y), (x + 40, y)], [(x, y), (x, y + 40)]]
+        for kind, places in zip(("touchStart", "touchMove", "touchMove"), fingers, strict=True):
+            points = [{"x": a, "y": b, "id": k} for k, (a, b) in enumerate(places)]
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        turned, rolled, zoom, _ = camera(visit.page)
+        np.testing.assert_allclose(turned, arm, atol=1e-9)
+        assert zoom == pytest.approx(2, rel=0.05)
+        # the fingers turned clockwise by a quarter, and so did the body: what was up in it points to the right
+        assert abs(rolled @ up) < 0.05
+        assert np.cross(rolled, arm) @ up > 0
+        visit.check()
+    finally:
+        visit.close()

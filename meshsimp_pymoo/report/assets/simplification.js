@@ -93,7 +93,7 @@ async function pick(row) {
 function refitted(row) {
   const error = columns.refitted_error && columns.refitted_error[row];
   if (error === undefined || error === null) return [];
-  return [["refitted_error", error, `of its triangles with the best heights: ${data.refitted_meshes[row]}`]];
+  return [["refitted_error", error, `of its triangles with the best ${data.closed ? "places of its vertices" : "heights"}: ${data.refitted_meshes[row]}`]];
 }
 
 function numbers(row) {
@@ -222,7 +222,7 @@ function paintErrors() {
   state.viewer.setErrors(colours);
   part("scale-middle").textContent = readable(end / 2);
   part("scale-end").textContent = data.solutions.some((solution) => solution && solution.largest > end) ? `≥ ${readable(end)}` : readable(end);
-  part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
+  if (!data.closed) part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
 }
 
 function colourBar() {
@@ -253,17 +253,18 @@ async function openViewer() {
   }
   const canvas = part("canvas");
   const windows = [part("original-window"), part("simplified-window")];
-  const heights = part("heights");
+  const heights = part("heights"); // which a closed mesh has not
   let first = true;
   try {
-    state.viewer = new MeshPair(canvas, windows, {
+    state.viewer = new (data.closed ? BodyPair : MeshPair)(canvas, windows, {
       positions: upright,
       faces,
       lines,
       paint,
       channels: data.paint ? data.paint.channels : 0,
-      exaggeration: heights.valueAsNumber,
+      exaggeration: heights ? heights.valueAsNumber : 1,
       relief: model.relief,
+      first: data.closed && data.closed.front.map((degrees) => (degrees * Math.PI) / 180),
       onDraw() {
         if (!first || !state.mesh) return;
         first = false;
@@ -285,13 +286,15 @@ async function openViewer() {
     });
   }
   part("scale").addEventListener("change", paintErrors);
-  heights.addEventListener("input", () => {
+  heights?.addEventListener("input", () => {
     part("heights-value").textContent = `× ${readable(heights.valueAsNumber)}`;
     viewer.setExaggeration(heights.valueAsNumber);
   });
   part("lines")?.addEventListener("change", (event) => viewer.showLines(event.target.checked));
-  part("from-above").addEventListener("click", () => viewer.look(0, 0));
-  part("from-side").addEventListener("click", () => viewer.look(0.6, 1.2));
+  part("from-above")?.addEventListener("click", () => viewer.look(0, 0));
+  part("from-side")?.addEventListener("click", () => viewer.look(0.6, 1.2));
+  part("quarter-turn")?.addEventListener("click", () => viewer.turn(Math.PI / 2, 0, 1));
+  part("other-side")?.addEventListener("click", () => viewer.turn(Math.PI, 0, 1));
   part("reset").addEventListener("click", () => viewer.reset());
   if (state.mesh) {
     viewer.show(state.mesh.faces, state.mesh.edges);

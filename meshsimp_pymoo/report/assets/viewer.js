@@ -9,9 +9,9 @@ const TEXTURE_SIZE = 1024;
 
 class MeshPair {
   // positions: (V, 3) upright from a local origin; extent: [low, high] of the original; paint: (V, k) uint8 or null;
-  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null
-  constructor(canvas, windows, { positions, faces, lines, paint, channels, exaggeration, relief, onDraw }) {
-    Object.assign(this, { canvas, windows, paint, onDraw });
+  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null; first: where a body is looked at from
+  constructor(canvas, windows, { positions, faces, lines, paint, channels, exaggeration, relief, first, onDraw }) {
+    Object.assign(this, { canvas, windows, paint, first, onDraw });
     const count = positions.length / 3;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -77,10 +77,6 @@ class MeshPair {
     this.exaggeration = exaggeration;
     this.relief = relief;
 
-    this.controls = new THREE.OrbitControls(this.camera, canvas);
-    this.controls.addEventListener("change", () => this.request());
-    this.controls.maxDistance = 20;
-    this.controls.minDistance = 0.05;
     // the wheel scrolls the page until the view has the focus
     canvas.addEventListener(
       "wheel",
@@ -89,6 +85,7 @@ class MeshPair {
       },
       { capture: true },
     );
+    this.steer();
     canvas.addEventListener("pointerdown", () => canvas.focus({ preventScroll: true }));
     canvas.addEventListener("keydown", (event) => this.key(event));
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -96,6 +93,14 @@ class MeshPair {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.theme());
     this.resize();
     this.reset();
+  }
+
+  // What turns the camera: heights stay upright.
+  steer() {
+    this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+    this.controls.addEventListener("change", () => this.request());
+    this.controls.maxDistance = 20;
+    this.controls.minDistance = 0.05;
   }
 
   // Every geometry has attributes of its own: disposing of one deletes its buffers on the graphics card.
@@ -130,7 +135,7 @@ class MeshPair {
 
   // faces: Uint32Array or null for no mesh; edges: the ends of its break lines as rows of the vertices, or null
   show(faces, edges) {
-    if (this.simplified) this.simplified.mesh.geometry.dispose();
+    if (this.simplified) this.simplified.wire.geometry.dispose();
     if (this.simplified?.lines) this.simplified.lines.segments.geometry.dispose();
     const ends = edges && new Float32Array(3 * edges.length);
     for (let i = 0; ends && i < ends.length; i++) ends[i] = this.arrays.position[3 * edges[Math.floor(i / 3)] + (i % 3)];
@@ -260,6 +265,15 @@ class MeshPair {
     });
   }
 
+  // What the original (0) and the simplified mesh (1) look like in this mode.
+  dress(part, which) {
+    part.wire.visible = this.mode === "wireframe";
+    if (which === 0) part.mesh.geometry.setAttribute("color", this.mode === "error" ? this.errorColour : this.own);
+    if (this.mode === "wireframe") part.mesh.material = this.materials.paper;
+    else if (this.mode === "error" && which === 1) part.mesh.material = this.materials.texture;
+    else part.mesh.material = this.materials.shaded;
+  }
+
   draw() {
     const renderer = this.renderer;
     const bright = this.mode === "error" ? 0.72 : 0.3; // colours of the error must be told from the light
@@ -277,11 +291,7 @@ class MeshPair {
       renderer.setScissor(...rectangle);
       this.camera.aspect = rectangle[2] / rectangle[3];
       this.camera.updateProjectionMatrix();
-      part.wire.visible = this.mode === "wireframe";
-      if (which === 0) part.mesh.geometry.setAttribute("color", this.mode === "error" ? this.errorColour : this.own);
-      if (this.mode === "wireframe") part.mesh.material = this.materials.paper;
-      else if (this.mode === "error" && which === 1) part.mesh.material = this.materials.texture;
-      else part.mesh.material = this.materials.shaded;
+      this.dress(part, which);
       part.mesh.scale.z = part.wire.scale.z = this.exaggeration;
       part.scene.add(this.camera, this.sky);
       renderer.render(part.scene, this.camera);
