@@ -180,8 +180,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     output.add_argument(
         "--refit",
         action="store_true",
-        help="write each mesh once more in OUT/refitted, its vertices raised or lowered (of a closed surface: moved) to "
-        "where the sum of the deviations is least; front.csv says refitted_error",
+        help="write each mesh once more in OUT/refitted, its vertices raised or lowered (of a closed surface: moved) "
+        "to where the sum of the deviations is least; front.csv says refitted_error",
     )
     output.add_argument(
         "--no-page", dest="page", action="store_false", help="do not write OUT/report.html, the page to look and choose"
