@@ -91,7 +91,7 @@ def make_parser() -> Parser:
     """Return the parser of the whole command line; ``args.command(args)`` then runs the command."""
     parser = Parser(
         prog="meshsimp",
-        description="Simplify an open mesh: not to one mesh, but to the whole trade-off between accuracy and size.",
+        description="Simplify a mesh: not to one mesh, but to the whole trade-off between accuracy and size.",
         epilog=MODELS + "\n`meshsimp COMMAND --help` has examples of each command.\n",
     )
     parser.add_argument("--version", action=_Version, nargs=0, dest=argparse.SUPPRESS, help="show the version and exit")

@@ -607,7 +607,7 @@ def read_experiment_file(
     path: str | os.PathLike[str],
     *,
     folder: str | os.PathLike[str] | None = None,
-    before_trials: Callable[[], object] = lambda: None,
+    before_trials: Callable[[Sequence[ProblemConfig]], object] = lambda _: None,
 ) -> Experiment:
     """Read a configuration and make sure that all of it can be done.
 
@@ -619,7 +619,8 @@ def read_experiment_file(
     folder : path, optional
         Where the model files are, in place of what the file says: any folder.
     before_trials : callable, optional
-        Called when all that is quick to check is right, before the algorithms are tried out, which compiles them.
+        Called with the problems when all that is quick to check is right, before the algorithms are tried out, which
+        compiles them.
 
     Raises
     ------
@@ -637,7 +638,7 @@ def read_experiment_file(
             with _blaming("problems", place):
                 problems.append(_opened(entry, file, models))
         reasons = {}
-        before_trials()
+        before_trials(problems)
         for place, algorithm in enumerate(file.algorithms):
             with _blaming("algorithms", place):
                 reasons[algorithm.name] = _try_out(algorithm, problems)

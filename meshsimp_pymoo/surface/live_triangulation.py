@@ -30,7 +30,7 @@ class LiveTriangulation:
     Raises
     ------
     ValueError
-        If ``kept`` has the wrong shape or spans no triangle, or the surface is of another kind.
+        If ``kept`` has the wrong shape or spans no triangle, or this is a surface of another kind.
 
     Examples
     --------
@@ -46,13 +46,12 @@ class LiveTriangulation:
     """
 
     def __init__(self, surface: HeightSurface, kept: BoolArray) -> None:
-        ground = movable_ground(surface, "live triangulations")
-        if not isinstance(ground, Ground):
+        self.ground: Ground = movable_ground(surface, "live triangulations")
+        if not isinstance(surface, HeightSurface):
             raise ValueError(
-                f"live triangulations are of height surfaces, and this is a {type(surface).__name__}; evaluate subsets "
-                "of it, or move its vertices with relocate()"
+                f"live triangulations are of height surfaces, not of a {type(surface).__name__}, whose vertices are "
+                "moved by thinning, greedy_insertion and Relocation"
             )
-        self.ground = ground
         self.surface = surface
         self.model = model = surface.model
         kept = require_bool(kept, f"a subset of {model.name} is a bool array")

@@ -6,6 +6,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from meshsimp_pymoo.comparison.config import ProblemConfig
     from meshsimp_pymoo.workers import DaskEngine
 
 HELP = "do a whole comparison from a YAML file"
@@ -52,13 +55,20 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.cli.terminal import INTERRUPTED, Stages, answering, bar, say, tell
     from meshsimp_pymoo.comparison.config import read_experiment_file
     from meshsimp_pymoo.comparison.runner import run_experiment
-    from meshsimp_pymoo.warming import SEARCH
+    from meshsimp_pymoo.surface.closed.model import ClosedModel
+    from meshsimp_pymoo.warming import CLOSED_WISH, WISH
 
     with (
         Stages(args.quiet, "compiling", {"compiling": 0.0}, lines=True) as shown,
-        compiling((*SEARCH, "insertion"), shown) as compiled,
+        compiling(WISH, shown) as compiled,
     ):
-        experiment = read_experiment_file(args.config, folder=args.models, before_trials=compiled.finish)
+
+        def finish(problems: Sequence[ProblemConfig]) -> None:
+            # algorithms are tried out on a height field, whatever the models are
+            any_closed = any(isinstance(problem.model, ClosedModel) for problem in problems)
+            compiled.finish((*WISH, *CLOSED_WISH) if any_closed else WISH)
+
+        experiment = read_experiment_file(args.config, folder=args.models, before_trials=finish)
     out = Path(args.output or f"{Path(args.config).stem}_results")
     jobs = args.jobs or os.cpu_count() or 1
     start = time.perf_counter()

@@ -21,6 +21,8 @@ examples:
       the smallest that deviates nowhere by more than 0.1
   meshsimp simplify dem.asc --triangles 5000 --free --refit --time 60s
       the least error at so many triangles: edges chosen for it, then heights
+  meshsimp simplify statue.ply --triangles 5000 --refit --time 60s
+      a closed surface, its vertices moved to where the mesh fits it best
   meshsimp simplify grid.npy --spacing 30 --nodata=-9999
       a height grid
   meshsimp simplify scan.laz --classes 2 --max-edge 5 --format landxml
@@ -178,8 +180,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     output.add_argument(
         "--refit",
         action="store_true",
-        help="write each mesh once more in OUT/refitted, its vertices raised or lowered to where the sum of the "
-        "deviations is least; front.csv says refitted_error",
+        help="write each mesh once more in OUT/refitted, its vertices raised or lowered (of a closed surface: moved) "
+        "to where the sum of the deviations is least; front.csv says refitted_error",
     )
     output.add_argument(
         "--no-page", dest="page", action="store_false", help="do not write OUT/report.html, the page to look and choose"
