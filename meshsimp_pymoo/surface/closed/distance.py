@@ -34,8 +34,8 @@ def squared_distance(xyz: np.ndarray, a: int, b: int, c: int, x: float, y: float
             s = 1.0
         elif vp_c >= 0.0 and up_c <= vp_c:
             t = 1.0
-        elif of_c <= 0.0 and up >= 0.0 and up_b <= 0.0:
-            s = up / uu if uu > 0.0 else 0.0
+        elif of_c <= 0.0 and up >= 0.0 and up_b <= 0.0 and uu > 0.0:
+            s = up / uu
         elif of_b <= 0.0 and vp >= 0.0 and vp_c <= 0.0:
             t = vp / vv if vv > 0.0 else 0.0
         elif of_a <= 0.0 and vp_b >= up_b and up_c >= vp_c:

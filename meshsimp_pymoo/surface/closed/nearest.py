@@ -16,7 +16,9 @@ DEEPEST = 64
 MORTON_BITS = 20
 
 
-def distances_to_mesh(points: FloatArray, vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+def distances_to_mesh(
+    points: FloatArray, vertices: FloatArray, faces: IntArray, guesses: IntArray | None = None
+) -> tuple[FloatArray, IntArray]:
     """Return how far points (N, 3) are from a mesh, and the triangle that each is nearest to (N,).
 
     Parameters
@@ -25,6 +27,8 @@ def distances_to_mesh(points: FloatArray, vertices: FloatArray, faces: IntArray)
         Consecutive ones should be close to each other.
     vertices : (V, 3) float array
     faces : (M, 3) int array
+    guesses : (N,) int array, optional
+        A triangle for each point that may be near, so that it is found sooner; of several as near it is the one.
 
     Examples
     --------
@@ -35,7 +39,11 @@ def distances_to_mesh(points: FloatArray, vertices: FloatArray, faces: IntArray)
     corners = np.asarray(vertices, float)[np.asarray(faces)]
     low, high = corners.min(axis=1), corners.max(axis=1)
     order = np.argsort(_morton_keys(0.5 * (low + high)), kind="stable")
-    squares, nearest = np.empty(len(points)), np.empty(len(points), np.int64)
+    squares, nearest = np.empty(len(points)), np.full(len(points), -1, np.int64)
+    if guesses is not None:
+        place = np.empty(len(order), np.int64)
+        place[order] = np.arange(len(order))
+        nearest[:] = place[guesses]
     xyz, ordered = np.ascontiguousarray(vertices, float).ravel(), np.ascontiguousarray(faces, np.int64)[order]
     boxes = _tree(low[order], high[order])
     _nearest_triangles(np.ascontiguousarray(points, float), xyz, ordered, boxes, squares, nearest)
@@ -91,13 +99,14 @@ def _nearest_triangles(
     squares: np.ndarray,
     nearest: np.ndarray,
 ) -> None:
-    """Fill in the squared distance of each point and the triangle, the first of several as near as guesses come."""
+    """Fill in the squared distance of each point and the triangle, which may be guessed; -1: that of the one before."""
     n_leaves = len(boxes) // 2
     nodes = np.empty(DEEPEST, np.int64)
     far = np.empty(DEEPEST, np.float64)
     best = np.int64(0)
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        best = nearest[i] if nearest[i] >= 0 else best
         least = squared_distance(xyz, faces[best, 0], faces[best, 1], faces[best, 2], x, y, z)
         nodes[0] = 1
         far[0] = 0.0

@@ -4,6 +4,7 @@ The original is sampled at its vertices and at the centres of its faces. In each
 the triangle that is nearest to it, among those around the one before, and the vertices are moved to where the sum of
 the squared distances to the planes of these triangles is least (point-to-plane, Chen and Medioni [1]_), with a small
 pull towards where they are. Slipping along the surface costs nothing so, which is what makes a few rounds enough.
+Where a triangle would turn over, as in thin parts, its vertices stay where they were at first.
 
 References
 ----------
@@ -14,30 +15,41 @@ References
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 
 # Rounds, and what holds vertices where they are: this share of what a sample weighs, times the samples a vertex.
 ROUNDS = 6
 PULL = 0.02
+# Conjugate gradients end where so much of the residual is left, or after so many steps: rounds go on from there.
+CLOSE = 1e-6
+MOST_STEPS = 200
 
 
-def moved_vertices(
-    vertices: FloatArray,
-    faces: IntArray,
-    samples: FloatArray,
-    weights: FloatArray,
-    *,
-    rounds: int = ROUNDS,
-    until: float | None = None,
-) -> list[FloatArray]:
-    """Return where the vertices are after each round.
+class Round(NamedTuple):
+    """Where the vertices are, and how far the samples of the original are from their mesh.
+
+    Attributes
+    ----------
+    vertices : (V, 3) float array
+    distances : (K,) float array
+    """
+
+    vertices: FloatArray
+    distances: FloatArray
+
+
+def rounds_of_refit(
+    vertices: FloatArray, faces: IntArray, samples: FloatArray, weights: FloatArray, *, until: float | None = None
+) -> Iterator[Round]:
+    """Yield where the vertices are: at the start, and after each round.
 
     Parameters
     ----------
@@ -45,43 +57,65 @@ def moved_vertices(
         Of the mesh, all used.
     faces : (M, 3) int array
     samples : (K, 3) float array
-        Of the original.
+        Of the original; consecutive ones should be close to each other.
     weights : (K,) float array
         What each counts.
-    rounds : int
     until : float, optional
         ``perf_counter()`` after which no round begins.
     """
     pull = PULL * weights.sum() / len(vertices)
-    found = []
-    for _ in range(rounds):
+    start = vertices
+    distances, nearest = distances_to_mesh(samples, vertices, faces)
+    yield Round(vertices, distances)
+    for _ in range(ROUNDS):
         if until is not None and time.perf_counter() >= until:
-            break
-        _, nearest = distances_to_mesh(samples, vertices, faces)
-        vertices = _fitted(vertices, faces, samples, weights, nearest, pull)
-        found.append(vertices)
-    return found
+            return
+        vertices = _unturned(_fitted(vertices, faces, samples, weights, nearest, pull), start, faces)
+        distances, nearest = distances_to_mesh(samples, vertices, faces, nearest)
+        yield Round(vertices, distances)
 
 
 def _fitted(
     vertices: FloatArray, faces: IntArray, samples: FloatArray, weights: FloatArray, nearest: IntArray, pull: float
 ) -> FloatArray:
     """Return the vertices of least squares, where sample k lies on triangle ``nearest[k]``."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    u, v = b - a, c - a
-    normal = np.cross(u, v)
+    normal = _normals(vertices, faces)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    share = _shares(a[nearest], u[nearest], v[nearest], samples)
+    a, b, c = (vertices[faces[nearest, k]] for k in range(3))
+    share = _shares(a, b - a, c - a, samples)
     # one row a sample: sum over corners of share * normal . vertex = normal . sample
     n, across = len(vertices), normal[nearest]
     values = (share[:, :, None] * across[:, None, :]).reshape(-1)
     columns = (3 * faces[nearest][:, :, None] + np.arange(3)).reshape(-1)
     A = sparse.csr_matrix((values, columns, np.arange(0, 9 * len(samples) + 1, 9)), shape=(len(samples), 3 * n))
-    At = (A.multiply(weights[:, None])).T.tocsr()
-    normal_matrix = (At @ A + pull * sparse.identity(3 * n)).tocsc()
-    right = At @ (across * samples).sum(axis=1) + pull * vertices.ravel()
-    return np.asarray(linalg.spsolve(normal_matrix, right)).reshape(-1, 3)
+    root = np.sqrt(weights)
+    A.data *= np.repeat(root, 9)
+    start = vertices.ravel()
+    # of what is left at the start, so that vertices which fit need not move
+    right = A.T @ (root * (across * samples).sum(axis=1) - A @ start)
+    normal_matrix = (A.T @ A + pull * sparse.identity(3 * n)).tocsr()
+    scaled = linalg.LinearOperator((3 * n, 3 * n), matvec=(1.0 / normal_matrix.diagonal()).__mul__, dtype=float)
+    step, _ = linalg.cg(normal_matrix, right, rtol=CLOSE, maxiter=MOST_STEPS, M=scaled)
+    return np.asarray(start + step).reshape(-1, 3)
+
+
+def _unturned(vertices: FloatArray, start: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the vertices, but those of triangles that have turned over since the start where they were then."""
+    before = _normals(start, faces)
+    vertices = vertices.copy()
+    while True:  # each time more of them are back
+        turned = np.unique(faces[(_normals(vertices, faces) * before).sum(axis=1) < 0.0])
+        turned = turned[(vertices[turned] != start[turned]).any(axis=1)]
+        if len(turned) == 0:
+            return vertices
+        vertices[turned] = start[turned]
+
+
+def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the normals (M, 3) of triangles, twice as long as their areas."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
 
 
 def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> FloatArray:
@@ -110,15 +144,3 @@ def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> 
     s = np.where(inside, s, on_side[:, 0])
     t = np.where(inside, t, on_side[:, 1])
     return np.column_stack([1.0 - s - t, s, t])
-
-
-def folded_edges(vertices: FloatArray, faces: IntArray, most: float) -> IntArray:
-    """Return how many edges have two faces that turn against each other by more than ``most`` degrees."""
-    table = edge_table(faces)
-    two = table.first[table.n_triangles == 2]
-    n_faces = len(faces)
-    one, other = table.order[two] % n_faces, table.order[two + 1] % n_faces
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    return np.asarray(((normal[one] * normal[other]).sum(axis=1) < np.cos(np.radians(most))).sum())

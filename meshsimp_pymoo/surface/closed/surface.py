@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
-from meshsimp_pymoo.surface.closed.refit import moved_vertices
+from meshsimp_pymoo.surface.closed.refit import rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
 from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
@@ -275,18 +275,19 @@ class ClosedSurface:
         less. There is no proved bound: it is 0.
         """
         rows, compact = used_rows(mesh.faces)
-        own = self.model.file_points[rows]
-        start = self._scored(self.points[rows], compact).quality.error
-        weights = np.ones(self.n_vertices) if self.model.weights is None else self.model.weights
+        n, before = self.n_vertices, mesh.quality.error
+        weights = np.ones(n) if self.model.weights is None else self.model.weights
         centres, share = self._between
         samples = np.concatenate([self.points, centres])
         counts = np.concatenate([weights, share * weights.sum()])
-        best, error = own, start
-        for moved in moved_vertices(self.points[rows], compact, samples[counts > 0], counts[counts > 0], until=until):
-            there = self._scored(moved, compact).quality.error
+        best, error = self.points[rows], np.inf
+        for vertices, away in rounds_of_refit(best, compact, samples, counts, until=until):
+            there = float((weights * away[:n]).sum())
             if there < error:
-                best, error = self.model.to_file(moved), there
-        return Refitted(mesh.faces, rows, best, min(error, mesh.quality.error), mesh.quality.error, 0.0)
+                best, error = vertices, there
+        moved = (best != self.points[rows]).any(axis=1)
+        found = np.where(moved[:, None], self.model.to_file(best), self.model.file_points[rows])
+        return Refitted(mesh.faces, rows, found, min(error, before), before, 0.0)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ClosedSurface:
         return self
