@@ -27,7 +27,6 @@ import importlib.util
 import sys
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +39,7 @@ from rich.table import Table
 from meshsimp_pymoo import Front, MeshProblem, memetic, simplify_to
 from meshsimp_pymoo.comparison.baselines import BASELINES, largest_at_most
 from meshsimp_pymoo.comparison.meshlab import load_pymeshlab
-from meshsimp_pymoo.errors import ModelError, ModelWarning, ToolUnavailable
+from meshsimp_pymoo.errors import ModelError, ToolUnavailable
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -162,9 +161,7 @@ def ours(problem: MeshProblem, sizes: dict[float, int], seconds: float, whole: b
 def compared(name: str, options: argparse.Namespace, measure: Measure, folder: Path) -> list[Row]:
     """Return the rows of one model."""
     source = options.shared / f"{name}.ply"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ModelWarning)  # that it is taken as a closed surface
-        problem = MeshProblem(source if source.is_file() else name, weights=options.weights)
+    problem = MeshProblem(source if source.is_file() else name, surface="closed", weights=options.weights)
     model = problem.model
     sizes = {share: int(share / 100 * len(model.faces)) // 2 * 2 for share in options.shares}
     original = write_obj(folder / "original.obj", model.file_points, model.faces)
