@@ -127,7 +127,10 @@ def quadric_collapse(
     if not optimal_placement:  # they are given ones exactly: to the local frame and back is not
         from scipy.spatial import cKDTree
 
-        return points[cKDTree(local).query(collapsed)[1]], remaining
+        away, nearest = cKDTree(local).query(collapsed)
+        if away.max(initial=0.0) > 1e-12 * _diagonal(local):
+            raise RuntimeError("MeshLab's vertices are not among those given")
+        return points[nearest], remaining
     return back(collapsed), remaining
 
 
