@@ -30,7 +30,7 @@ class LiveTriangulation:
     Raises
     ------
     ValueError
-        If ``kept`` has the wrong shape or spans no triangle.
+        If ``kept`` has the wrong shape or spans no triangle, or this is a surface of another kind.
 
     Examples
     --------
@@ -47,6 +47,11 @@ class LiveTriangulation:
 
     def __init__(self, surface: HeightSurface, kept: BoolArray) -> None:
         self.ground: Ground = movable_ground(surface, "live triangulations")
+        if not isinstance(surface, HeightSurface):
+            raise ValueError(
+                f"live triangulations are of height surfaces, not of a {type(surface).__name__}, whose vertices are "
+                "moved by thinning, greedy_insertion and Relocation"
+            )
         self.surface = surface
         self.model = model = surface.model
         kept = require_bool(kept, f"a subset of {model.name} is a bool array")

@@ -120,7 +120,7 @@ class Refitted:
     before : float
         Error with the original vertices [model units].
     bound : float
-        No such mesh has an error below this, up to rounding [model units].
+        No such mesh has an error below this, up to rounding [model units]; 0 where none is proved.
     """
 
     faces: IntArray
@@ -131,10 +131,8 @@ class Refitted:
     bound: float
 
     def __repr__(self) -> str:
-        return (
-            f"<Refitted: {len(self.faces):,} triangles, error {self.error:.6g}, {self.before:.6g} before, "
-            f"at least {self.bound:.6g}>"
-        )
+        proved = f", at least {self.bound:.6g}" if self.bound > 0.0 else ""
+        return f"<Refitted: {len(self.faces):,} triangles, error {self.error:.6g}, {self.before:.6g} before{proved}>"
 
 
 @brief

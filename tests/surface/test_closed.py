@@ -154,6 +154,23 @@ def test_refit_leaves_what_is_exact_to_the_bit():
     assert np.array_equal(found.vertices, surface.model.file_points)
 
 
+def test_refit_turns_no_triangle_over():
+    """A plate as thin as a leaf, whose sides would swap places."""
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    x, y, z = mesh.vertices.T
+    mesh.vertices = np.column_stack(
+        [x, 0.8 * y + 0.1 * np.sin(3 * x), 0.004 * z + 0.05 * np.sin(4 * x) * np.cos(3 * y)]
+    )
+    surface = ClosedSurface(open_model(mesh, Options(surface="closed")))
+    for seed in range(3):
+        found = surface.refit(surface.simplify(subset(surface, 0.06, seed)))
+        assert found.error < found.before
+        rows, compact = used_rows(found.faces)
+        corners = [points[compact] for points in (surface.model.file_points[rows], found.vertices)]
+        before, after = (np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) for c in corners)
+        assert ((before * after).sum(axis=1) >= 0.0).all()
+
+
 def test_refit_out_of_time_is_the_mesh_itself():
     surface = ClosedSurface(bumpy())
     mesh = surface.simplify(subset(surface, 0.1, 3))

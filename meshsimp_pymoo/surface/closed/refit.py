@@ -4,6 +4,7 @@ The original is sampled at its vertices and at the centres of its faces. In each
 the triangle that is nearest to it, among those around the one before, and the vertices are moved to where the sum of
 the squared distances to the planes of these triangles is least (point-to-plane, Chen and Medioni [1]_), with a small
 pull towards where they are. Slipping along the surface costs nothing so, which is what makes a few rounds enough.
+Where a triangle would turn over, as in thin parts, its vertices stay where they were at first.
 
 References
 ----------
@@ -63,12 +64,13 @@ def rounds_of_refit(
         ``perf_counter()`` after which no round begins.
     """
     pull = PULL * weights.sum() / len(vertices)
+    start = vertices
     distances, nearest = distances_to_mesh(samples, vertices, faces)
     yield Round(vertices, distances)
     for _ in range(ROUNDS):
         if until is not None and time.perf_counter() >= until:
             return
-        vertices = _fitted(vertices, faces, samples, weights, nearest, pull)
+        vertices = _unturned(_fitted(vertices, faces, samples, weights, nearest, pull), start, faces)
         distances, nearest = distances_to_mesh(samples, vertices, faces, nearest)
         yield Round(vertices, distances)
 
@@ -77,12 +79,11 @@ def _fitted(
     vertices: FloatArray, faces: IntArray, samples: FloatArray, weights: FloatArray, nearest: IntArray, pull: float
 ) -> FloatArray:
     """Return the vertices of least squares, where sample k lies on triangle ``nearest[k]``."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    u, v = b - a, c - a
-    normal = np.cross(u, v)
+    normal = _normals(vertices, faces)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    share = _shares(a[nearest], u[nearest], v[nearest], samples)
+    a, b, c = (vertices[faces[nearest, k]] for k in range(3))
+    share = _shares(a, b - a, c - a, samples)
     # one row a sample: sum over corners of share * normal . vertex = normal . sample
     n, across = len(vertices), normal[nearest]
     values = (share[:, :, None] * across[:, None, :]).reshape(-1)
@@ -97,6 +98,24 @@ def _fitted(
     scaled = linalg.LinearOperator((3 * n, 3 * n), matvec=(1.0 / normal_matrix.diagonal()).__mul__, dtype=float)
     step, _ = linalg.cg(normal_matrix, right, rtol=CLOSE, maxiter=MOST_STEPS, M=scaled)
     return np.asarray(start + step).reshape(-1, 3)
+
+
+def _unturned(vertices: FloatArray, start: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the vertices, but those of triangles that have turned over since the start where they were then."""
+    before = _normals(start, faces)
+    vertices = vertices.copy()
+    while True:  # each time more of them are back
+        turned = np.unique(faces[(_normals(vertices, faces) * before).sum(axis=1) < 0.0])
+        turned = turned[(vertices[turned] != start[turned]).any(axis=1)]
+        if len(turned) == 0:
+            return vertices
+        vertices[turned] = start[turned]
+
+
+def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the normals (M, 3) of triangles, twice as long as their areas."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
 
 
 def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> FloatArray:
