@@ -1,4 +1,4 @@
-"""Pareto fronts of simplified open meshes, as a pymoo plugin.
+"""Pareto fronts of simplified meshes, as a pymoo plugin.
 
 The tree is the data flow. Bottom up; one part may import only parts above it in this list::
 
@@ -9,7 +9,8 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
     files          files and folders whole or not at all, locks, arrays without pickles
     plane/         predicates, triangulation, footprint, faces: arrays in, arrays out
     formats/       one file a format, in one table; ends in a SourceMesh
-    surface/       what a chromosome means: rules and measures, the height surface, its moves, refit, score; big grids
+    surface/       what a chromosome means: rules and measures, the height surface, its moves, refit, score; big grids;
+                   the closed surface (surface/closed/); which of both a model makes (surface/kinds)
     datasets       built-in models by name
     opening        the one way in: path, name or arrays, and Options -> model, or a grid read by windows
     problem        MeshProblem: which vertices are kept -> (error, triangles)
