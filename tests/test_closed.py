@@ -190,7 +190,7 @@ def last_bits(points, faces):
 def another_pole(points, faces):
     """Flatten from within another face, as where several are equally near to the middle but for rounding."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(embedding, "_pole_face", lambda *_: 7)
+        patch.setattr(embedding, "_trunk_face", lambda *_: 7)
         return embedding.embed(points, faces)
 
 

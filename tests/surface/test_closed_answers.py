@@ -44,26 +44,29 @@ def random_subset(surface: ClosedSurface, share: float, seed: int) -> BoolArray:
 # -------------------------------------------------------------------------------------------------------- known answers
 
 
-@pytest.mark.parametrize("name", ["tetrahedron:5", "tetrahedron:9", "cube:5", "cube:9", "cube:17", "icosahedron:3"])
-def test_the_corners_of_a_polyhedron_and_the_pole_are_all_of_it(name):
-    surface = closed(name)
-    kept = with_corners(surface)
-    mesh = surface.simplify(kept)
-    assert mesh.quality.max_error < 1e-14 * surface.diagonal
-    assert mesh.quality.error < 1e-12 * surface.diagonal
-    assert len(mesh.faces) == 2 * kept.sum() - 4
-
-
-@pytest.mark.parametrize(("name", "triangles"), [("tetrahedron:17", 8), ("icosahedron:9", 24), ("icosahedron:16", 24)])
-def test_with_the_pole_at_a_corner_the_corners_are_all_of_it(name, triangles, monkeypatch):
-    def at_a_corner(points, faces):
-        return int(np.argmax(np.linalg.norm(points[faces].mean(axis=1) - points.mean(axis=0), axis=1)))
-
-    monkeypatch.setattr(embedding, "_pole_face", at_a_corner)
+@pytest.mark.parametrize(
+    ("name", "triangles", "most"),
+    [
+        ("tetrahedron:5", 8, 1e-15), ("tetrahedron:17", 8, 1e-15), ("icosahedron:3", 24, 1e-15),
+        ("icosahedron:9", 24, 1e-15), ("icosahedron:16", 24, 1e-15), ("cube:5", 16, 1e-15), ("cube:17", 16, 1e-3),
+    ],
+)  # fmt: skip
+def test_the_corners_of_a_polyhedron_are_all_of_it(name, triangles, most):
+    """The pole is at one of them, so two vertices more are kept. In a cube some look past the side that is nearest."""
     surface = closed(name)
     mesh = surface.simplify(with_corners(surface))
-    assert mesh.quality.error < 1e-12 * surface.diagonal
+    assert mesh.quality.mean_error < most * surface.diagonal
     assert mesh.quality.triangles == triangles
+
+
+def test_the_pole_is_at_the_trunk_where_no_corner_is_sharp_or_seen_from_it_things_get_too_small():
+    smooth = closed("blob:500")
+    centre = smooth.points.mean(axis=0)
+    away = np.linalg.norm(smooth.points - centre, axis=1)
+    assert away[smooth.model.pole].max() < np.median(away)
+    spiked = tube(30.0)
+    model = closed_model(spiked)
+    assert np.abs(model.points[model.pole] - model.points.mean(axis=0)).max() < 5.0
 
 
 @pytest.mark.parametrize(("name", "most"), [("tetrahedron:17", 16), ("cube:17", 18), ("icosahedron:9", 32)])

@@ -1,9 +1,11 @@
 """A closed mesh of genus 0 flattened once: every vertex gets an image in the plane, and no face is turned over.
 
-One original face, the *pole*, is the outside: its vertices are the corners of a triangle that holds all other images,
-each of which is the weighted mean of those of its neighbours. With positive weights no face flips (Tutte [1]_); these
-are the cotangent weights, which make angles in the plane like those on the surface (Pinkall and Polthier [2]_), bounded
-from below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
+One original face, the *pole*, is the outside: its vertices are the corners of a triangle that holds all other images.
+They are part of every mesh, so it is a face at the sharpest corner, which every mesh wants, if there is a sharp one and
+nothing gets too small as seen from there; else one at the trunk, from where limbs shrink least. Each of the others
+is the weighted mean of those of its neighbours. With positive weights no face flips (Tutte [1]_); these are the
+cotangent weights, which make angles in the plane like those on the surface (Pinkall and Polthier [2]_), bounded from
+below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
 
 Seen from the centre of a sphere that touches the plane these are images on the sphere; the Delaunay triangulation of
 any of them with the outside as one more triangle is the convex hull there.
@@ -33,6 +35,9 @@ LEAST_SHARE = 1e-3
 # Faces whose images are sheared more than this (the sum of both squared stretches over the area's) say nothing of the
 # affine map: they lie where the triangle is cut off by the outside.
 MOST_SHEAR = 50.0
+# A corner is sharp if the angles of its faces lack so much of a full turn: those of a cube lack pi / 2, of an
+# icosahedron pi / 3 [radians]. Seen from there no image may be closer to its neighbour than this.
+SHARP, LEAST_EDGE = 1.0, 2.0**-30
 # What is left outside when images are scaled into the unit square.
 MARGIN = 2.0**-10
 
@@ -67,7 +72,16 @@ def embed(points: FloatArray, faces: IntArray) -> Embedding:
     Embedding
         The images that floating point gives; see :func:`faults` for whether they are an embedding.
     """
-    pole = faces[_pole_face(points, faces)].astype(np.int64)
+    corner = _sharp_face(points, faces)
+    if corner is not None:
+        found = _embedded(points, faces, faces[corner].astype(np.int64))
+        if shortest_edge(found.xy, faces) >= LEAST_EDGE and faults(found.xy, faces, found.pole) == (0, 0):
+            return found
+    return _embedded(points, faces, faces[_trunk_face(points, faces)].astype(np.int64))
+
+
+def _embedded(points: FloatArray, faces: IntArray, pole: IntArray) -> Embedding:
+    """Flatten a closed mesh with this face for the outside."""
     inner = np.ones(len(points), bool)
     inner[pole] = False
     rows = np.flatnonzero(inner)
@@ -105,6 +119,11 @@ def faults(xy: FloatArray, faces: IntArray, pole: IntArray) -> tuple[int, int]:
     return int(flipped), len(xy) - len(np.unique(np.ascontiguousarray(xy).view(np.complex128)))
 
 
+def shortest_edge(xy: FloatArray, faces: IntArray) -> float:
+    """Return the length of the shortest side of a face in the plane."""
+    return min(float(np.hypot(*(xy[faces[:, k]] - xy[faces[:, k - 1]]).T).min()) for k in range(3))
+
+
 @entry
 def _n_flipped(xy: np.ndarray, faces: np.ndarray) -> int:
     n = 0
@@ -115,8 +134,19 @@ def _n_flipped(xy: np.ndarray, faces: np.ndarray) -> int:
     return n
 
 
-def _pole_face(points: FloatArray, faces: IntArray) -> int:
-    """Return the face nearest to the centroid of the surface: seen from a trunk limbs shrink least."""
+def _sharp_face(points: FloatArray, faces: IntArray) -> int | None:
+    """Return the first face at the vertex whose angles lack most of a full turn; None where none lacks much."""
+    lacks = np.full(len(points), 2.0 * np.pi)
+    for k in range(3):
+        a, b, c = (points[faces[:, (k + i) % 3]] for i in range(3))
+        cross = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        lacks -= np.bincount(faces[:, k], np.arctan2(cross, ((b - a) * (c - a)).sum(axis=1)), len(points))
+    sharpest = int(np.argmax(lacks))
+    return int(np.argmax((faces == sharpest).any(axis=1))) if lacks[sharpest] >= SHARP else None
+
+
+def _trunk_face(points: FloatArray, faces: IntArray) -> int:
+    """Return the face nearest to the centroid of the surface."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     centres = (a + b + c) / 3.0
