@@ -495,5 +495,9 @@ def test_a_search_of_a_closed_surface_compiles_nothing_more(ball, tmp_path, monk
             return search(*args)
 
     monkeypatch.setattr(searching, "_search", watched)
+    finished = []
+    finish = preparing.Compiling.finish
+    monkeypatch.setattr(preparing.Compiling, "finish", lambda own, names: (finished.append(names), finish(own, names)))
     assert run("simplify", ball, "-o", tmp_path / "out", "--moves", "2000", "--quiet", "--no-page") == 0
     assert compiled == []
+    assert finished == [list(CLOSED_SEARCH)]

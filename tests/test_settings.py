@@ -212,6 +212,7 @@ SETTINGS = {
     "up": st.one_of(st.sampled_from(["auto", "z", "-x"]), directions),
     "patch": st.none() | st.just("front"),
     "repair": st.sampled_from(["mend", "none"]),
+    "surface": st.sampled_from(["auto", "height", "closed"]),
     "spacing": st.none() | st.tuples(positive, positive),
     "nodata": st.none() | st.floats(allow_nan=False, allow_infinity=False),
     "window": st.none() | st.tuples(wholes, wholes, *2 * [wholes.map(lambda count: count + 2)]),
@@ -222,8 +223,8 @@ SETTINGS = {
     "classes": st.none() | st.lists(st.integers(0, 255), min_size=1, unique=True),
     "columns": st.none()
     | st.lists(wholes.map(lambda k: k + 1) | names.map(str.strip), min_size=3, max_size=3, unique=True),
-    "footprint": st.sampled_from(FOOTPRINTS),
-    "outside": st.sampled_from(OUTSIDES),
+    "footprint": st.none() | st.sampled_from(FOOTPRINTS),
+    "outside": st.none() | st.sampled_from(OUTSIDES),
     "pin": st.none() | pins,
     "weights": st.none() | names | st.lists(reals, min_size=1),
     "break_lines": st.none() | st.sampled_from(["outline", "sharp:30"]) | lines,
@@ -285,7 +286,7 @@ def test_a_weight_that_is_no_number_is_stored_as_nothing_and_read_back():
         (Rules, {"pin": {"hull": True}}, "pin is .*: expected corners, hull, border, or a list"),
         (Rules, {"weights": " "}, "weights is ' ': expected the name of an attribute"),
         (Rules, {"weights": np.array(["a"] * 1000)}, "weights is .*: expected a list of numbers, and 'a' is none"),
-        (Rules, {"footprint": None}, "footprint is None: expected one of model, hull"),
+        (Rules, {"measure": None}, "measure is None: expected one of error, "),
     ],
 )
 def test_what_could_not_be_read_back_is_refused_when_it_is_given(kind, given, message):
@@ -310,7 +311,7 @@ def test_defaults_are_read_back_and_missing_settings_have_them():
         ({"footprint": "hul"}, r"footprint is 'hul': unknown \(did you mean 'hull'\?\)"),
         ({"pin": {}}, "pin is {}: expected corners, hull, border, or a list"),
         ({"weights": 3}, "weights is 3: expected the name of an attribute"),
-        ({"footprint": None}, "footprint is None: expected one of model, hull"),
+        ({"measure": None}, "measure is None: expected one of error, "),
     ],
 )
 def test_what_was_stored_of_nothing_like_it_is_refused(stored, message):
