@@ -56,6 +56,7 @@ from meshsimp_pymoo import (
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.opening import open_source
 from meshsimp_pymoo.settings import settings_of
+from meshsimp_pymoo.surface.closed.model import topology
 from meshsimp_pymoo.surface.edges import Edges
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.surface import FreeMesh, Scored, View
@@ -64,6 +65,7 @@ from meshsimp_pymoo.workers import Serial
 # A roof of 5 x 5 samples: the ridge has height 1, so that the corners alone miss 10 in all, in two triangles.
 PROBLEM = MeshProblem("roof:5")
 SURFACE = PROBLEM.surface
+BODY = MeshProblem("sphere:100").surface
 CORNERS = PROBLEM.simplify(PROBLEM.pinned)
 FRONT = Front.from_subsets(PROBLEM, np.array([PROBLEM.pinned, np.ones(25, bool)]))
 SAYS = "<MeshProblem roof:5: 25 vertices, minimise error and triangles; footprint model, outside nearest>"
@@ -102,6 +104,9 @@ F = [[1, 15], [0, 20]]
             SURFACE,
             "<HeightSurface of roof:5: 25 vertices, 4 pinned, error measured; footprint model, outside nearest>",
         ),
+        (BODY.model, "<ClosedModel sphere:100: 100 vertices, 196 triangles, 1.981 x 1.981 x 1.978 model units>"),
+        (BODY, "<ClosedSurface of sphere:100: 100 vertices, 3 pinned, error measured>"),
+        (topology(BODY.faces), "Topology(components=1, loops=0, crowded=0, touching=0, mismatched=0, genus=0)"),
         (open_grid(np.zeros((40, 30))), "<HeightGrid grid: 40 rows of 30 samples>"),
         (
             GridSurface(open_grid(np.zeros((40, 30)))),
@@ -181,7 +186,8 @@ F = [[1, 15], [0, 20]]
         (Cardinality(), "Cardinality()"),
         (
             View(np.array([2.0, 2.0, 1.0]), np.eye(3), np.zeros(3)),
-            "View(extent=[2.0, 2.0, 1.0], rotation=<(3, 3) float64>, pivot=[0.0, 0.0, 0.0], scale=[1.0, 1.0, 1.0])",
+            "View(extent=[2.0, 2.0, 1.0], rotation=<(3, 3) float64>, pivot=[0.0, 0.0, 0.0], scale=[1.0, 1.0, 1.0], "
+            "is_closed=False)",
         ),
     ],
     ids=lambda value: "" if isinstance(value, str) else type(value).__name__,
@@ -240,13 +246,13 @@ def test_settings_are_named_with_their_defaults_wherever_they_are_taken_by_name(
     for of in (MeshProblem, MeshProblem.__init__):
         found = inspect.signature(of).parameters
         assert [name for name in found if name in names] == names
-        assert (found["up"].default, found["footprint"].default, found["pin"].default) == ("auto", "model", None)
-        assert found["outside"].annotation == "str"
+        assert (found["up"].default, found["footprint"].default, found["pin"].default) == ("auto", None, None)
+        assert found["outside"].annotation == "str | None"
         assert found["memo"].default == 100_000
         assert list(found)[-1] == "kwargs"
         assert "measure" not in found
     found = inspect.signature(open_grid).parameters
-    assert list(found)[:4] == ["model", "options", "up", "patch"]
+    assert list(found)[:4] == ["model", "options", "surface", "up"]
     assert "footprint" not in found
     said = pydoc.plain(pydoc.render_doc(MeshProblem.__init__))
     assert "spacing: 'float | tuple[float, float] | None' = None" in said

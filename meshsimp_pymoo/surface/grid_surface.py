@@ -56,7 +56,7 @@ class GridSurface:
                     "the grid in one piece (MeshProblem), or a part of it (window=)"
                 )
         self.model = grid
-        self.rules = rules
+        self.rules = rules.of_heights
 
     def __repr__(self) -> str:
         return f"<GridSurface of {self.model.name}: {self.n_vertices:,} samples; {self.rules.in_words}>"
