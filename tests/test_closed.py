@@ -415,7 +415,7 @@ def test_info_says_what_a_closed_model_is(ball, folder, capsys):
     assert {name: said[name] for name in known} == known
     model = open_model(ball)
     ends = model.xy[model.faces[:, [0, 1, 2, 0]]]
-    assert said["least_image_edge"] == np.linalg.norm(np.diff(ends, axis=1), axis=2).min()
+    assert said["least_image_edge"] == pytest.approx(np.linalg.norm(np.diff(ends, axis=1), axis=2).min(), rel=1e-12)
     assert "faces all ways alike" in said["not_height"]
     assert said["not_closed"] is None
 

@@ -199,11 +199,9 @@ def _as_closed(
     source: SourceMesh, options: Options, rules: Rules, content: dict[str, Any], rows: dict[str, str]
 ) -> str | None:
     """Add what a model is as a closed surface, and why it is no height field; return why it is refused, if it is."""
-    import numpy as np
-
     from meshsimp_pymoo.cli.terminal import with_options
     from meshsimp_pymoo.errors import ModelError
-    from meshsimp_pymoo.surface.closed.embedding import faults
+    from meshsimp_pymoo.surface.closed.embedding import faults, shortest_edge
     from meshsimp_pymoo.surface.closed.model import closed_model, topology
     from meshsimp_pymoo.surface.closed.surface import ClosedSurface
     from meshsimp_pymoo.surface.orient import seen_upright
@@ -225,8 +223,7 @@ def _as_closed(
         ClosedSurface(model, rules)
     except ModelError as problem:
         return str(problem)
-    ends = model.xy[np.concatenate([model.faces[:, [0, 1]], model.faces[:, [1, 2]], model.faces[:, [2, 0]]])]
-    least = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).min())
+    least = shortest_edge(model.xy, model.faces)
     flips, _ = faults(model.xy, model.faces, model.pole)
     content |= {"flips": flips, "least_image_edge": least}
     rows["flattened"] = f"{flips} faces flipped, the shortest edge {least:.3g} of the plane's side"

@@ -135,14 +135,20 @@ def _n_flipped(xy: np.ndarray, faces: np.ndarray) -> int:
 
 
 def _sharp_face(points: FloatArray, faces: IntArray) -> int | None:
-    """Return the first face at the vertex whose angles lack most of a full turn; None where none lacks much."""
-    lacks = np.full(len(points), 2.0 * np.pi)
+    """Return the face of the widest angle at the vertex whose angles lack most of a full turn; None if none lacks much.
+
+    However the model is turned or listed it is the same one, but where several are alike.
+    """
+    sides = [points[faces[:, (k + 1) % 3]] - points[faces[:, k]] for k in range(3)]
+    angles = np.empty(faces.shape)
     for k in range(3):
-        a, b, c = (points[faces[:, (k + i) % 3]] for i in range(3))
-        cross = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        lacks -= np.bincount(faces[:, k], np.arctan2(cross, ((b - a) * (c - a)).sum(axis=1)), len(points))
+        u, v = sides[k], -sides[k - 1]
+        angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
+    lacks = 2.0 * np.pi - np.bincount(faces.ravel(), angles.ravel(), len(points))
     sharpest = int(np.argmax(lacks))
-    return int(np.argmax((faces == sharpest).any(axis=1))) if lacks[sharpest] >= SHARP else None
+    if lacks[sharpest] < SHARP:
+        return None
+    return int(np.argmax(np.where(faces == sharpest, angles, 0.0).max(axis=1)))
 
 
 def _trunk_face(points: FloatArray, faces: IntArray) -> int:
