@@ -463,6 +463,12 @@ def test_errors_on_a_body_are_seen_from_both_sides(blob):
     plot_error(blob, size, ax)
     front, back = ax.get_images()
     assert front.get_extent()[1] < back.get_extent()[0]
+    near = Figure().subplots()
+    plot_error(blob, blob.points[:, 2] - blob.points[:, 2].min(), near)  # what is in front is off, the back is not
+    bright = [
+        rgba[rgba[..., 3] == 1, :3].mean() for rgba in (np.asarray(part.get_array()) for part in near.get_images())
+    ]
+    assert bright[0] < 0.7 * bright[1]
     assert ax.get_xlim()[0] < front.get_extent()[0] < back.get_extent()[1] < ax.get_xlim()[1]
     for drawn in (front, back):
         rgba = np.asarray(drawn.get_array())

@@ -990,6 +990,16 @@ def test_the_error_on_a_simplified_body_is_that_of_the_nearest_original_vertex(c
     places, points, faces = places.reshape(-1, 3), points.reshape(-1, 3), faces.reshape(-1, 3)
     away = np.linalg.norm(places[:, None] - points[None], axis=2)
     np.testing.assert_allclose(away[np.arange(len(places)), sources], away.min(axis=1), atol=1e-6)
+    # another scale and another mesh show at once
+    page.locator("#slider").fill("2")
+    assert shown(page) == 2
+    same = pixels(page)[1]
+    assert unlike(same, looks["error"][1]) > 0.05
+    page.select_option("#scale", "one")
+    assert unlike(pixels(page)[1], same) > 0.02
+    page.select_option("#scale", "all")
+    page.locator("#slider").fill("4")
+    assert shown(page) == 4
     # the parts are the whole mesh: they enclose the same
     own = np.array(page.evaluate("Array.from(state.mesh.faces)")).reshape(-1, 3)
     volumes = [np.linalg.det(corners.astype(float)).sum() / 6 for corners in (places[faces], points[own])]
@@ -1036,6 +1046,10 @@ def test_two_fingers_magnify_and_roll_a_closed_model(browser, closed_folder):
         assert visit.page.evaluate("document.documentElement.scrollWidth") == 360
         arm, up, _, _ = camera(visit.page)
         visit.page.locator("#original-window").scroll_into_view_if_needed()
+        for window in pixels(visit.page):  # all of the body is in it
+            drawn = np.abs(window - window[8, 8]).max(axis=2)[8:-8] > 24
+            assert not drawn[:, [1, 2, -3, -2]].any()
+            assert drawn.any(axis=0).mean() > 0.6
         box = visit.page.locator("#original-window").bounding_box()
         x, y = box["x"] + 60, box["y"] + 100
         touch = visit.context.new_cdp_session(visit.page)
