@@ -269,7 +269,7 @@ def test_the_measure_of_the_rules_is_the_first_objective():
     problem = MeshProblem("roof:5", rules=Rules(measure="max_error"))
     assert problem.objectives == ("max_error", "triangles")
     problem = MeshProblem("roof:5", rules=Rules(measure="max_error"), objectives=("rms_error", "triangles"))
-    assert problem.surface.rules == Rules(measure="rms_error")
+    assert problem.surface.rules == Rules(measure="rms_error").of_heights
 
 
 def test_a_surface_brings_its_rules_and_takes_no_other_ones():

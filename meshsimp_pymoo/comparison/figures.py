@@ -24,7 +24,7 @@ from meshsimp_pymoo.comparison.statistics import ALPHA, performance_profile
 from meshsimp_pymoo.comparison.store import StoredRun, classic_mesh
 from meshsimp_pymoo.comparison.study import CLASSIC_NAMES, SCORINGS, Case, Study, on_all_models, ranked
 from meshsimp_pymoo.indicators import non_dominated
-from meshsimp_pymoo.report.figures import front_axes, plain_numbers, plot_error, plot_mesh
+from meshsimp_pymoo.report.figures import ERROR_COLOURS, front_axes, plain_numbers, plot_error, plot_mesh
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.kinds import OfModel
 
@@ -380,6 +380,8 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     Of one baseline, MeshLab's if it is there, the mesh whose size is nearest to that of the best evolutionary trade-off
     is shown.
     """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
     surface = study.surface(case.problem, case.scoring)
@@ -396,7 +398,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
     nothing = np.zeros(surface.n_vertices)
     title = f"original\n{len(surface.faces):,} triangles"
     original = _Shown(title, points, surface.faces, nothing, nothing == 0)
-    drawn: Any = None
+    colours = ScalarMappable(Normalize(0.0, end), ERROR_COLOURS)
     for column, mesh in enumerate([original, *shown]):
         for row, view in enumerate((FRONT, SIDE)):
             panel = panels[row, column]
@@ -409,13 +411,17 @@ def meshes_figure(study: Study, case: Case) -> Figure:
         below.set_aspect("equal")
         if column == 0:
             text = "error at every\nvertex of the original\n\n"
-            text += "seen from the front" if surface.view.is_closed else "blue: vertices that\nno triangle covers"
+            text += (
+                "seen from the front\nand from the back"
+                if surface.view.is_closed
+                else "blue: vertices that\nno triangle covers"
+            )
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
         plot_error(surface, mesh.deviation, below, covered=mesh.covered, largest=end, bar=False)
-        drawn = below.collections[0]
-        below.set(xlim=panels[0, 0].get_xlim(), ylim=panels[0, 0].get_ylim())
-    bar = figure.colorbar(drawn, ax=panels[2, :].tolist(), shrink=0.8, pad=0.01, extend="max")
+        if not surface.view.is_closed:  # which is drawn from both sides
+            below.set(xlim=panels[0, 0].get_xlim(), ylim=panels[0, 0].get_ylim())
+    bar = figure.colorbar(colours, ax=panels[2, :].tolist(), shrink=0.8, pad=0.01, extend="max")
     bar.set_label("error [file units]", fontsize=9)
     _title(figure, case.problem.name, [case])
     return figure

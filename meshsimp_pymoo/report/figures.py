@@ -68,6 +68,8 @@ MOST_DRAWN = 500_000
 BODY_PIXELS, SAMPLES = 600, 2  # of the picture of a body, its longer side; each is the mean of so many squared
 OUTLINE = 1.1  # half the width of its edges, in samples
 ERROR_SHADE = 0.62  # the darkest shade on a body whose colours are to be read
+# The colours of errors, from none to the largest.
+ERROR_COLOURS = "magma_r"
 ROUNDING = 1e-6  # errors below this share of the largest are drawn near 0: rounding would stretch the axis
 # Vertices of an original that are drawn; a picture shows no more of them, and a browser without a graphics card turns
 # no more of them smoothly.
@@ -328,7 +330,7 @@ def _error_map(ax: Axes, surface: Surface, size: FloatArray, end: float, covered
         np.asarray(surface.faces),
         size,
         shading="gouraud",
-        cmap="magma_r",
+        cmap=ERROR_COLOURS,
         vmin=0.0,
         vmax=end,
         rasterized=True,
@@ -346,7 +348,7 @@ def _error_of_body(ax: Axes, surface: Surface, size: FloatArray, end: float, cov
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    colours, faces = ScalarMappable(Normalize(0.0, end), "magma_r"), np.asarray(surface.faces)
+    colours, faces = ScalarMappable(Normalize(0.0, end), ERROR_COLOURS), np.asarray(surface.faces)
     beside, corners = np.zeros(2), []
     for side in ("front", "back"):
         points = _turned(surface.points, side, is_body=True)

@@ -166,7 +166,7 @@ def test_the_report_and_its_pictures_say_nothing_of_what_is_uncovered(done, monk
     assert any(title.startswith("N1\n") for title in titles)
     assert not any("uncovered" in title for title in titles)
     texts = [text.get_text() for axes in figure.axes for text in axes.texts]
-    assert any("seen from the front" in text for text in texts)
+    assert any("seen from the front\nand from the back" in text for text in texts)
 
 
 @pytest.mark.parametrize(
