@@ -24,6 +24,7 @@ from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.reprs import as_made
 from meshsimp_pymoo.settings import by_name, documentation, settings_of, taken
+from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.kinds import Model, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
@@ -201,6 +202,8 @@ class MeshProblem(ElementwiseProblem):
             self.objectives = checked_objectives(objectives if objectives is not None else (measure, "triangles"))
             rules = taken(Rules, rules, named | {"measure": self.objectives[0]})
             self.surface = surface_of(open_model(model, self.options), rules)
+        if isinstance(self.surface, ClosedSurface):
+            self.surface.refuse_regions(regions)
         self.max_triangles = max_triangles
         self.max_objective = max_objective
         self._memo: OrderedDict[bytes, FloatArray] = OrderedDict()

@@ -347,7 +347,7 @@ def test_what_does_not_go_with_a_closed_surface_is_refused_in_one_line_before_an
         (lambda problem: minimize(problem, memetic(8, triangulation="free"), ("n_gen", 1)), "free meshes are made by"),
         (lambda problem: Front.from_subsets(problem, ~problem.pinned).free(moves=10), "free meshes are made by"),
         (
-            lambda problem: MeshProblem(problem.surface, regions=4).evaluate(problem.pinned),
+            lambda problem: MeshProblem(problem.surface, regions=4),
             "regions=4.*RegionCrossover",
         ),
         (lambda problem: MeshProblem(problem.model, pin=[[10.0, 20.0]]), r"give \[x, y, z\]"),

@@ -181,12 +181,16 @@ class ClosedSurface:
 
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table (P, 6) of numbers of subsets (P, N); a closed surface knows no ``regions``."""
+        self.refuse_regions(regions)
+        return evaluate_closed(self._ground, self._workspaces, kept, n_threads=threads)
+
+    def refuse_regions(self, regions: int) -> None:
+        """Raise a ValueError if errors by region are asked for."""
         if regions:
             raise ValueError(
                 f"regions={regions}: errors by region are for height surfaces, and {self.model.name} is a closed one; "
                 "leave regions (and what is made of them, such as RegionCrossover) out"
             )
-        return evaluate_closed(self._ground, self._workspaces, kept, n_threads=threads)
 
     def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
         """Return the mesh of the kept vertices and its measures: the phenotype of one chromosome (N,).
