@@ -26,8 +26,8 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 
 # Rounds, and what holds vertices where they are: this share of what a sample weighs, times the samples a vertex.
-ROUNDS = 6
-PULL = 0.02
+ROUNDS = 10
+PULL = 0.01
 # Conjugate gradients end where so much of the residual is left, or after so many steps: rounds go on from there.
 CLOSE = 1e-6
 MOST_STEPS = 200
