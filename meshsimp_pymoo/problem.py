@@ -375,10 +375,11 @@ class MeshProblem(ElementwiseProblem):
         said.append(surface.rules.in_words)
         if self.regions:
             said.append(f"error in {self.regions:,} regions")
+        besides = ", ".join(filter(None, said))  # rules of which nothing is said have no words
         objectives = f"{', '.join(self.objectives[:-1])} and {self.objectives[-1]}"
         return (
-            f"<{type(self).__name__} {self.model.name}: {self.n_var:,} vertices, minimise {objectives}; "
-            f"{', '.join(said)}>"
+            f"<{type(self).__name__} {self.model.name}: {self.n_var:,} vertices, minimise {objectives}"
+            f"{'; ' if besides else ''}{besides}>"
         )
 
     def name(self) -> str:

@@ -18,14 +18,14 @@ from meshsimp_pymoo.cli import main, preparing, searching
 from meshsimp_pymoo.cli.requests import Free, Output, Request, Search, Tiling, Wish
 from meshsimp_pymoo.cli.terminal import Stages
 from meshsimp_pymoo.compiling.store import told_of_compiling
-from meshsimp_pymoo.errors import ModelError, ResultError
+from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.files import read_npz
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import write_mesh, written_formats
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search.checkpoint import read_checkpoint
 from meshsimp_pymoo.surface.closed import embedding, model
-from meshsimp_pymoo.surface.height import HeightSurface
+from meshsimp_pymoo.surface.height import HeightSurface, refit_heights
 from meshsimp_pymoo.surface.kinds import as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.rules import Rules
@@ -350,11 +350,12 @@ def test_what_does_not_go_with_a_closed_surface_is_refused_in_one_line_before_an
             lambda problem: MeshProblem(problem.surface, regions=4),
             "regions=4.*RegionCrossover",
         ),
+        (lambda problem: refit_heights(problem.surface, ~problem.pinned), "a ClosedSurface has no heights"),
         (lambda problem: MeshProblem(problem.model, pin=[[10.0, 20.0]]), r"give \[x, y, z\]"),
     ],
 )
 def test_what_describes_height_surfaces_is_refused_in_python_too(ball, refused, match):
-    with pytest.raises((ValueError, ModelError), match=match) as told:
+    with pytest.raises((ValueError, TypeError), match=match) as told:
         refused(MeshProblem(ball))
     assert "\n" not in str(told.value)
 

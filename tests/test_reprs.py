@@ -104,6 +104,10 @@ F = [[1, 15], [0, 20]]
             SURFACE,
             "<HeightSurface of roof:5: 25 vertices, 4 pinned, error measured; footprint model, outside nearest>",
         ),
+        (
+            MeshProblem("sphere:100"),
+            "<MeshProblem sphere:100: 100 vertices, minimise error and triangles>",
+        ),
         (BODY.model, "<ClosedModel sphere:100: 100 vertices, 196 triangles, 1.981 x 1.981 x 1.978 model units>"),
         (BODY, "<ClosedSurface of sphere:100: 100 vertices, 3 pinned, error measured>"),
         (topology(BODY.faces), "Topology(components=1, loops=0, crowded=0, touching=0, mismatched=0, genus=0)"),

@@ -400,7 +400,7 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
     Raises
     ------
     TypeError
-        If this is no surface but a model, which has no rules.
+        If this is no surface but a model, which has no rules, or a surface of another kind.
     ValueError
         If the subset spans no triangle, or the tolerance is not positive.
 
@@ -416,4 +416,8 @@ def refit_heights(surface: HeightSurface, kept: BoolArray, *, tolerance: float =
     3.0
     """
     require_rules(surface, "refit_heights")
+    if not isinstance(surface, HeightSurface):
+        raise TypeError(
+            f"refit_heights: a {type(surface).__name__} has no heights; call refit of the surface with the mesh itself"
+        )
     return surface.refit(surface.simplify(kept), tolerance=tolerance)

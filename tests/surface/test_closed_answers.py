@@ -267,6 +267,14 @@ def touching() -> SourceMesh:
     return SourceMesh(np.delete(one.points, far, axis=0), faces, {}, "touching")
 
 
+def wound_against(face: int) -> SourceMesh:
+    """Return a sphere with one face turned over."""
+    one = load("sphere:60")
+    faces = one.faces.copy()
+    faces[face] = faces[face, ::-1]
+    return SourceMesh(one.points, faces, {}, "against")
+
+
 def flattened() -> SourceMesh:
     rim = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [1, 2], [0, 2], [0, 1]], float)
     points = np.column_stack([np.concatenate([rim, [[1.0, 1.0], [0.9, 1.1]]]), np.zeros(10)])
@@ -284,6 +292,8 @@ def flattened() -> SourceMesh:
         (finned, r"finned: is not manifold \(1 edge of more than two faces\)"),
         (touching, r"touching: is not manifold \(1 vertex in which several fans of faces meet"),
         (lambda: tube(100), "tube: cannot be flattened: .* coincide and .* flipped"),
+        (lambda: wound_against(3), "against: is not wound alike, or has one side only .3 edges between"),
+        (lambda: dataclasses.replace(load("roof:3"), name="roof"), "roof: is a grid, which has one height .* leave"),
         (flattened, "flattened: all 10 vertices lie in one plane"),
     ],
 )

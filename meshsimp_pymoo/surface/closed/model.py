@@ -72,7 +72,8 @@ class Topology:
                 f"is not manifold ({_count(self.touching, 'vertex', 'vertices')} in which several fans of faces meet)"
             )
         if self.mismatched:
-            return f"has one side only ({_count(self.mismatched, 'edge')} between faces wound against each other)"
+            between = _count(self.mismatched, "edge")
+            return f"is not wound alike, or has one side only ({between} between faces wound against each other)"
         if self.genus:
             return f"has genus {self.genus} ({_count(self.genus, 'handle')}, as a ring has one)"
         return None
@@ -257,6 +258,11 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     ModelWarning
         Of vertices that belong to no face.
     """
+    if source.sort != "mesh":
+        raise ModelError(
+            f"{source.name}: is a {source.sort}, which has one height at each place, and no closed surface; leave "
+            "--surface closed (surface='closed') out"
+        )
     used = np.zeros(len(source.points), bool)
     used[source.faces] = True
     n_unused = len(used) - int(used.sum())
@@ -269,8 +275,8 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     what = topology(source.faces).refusal
     if what is not None:
         raise ModelError(
-            f"{source.name}: {what}; a closed surface is one part without holes, like a sphere: split or fill it in a "
-            "mesh program, or cut out one side as a height surface with --patch front (patch='front')"
+            f"{source.name}: {what}; a closed surface is one part without holes, like a sphere: split, fill or mend it "
+            "in a mesh program, or cut out one side as a height surface with --patch front (patch='front')"
         )
     measured = source.measured.points
     rows = np.flatnonzero(used)
