@@ -33,7 +33,7 @@ from meshsimp_pymoo.surface.closed.model import ClosedModel, closed_model, topol
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.kinds import Model
 from meshsimp_pymoo.surface.model import Mesh, OpenModel, build_model
-from meshsimp_pymoo.surface.orient import Up, front_patch, seen_upright
+from meshsimp_pymoo.surface.orient import Up, front_patch
 from meshsimp_pymoo.surface.repair import Mended, mend
 
 if TYPE_CHECKING:
@@ -113,16 +113,8 @@ def kind_of(source: SourceMesh, options: Options = DEFAULT) -> str:
         return options.surface
     if not _can_be_closed(source, options):
         return "height"
-    if source.is_closed:
-        return "closed"
-    what = topology(source.faces)
-    if not what.is_sphere:
-        return "height"
-    try:
-        refused = seen_upright(source.measured, options.up)[1].refusal is not None
-    except ModelError:
-        refused = True
-    return "closed" if refused else "height"
+    # what has no border is no height field from any side
+    return "closed" if source.is_closed or topology(source.faces).is_sphere else "height"
 
 
 def _can_be_closed(source: SourceMesh, options: Options) -> bool:

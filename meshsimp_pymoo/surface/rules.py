@@ -59,22 +59,24 @@ class Rules:
         None,
         kind=Pins(PINS),
         accepts='"corners", "hull", "border", file rows, positions, or a list of these',
-        doc='Vertices that every mesh keeps, besides the four corners: ``"hull"`` for all on the convex hull, '
-        '``"border"`` for all on the outline and around the holes, so that tiles still fit together, whole '
-        "numbers for rows of the file, or an array of positions (K, 2) in the upright plane or (K, 3) in the file's "
-        "frame.",
-        help="vertices that every mesh keeps beside the corners: the convex hull, the outline and the holes' rims, or "
-        "rows of the file, from 0",
+        doc="Vertices that every mesh keeps, besides the four corners, or of a closed surface the three of one face: "
+        "whole numbers for rows of the file, or an array of positions (K, 3) in the file's frame; of a height surface "
+        '``"hull"`` for all on the convex hull, ``"border"`` for all on the outline and around the holes, so that '
+        "tiles still fit together, or positions (K, 2) in the upright plane, too.",
+        help="vertices that every mesh keeps beside the corners: rows of the file, from 0, or of height surfaces the "
+        "convex hull, or the outline and the holes' rims",
         metavar="hull|border|I,J,...",
     )
     weights: Any = setting(
         None,
         kind=Weights(),
         accepts="str or array, optional",
-        doc="How much each vertex counts in the error: one number for each row of the file, or the name of one of its "
-        "per-vertex attributes; see :meth:`~meshsimp_pymoo.surface.model.OpenModel.with_weights`. 1 by default.",
-        help="per-vertex attribute of the file that says how much each vertex counts in the error (default: all alike)",
-        metavar="NAME",
+        doc='How much each vertex counts in the error: ``"area"`` for the area around it, one number for each row of '
+        "the file, or the name of one of its per-vertex attributes; see "
+        ":meth:`~meshsimp_pymoo.surface.model.OpenModel.with_weights`. 1 by default.",
+        help="how much each vertex counts in the error: the area around it, or what a per-vertex attribute of the file "
+        "says (default: all alike)",
+        metavar="area|NAME",
     )
     break_lines: Any = setting(
         None,

@@ -7,8 +7,8 @@ is the weighted mean of those of its neighbours. With positive weights no face f
 cotangent weights, which make angles in the plane like those on the surface (Pinkall and Polthier [2]_), bounded from
 below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
 
-Seen from the centre of a sphere that touches the plane these are images on the sphere; the Delaunay triangulation of
-any of them with the outside as one more triangle is the convex hull there.
+Seen from the top of a sphere that the plane touches below, these are images on the sphere (stereographically); the
+Delaunay triangulation of any of them with the outside as one more triangle is the convex hull there.
 
 References
 ----------

@@ -2,7 +2,8 @@
 
 The mesh is the Delaunay triangulation of the images that are kept, and the outside as one more triangle. What a vertex
 p costs is d_p, its least distance in space to the triangle that holds its image and to those across its edges: the own
-triangle alone is up to an eighth too far, since images slip along the surface, and no further one is nearer. An image
+triangle alone is up to an eighth too far, since images slip along the surface, and further ones are hardly ever nearer,
+so that d_p is at least the true distance, and as a rule hardly more. An image
 on an edge belongs to the triangle on the left of the edge from its first to its second vertex, so that no walk decides.
 """
 
@@ -25,7 +26,6 @@ from meshsimp_pymoo.surface.closed.model import LEAST_VERTICES
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, REGIONS, SQUARES, TRIANGLES, UNCOVERED, VERTICES
 from meshsimp_pymoo.workers import Reserve, on_threads
 
-NO_SITE = 0xFFFFFFFF
 # In place of the deviations of each vertex, where they are not asked for.
 NO_DEVIATION = np.empty(0, np.float64)
 # Entries of subsets that are evaluated in one go: some tenths of a second.
