@@ -59,6 +59,7 @@ from meshsimp_pymoo.comparison.config import (
 from meshsimp_pymoo.comparison.store import (
     FORMAT,
     RunStore,
+    as_begun,
     claim_experiment,
     fingerprint,
     write_experiment,
@@ -258,6 +259,8 @@ def run_experiment(
     with locked(out, inside=True):
         store = RunStore(out)
         store.clean()
+        begun = [replace(problem, model=as_begun(out, problem.model)) for problem in experiment.problems]
+        experiment = replace(experiment, problems=tuple(begun))
         tasks = plan(experiment)
         finished = _finished(tasks, store)
         content = _content(experiment, tasks, out)

@@ -294,8 +294,7 @@ class RunStore:
 
 def write_model(out: Path, model: Model) -> str:
     """Store a model, unless it is stored already; return its path inside the folder."""
-    path = out / "models" / f"{_file_name(Path(model.name).stem)}.{model.hash[:KEY_DIGITS]}.npz"
-    relative = path.relative_to(out).as_posix()
+    relative = _place_of(model)
     with contextlib.suppress(ResultError):
         read_model(out, relative, model.hash)
         return relative
@@ -305,8 +304,26 @@ def write_model(out: Path, model: Model) -> str:
     if isinstance(model, OpenModel) and model.lines is not None:
         stored |= {LINES + name: part for name, part in model.lines.arrays().items()}
     np.savez_compressed(content, **stored)
-    _put(path, content.getvalue())
+    _put(out / relative, content.getvalue())
     return relative
+
+
+def as_begun(out: Path, model: Model) -> Model:
+    """Return a model in the vector order of the runs in a folder: of a closed surface, with the images stored there.
+
+    Their last bits depend on versions of libraries, and its hash does not know them.
+    """
+    if isinstance(model, ClosedModel):
+        with contextlib.suppress(ResultError):
+            stored = read_model(out, _place_of(model), model.hash)
+            assert isinstance(stored, ClosedModel)
+            return model.with_images(stored.xy, stored.source_index)
+    return model
+
+
+def _place_of(model: Model) -> str:
+    """Return where a model is stored, inside the folder."""
+    return f"models/{_file_name(Path(model.name).stem)}.{model.hash[:KEY_DIGITS]}.npz"
 
 
 def read_model(out: Path, relative: object, expected: str) -> Model:

@@ -19,8 +19,10 @@ from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.errors import ExperimentWarning, ResultError, ToolUnavailable
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.surface.closed import embedding, model
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
+from meshsimp_pymoo.surface.measures import ERROR
 
 BLOB = ClosedSurface(open_model("blob:250"))
 TOOLS = [name for name, known in BASELINES.items() if known.tool and not known.at_borders and name != "pydelatin"]
@@ -47,19 +49,39 @@ def write(folder, text=CONFIG):
 @pytest.mark.parametrize("weights", [None, "area"])
 def test_a_stored_model_is_the_same_with_its_images(tmp_path, weights):
     (tmp_path / "models").mkdir()
-    model = BLOB.model if weights is None else BLOB.model.with_weights(weights)
-    where = write_model(tmp_path, model)
-    again = read_model(tmp_path, where, model.hash)
+    own = BLOB.model if weights is None else BLOB.model.with_weights(weights)
+    where = write_model(tmp_path, own)
+    again = read_model(tmp_path, where, own.hash)
     assert isinstance(again, ClosedModel)
     for name in ("points", "faces", "xy", "pole", "source_index", "file_points", "rotation", "pivot", "weights"):
-        ours, theirs = getattr(model, name), getattr(again, name)
+        ours, theirs = getattr(own, name), getattr(again, name)
         assert ours is theirs is None or (ours.dtype == theirs.dtype and np.array_equal(ours, theirs)), name
     kept = np.random.default_rng(1).random((3, 250)) < 0.3
     kept |= BLOB.pinned
-    assert_array_equal(ClosedSurface(again).evaluate(kept), ClosedSurface(model).evaluate(kept))
-    assert write_model(tmp_path, model) == where
+    assert_array_equal(ClosedSurface(again).evaluate(kept), ClosedSurface(own).evaluate(kept))
+    assert write_model(tmp_path, own) == where
     with pytest.raises(ResultError, match="is not the model that was searched"):
         read_model(tmp_path, where, "0" * 64)
+
+
+def test_an_experiment_goes_on_with_the_images_that_it_began_with(tmp_path, monkeypatch):
+    """Runs of other versions of libraries would have another vector order than those that are there."""
+    begun = """
+        problems: [{name: Blob, model: "blob:120"}]
+        algorithms: [{name: N1, preset: nsga2_v1, parameters: {pop_size: 12}}]
+        seeds: [1]
+        budgets: [{generations: 3}]
+    """
+    with monkeypatch.context() as patch:
+        patch.setattr(model, "embed", lambda points, faces: embedding._embedded(points, faces, faces[7].astype(int)))
+        run_experiment(write(tmp_path, begun), tmp_path / "out")
+    run_experiment(write(tmp_path, begun.replace("[1]", "[1, 2]")), tmp_path / "out")
+    study = Study(tmp_path / "out")
+    surface = study.surface(study.problems[0])
+    assert len(study.all_runs) == 2
+    for run in study.all_runs:
+        kept = np.unpackbits(run.arrays["kept"], axis=1)[:, : surface.n_vertices].astype(bool)
+        assert_array_equal(surface.evaluate(kept)[:, ERROR], run.arrays["F"][:, 0])
 
 
 # ------------------------------------------------------------------------------------------------------- the tools
