@@ -291,7 +291,6 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     found = embed(local, faces)
     _refuse_faults(source.name, found.xy, faces, found.pole)
     rotation = _shown_side(local)
-    n = {"merged": len(source.repeats)}
     model = ClosedModel(
         name=source.name,
         points=local @ rotation.T,
@@ -304,7 +303,7 @@ def closed_model(source: SourceMesh) -> ClosedModel:
         rotation=rotation,
         pivot=pivot,
         repeats=source.repeats,
-        found={what: count for what, count in n.items() if count},
+        found={"merged": len(source.repeats)} if len(source.repeats) else {},
         georeference=source.georeference,
         scale=source.scale,
         material=source.material,

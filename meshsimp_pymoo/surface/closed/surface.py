@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.closed.books import ClosedLive, make_live, with_peaks
@@ -303,13 +303,12 @@ class ClosedSurface:
 
 def _refuse_rules(name: str, rules: Rules) -> None:
     """Refuse what describes height surfaces."""
-    given: list[AnyArray | str] = [what for what in OF_HEIGHTS if getattr(rules, what) is not None]
-    if given:
-        what = str(given[0])
-        raise ModelError(
-            f"{name}: {what}={getattr(rules, what)!r} (--{what} {getattr(rules, what)}) describes height surfaces, and "
-            "this is a closed one, whose meshes cover all of it; leave it out"
-        )
+    for what in OF_HEIGHTS:
+        if (value := getattr(rules, what)) is not None:
+            raise ModelError(
+                f"{name}: {what}={value!r} (--{what} {value}) describes height surfaces, and this is a closed one, "
+                "whose meshes cover all of it; leave it out"
+            )
     if rules.break_lines is not None:
         raise ModelError(
             f"{name}: break lines are for height surfaces, and this is a closed one; leave break_lines "
