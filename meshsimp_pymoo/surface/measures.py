@@ -124,11 +124,12 @@ class Quality:
     surface_error : float
         Mean of the deviation from the original surface between its vertices: at the centroids of the original faces,
         weighted by their area in the plane. Faces without one are left out; uncovered centroids cost what uncovered
-        vertices do. Weights of vertices change nothing [model units].
+        vertices do. Of a closed surface: their distance in space to all of the mesh, weighted by their area there.
+        Weights of vertices change nothing [model units].
     min_angle_median : float
-        Median over the triangles of the least angle of each, in the plane [degrees].
+        Median over the triangles of the least angle of each, in the plane; of a closed surface in space [degrees].
     below_5_degrees : float
-        Share of the triangles whose least angle in the plane is below 5 degrees.
+        Share of the triangles whose least angle, measured so, is below 5 degrees.
     line_max_error : float
         Largest vertical distance of the mesh from a vertex of a break line as it was given. Only where the model has
         break lines [model units].

@@ -43,7 +43,7 @@ class Topology:
     mismatched : int
         Edges whose two faces are wound against each other.
     genus : int or None
-        Number of handles of all parts, if they are closed and manifold.
+        Number of handles of all parts, if every edge has two faces wound alike; fans count as vertices of their own.
     """
 
     components: int
