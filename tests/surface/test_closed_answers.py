@@ -283,6 +283,11 @@ def flattened() -> SourceMesh:
     return SourceMesh(points, np.concatenate([up, np.where(up == 8, 9, up)[:, ::-1]]), {}, "flattened")
 
 
+def smaller(by: float) -> SourceMesh:
+    one = load("sphere:60")
+    return SourceMesh(by * one.points, one.faces, {}, "smaller")
+
+
 @pytest.mark.parametrize(
     ("make", "says"),
     [
@@ -295,6 +300,8 @@ def flattened() -> SourceMesh:
         (lambda: wound_against(3), "against: is not wound alike, or has one side only .3 edges between"),
         (lambda: dataclasses.replace(load("roof:3"), name="roof"), "roof: is a grid, which has one height .* leave"),
         (flattened, "flattened: all 10 vertices lie in one plane"),
+        (lambda: smaller(1e-160), "smaller: extends over 1.97574e-160 only; rescale the model to above 1e-60"),
+        (lambda: smaller(1e-310), "smaller: extends over 1.97574e-310 only"),
     ],
 )
 def test_what_is_no_closed_surface_of_genus_0_is_refused_in_one_line(make, says):

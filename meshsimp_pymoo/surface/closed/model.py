@@ -24,6 +24,9 @@ from meshsimp_pymoo.surface.units import length_unit
 # A mesh of fewer vertices is none.
 LEAST_VERTICES = 4
 LEAST_TRIANGLES = 2 * LEAST_VERTICES - 4
+# Squared areas multiply four lengths: of sides near 1e-77 they leave the range of doubles, and weights and errors are
+# wrong without a word. Sides may be 1e-17 of the box.
+LEAST_EXTENT = 1e-60
 
 
 @dataclass(frozen=True)
@@ -288,6 +291,10 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     local = measured[rows] - pivot
     if not local.any(axis=0).all() or np.linalg.matrix_rank(local - local.mean(axis=0)) < 3:
         raise ModelError(f"{source.name}: all {len(rows)} vertices lie in one plane; a closed surface has a volume")
+    if local.max() < LEAST_EXTENT:
+        raise ModelError(
+            f"{source.name}: extends over {local.max():g} only; rescale the model to above {LEAST_EXTENT:g}"
+        )
     found = embed(local, faces)
     _refuse_faults(source.name, found.xy, faces, found.pole)
     rotation = _shown_side(local)
