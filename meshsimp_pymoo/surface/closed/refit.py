@@ -96,7 +96,8 @@ def _fitted(
     right = A.T @ (root * (across * samples).sum(axis=1) - A @ start)
     normal_matrix = (A.T @ A + pull * sparse.identity(3 * n)).tocsr()
     scaled = linalg.LinearOperator((3 * n, 3 * n), matvec=(1.0 / normal_matrix.diagonal()).__mul__, dtype=float)
-    step, _ = linalg.cg(normal_matrix, right, rtol=CLOSE, maxiter=MOST_STEPS, M=scaled)
+    rounding = np.finfo(float).eps * float(np.linalg.norm(normal_matrix @ start))
+    step, _ = linalg.cg(normal_matrix, right, rtol=CLOSE, atol=rounding, maxiter=MOST_STEPS, M=scaled)
     return np.asarray(start + step).reshape(-1, 3)
 
 

@@ -280,6 +280,8 @@ class ClosedSurface:
         """
         rows, compact = used_rows(mesh.faces)
         n, before = self.n_vertices, mesh.quality.error
+        if before == 0.0:
+            return Refitted(mesh.faces, rows, self.model.file_points[rows], before, before, before)
         weights = np.ones(n) if self.model.weights is None else self.model.weights
         centres, share = self._between
         samples = np.concatenate([self.points, centres])
