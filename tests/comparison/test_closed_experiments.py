@@ -19,6 +19,7 @@ from meshsimp_pymoo.comparison.study import Study
 from meshsimp_pymoo.errors import ExperimentWarning, ResultError, ToolUnavailable
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.problem import MeshProblem
+from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.surface.closed import embedding, model
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
@@ -177,6 +178,7 @@ def test_thinning_finds_the_corners(done):
 
 
 def test_the_report_and_its_pictures_say_nothing_of_what_is_uncovered(done, monkeypatch):
+    monkeypatch.setattr(figures, "BODY_PIXELS", 60)
     monkeypatch.setattr(report, "_save", lambda draw, path: sketch_into(draw(), path))
     out = done[0] / "out"
     study = write_report(out)
