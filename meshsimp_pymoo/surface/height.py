@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.books import Live, make_live, with_peaks
 from meshsimp_pymoo.surface.centroids import Between, between_vertices
@@ -28,7 +28,15 @@ from meshsimp_pymoo.surface.pins import pinned_vertices
 from meshsimp_pymoo.surface.refit import TOLERANCE, least_error
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import line_errors, measured_angles, mesh_deviation, mesh_quality, mesh_samples
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, checked_faces, require_rules
+from meshsimp_pymoo.surface.surface import (
+    ModelSurface,
+    Refitted,
+    Scored,
+    Simplified,
+    View,
+    checked_faces,
+    require_rules,
+)
 from meshsimp_pymoo.workers import Reserve
 
 # A kept vertex of weight 0 counts this share of the mean all the same, so that its refitted height has a value.
@@ -37,7 +45,7 @@ LEAST_WEIGHT = 1e-9
 LARGE = 300_000
 
 
-class HeightSurface:
+class HeightSurface(ModelSurface):
     """An open model and the rules for it; see `Surface` for what its attributes are.
 
     Parameters
@@ -78,36 +86,6 @@ class HeightSurface:
             f"<HeightSurface of {self.model.name}: {self.n_vertices:,} vertices, {int(self.pinned.sum()):,} pinned, "
             f"{rules.measure} measured; {rules.in_words}>"
         )
-
-    @property
-    def n_vertices(self) -> int:
-        """Number N of original vertices."""
-        return self.model.n_vertices
-
-    @property
-    def points(self) -> FloatArray:
-        """The original vertices (N, 3), upright, height along z [model units]."""
-        return self.model.points
-
-    @property
-    def faces(self) -> IntArray:
-        """The original triangles (T, 3), counter-clockwise from above."""
-        return self.model.faces
-
-    @property
-    def diagonal(self) -> float:
-        """Diagonal of the bounding box in space [model units]."""
-        return self.model.diagonal
-
-    @property
-    def total_weight(self) -> float:
-        """Sum of the weights; N without any."""
-        return self.model.total_weight
-
-    @property
-    def neighbours(self) -> Csr:
-        """One-rings of the original, (indptr, indices): those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``."""
-        return self.model.neighbours
 
     @property
     def border(self) -> IntArray:
@@ -214,12 +192,6 @@ class HeightSurface:
             np.concatenate([chain[:1], *(between[pair][1:] for pair in itertools.pairwise(chain.tolist()))])
             for chain in lines.chains
         )
-
-    def selection(self, most: int) -> BoolArray:
-        """Return about ``most`` vertices (N,): the vertices lie along a curve that fills the plane, so every k-th."""
-        selected = self.pinned.copy()
-        selected[:: -(-self.n_vertices // most)] = True
-        return selected
 
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""

@@ -360,6 +360,50 @@ class Surface(Protocol):
         ...
 
 
+class ModelSurface:
+    """What the surfaces of this package hand on from their model; see `Surface` for what it is."""
+
+    model: Any
+    pinned: BoolArray
+
+    @property
+    def n_vertices(self) -> int:
+        """Number N of original vertices."""
+        return int(self.model.n_vertices)
+
+    @property
+    def points(self) -> FloatArray:
+        """The original vertices (N, 3) in the frame of the model, z to the viewer [model units]."""
+        return np.asarray(self.model.points)
+
+    @property
+    def faces(self) -> IntArray:
+        """The original triangles (T, 3), wound alike: counter-clockwise from above, if there is an above."""
+        return np.asarray(self.model.faces)
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box in space [model units]."""
+        return float(self.model.diagonal)
+
+    @property
+    def total_weight(self) -> float:
+        """Sum of the weights; N without any."""
+        return float(self.model.total_weight)
+
+    @property
+    def neighbours(self) -> Csr:
+        """One-rings of the original, (indptr, indices): those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``."""
+        rings: Csr = self.model.neighbours
+        return rings
+
+    def selection(self, most: int) -> BoolArray:
+        """Return about ``most`` vertices (N,): they lie along a curve over the surface, so every k-th."""
+        selected = self.pinned.copy()
+        selected[:: -(-self.n_vertices // most)] = True
+        return selected
+
+
 def checked_faces(faces: Any, n_vertices: int) -> IntArray:
     """Return triangles (M, 3) of N vertices in their one spelling, int32.
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, require_bool
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, require_bool
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.closed.books import ClosedLive, make_live, with_peaks
@@ -25,14 +25,14 @@ from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
 from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
 from meshsimp_pymoo.surface.score import measured_angles, mesh_quality
-from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, View, checked_faces
+from meshsimp_pymoo.surface.surface import ModelSurface, Refitted, Scored, Simplified, View, checked_faces
 from meshsimp_pymoo.workers import Reserve
 
 # From so many vertices on, books and workspaces that are not used are given back: hundreds of bytes a vertex each.
 LARGE = 300_000
 
 
-class ClosedSurface:
+class ClosedSurface(ModelSurface):
     """A closed model and the rules for it; see `Surface` for what its attributes are.
 
     The mesh of a subset is the Delaunay triangulation of its images and the outside as one more triangle: it is
@@ -67,36 +67,6 @@ class ClosedSurface:
             f"<ClosedSurface of {self.model.name}: {self.n_vertices:,} vertices, {int(self.pinned.sum()):,} pinned, "
             f"{self.rules.measure} measured>"
         )
-
-    @property
-    def n_vertices(self) -> int:
-        """Number N of original vertices."""
-        return self.model.n_vertices
-
-    @property
-    def points(self) -> FloatArray:
-        """The original vertices (N, 3) as they are drawn, z to the viewer [model units]."""
-        return self.model.points
-
-    @property
-    def faces(self) -> IntArray:
-        """The original triangles (T, 3)."""
-        return self.model.faces
-
-    @property
-    def diagonal(self) -> float:
-        """Diagonal of the bounding box in space [model units]."""
-        return self.model.diagonal
-
-    @property
-    def total_weight(self) -> float:
-        """Sum of the weights; N without any."""
-        return self.model.total_weight
-
-    @property
-    def neighbours(self) -> Csr:
-        """One-rings of the original, (indptr, indices): those of vertex i are ``indices[indptr[i]:indptr[i + 1]]``."""
-        return self.model.neighbours
 
     @property
     def border(self) -> IntArray:
@@ -168,12 +138,6 @@ class ClosedSurface:
             live = with_peaks(lent) if ground.by_peak else lent
             build(ground, live, np.flatnonzero(kept), self.model.name)
             yield live
-
-    def selection(self, most: int) -> BoolArray:
-        """Return about ``most`` vertices (N,): they lie along a curve over the surface, so every k-th."""
-        selected = self.pinned.copy()
-        selected[:: -(-self.n_vertices // most)] = True
-        return selected
 
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""
