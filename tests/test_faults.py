@@ -513,9 +513,9 @@ def test_a_signal_is_answered_while_a_kernel_runs(tmp_path):
                 state[0] = (state[0] * 6364136223846793005 + k) % 1000003
         kernel(1, np.ones(1, np.int64))
         state = np.ones(1, np.int64)
-        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM)).start()
         try:
             with interruptible(), answering("stopping soon"):
+                threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGTERM)).start()
                 kernel(200_000_000, state)
                 time.sleep(0)
         except KeyboardInterrupt:
