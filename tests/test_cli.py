@@ -1382,7 +1382,7 @@ def test_a_share_of_the_triangles_is_resolved_when_the_original_is_known(tmp_pat
     assert "making the pictures that are missing" in capsys.readouterr().err
     np.save(tmp_path / "grid.npy", np.random.default_rng(1).random((70, 80)))
     tiled = ("simplify", tmp_path / "grid.npy", "--tile", "64", "-o", tmp_path / "tiles", "--triangles", "0.5%")
-    assert run(*tiled, "--no-page") == 0
+    assert run(*tiled, "--no-page", "--jobs", "1") == 0
     stored = json.loads((tmp_path / "tiles" / "run.json").read_text())
     assert stored["settings"]["triangles"] == 54  # of 2 x 69 x 79 = 10902
     capsys.readouterr()

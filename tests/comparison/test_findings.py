@@ -58,8 +58,7 @@ def finding(study: Study, claim: str, indicator: str, procedure: str = "runs", s
     return found
 
 
-def verdicts(study: Study, procedure: str = "runs") -> dict[tuple[str, str], str]:
-    found = findings(study, BUDGET, "nearest")
+def verdicts(found: list[Finding], procedure: str = "runs") -> dict[tuple[str, str], str]:
     return {(f.claim.key, f.indicator): f.verdict for f in found if f.procedure == procedure}
 
 
@@ -68,8 +67,9 @@ def test_what_the_paper_found_is_found_where_it_is_planted(tmp_path):
     meshes = [(500.0, 10.0, True), (300.0, 20.0, True)]
     classic = {model: {"quadric_collapse": meshes, "vertex_clustering": meshes} for model in SIX}
     planted = study(tmp_path, levels, models=SIX, sizes={"MD": 5}, classic=classic)
+    all_found = findings(planted, BUDGET, "nearest")
     for procedure in ("runs", "merged"):
-        found = verdicts(planted, procedure)
+        found = verdicts(all_found, procedure)
         for claim in ("multi_over_single", "best_over_v2", "multi_over_classic", "single_over_classic"):
             assert found[claim, "hvr"] == found[claim, "epsilon_optimal"] == HOLDS
             assert found[claim, "epsilon"] == HOLDS
@@ -86,8 +86,9 @@ def test_the_opposite_is_found_where_that_is_planted(tmp_path):
     levels = {"N1": 2.0, "MD": 3.0, "N2": 1.8, "G1": 1.0, "G2": 1.5}
     classic = {model: {"quadric_collapse": [(90.0, 9.0, True), (9.0, 59.0, True)]} for model in SIX}
     planted = study(tmp_path, levels, models=SIX, classic=classic, sizes={"MD": 8})
+    all_found = findings(planted, BUDGET, "nearest")
     for procedure in ("runs", "merged"):
-        found = verdicts(planted, procedure)
+        found = verdicts(all_found, procedure)
         for claim in ("multi_over_single", "best_over_v2", "multi_over_classic", "ga_v2_over_v1", "nsga2_and_moead"):
             assert found[claim, "hvr"] == DOES_NOT_HOLD, (claim, procedure)
         assert found["multi_over_single", "epsilon"] == found["ga_v2_over_v1", "epsilon"] == DOES_NOT_HOLD
@@ -131,7 +132,7 @@ def test_methods_are_compared_with_those_that_start_alike(tmp_path):
 
 
 def test_equal_methods_do_not_differ(tmp_path):
-    found = verdicts(study(tmp_path, {"N1": 1.0, "MD": 1.0}))
+    found = verdicts(findings(study(tmp_path, {"N1": 1.0, "MD": 1.0}), BUDGET, "nearest"))
     assert found["nsga2_and_moead", "hvr"] == HOLDS
     assert found["nsga2_and_moead", "epsilon_optimal"] == HOLDS
     assert found["best_over_v2", "hvr"] == UNDECIDED  # there is no v2
@@ -141,7 +142,7 @@ def test_the_papers_own_settings_stand_for_a_preset(tmp_path):
     s = study(tmp_path, {"MD normalised": 1.0, "N1": 1.0, "MD": 3.0})
     (start,) = s.starts
     assert start.roles == {"nsga2_v1": "N1", "moead": "MD"}
-    assert verdicts(s)["nsga2_and_moead", "hvr"] == DOES_NOT_HOLD
+    assert verdicts(findings(s, BUDGET, "nearest"))["nsga2_and_moead", "hvr"] == DOES_NOT_HOLD
 
 
 def test_an_indicator_that_tells_nothing_apart_proves_no_equality(tmp_path):

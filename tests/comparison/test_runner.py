@@ -446,26 +446,38 @@ def spoil_swapped(path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        spoil_truncated, spoil_missing, spoil_swapped,
-        *(pytest.param(one, marks=pytest.mark.slow) for one in (spoil_record, spoil_number, spoil_arrays)),
-        *(pytest.param(one, marks=pytest.mark.slow) for one in (spoil_rewritten, spoil_empty)),
-    ],
+SPOILS = (
+    spoil_truncated, spoil_missing, spoil_swapped, spoil_record, spoil_number, spoil_arrays, spoil_rewritten,
+    spoil_empty,
 )  # fmt: skip
-def test_a_damaged_result_is_named_left_out_and_done_again(spoil, config, stored, reference):
-    record = record_of(stored, problem="Face", algorithm="N2", seed=2, budget="6 generations")
-    damaged = spoil(record)
+
+
+@pytest.mark.parametrize(
+    "spoils",
+    [
+        {("N2", 3): spoil_swapped, ("N2", 2): spoil_truncated, ("N1", 2): spoil_missing},
+        *(pytest.param({("N2", 2): one}, marks=pytest.mark.slow) for one in SPOILS),
+    ],
+)
+def test_a_damaged_result_is_named_left_out_and_done_again(spoils, config, stored, reference):
+    records = [
+        record_of(stored, problem="Face", algorithm=name, seed=seed, budget="6 generations") for name, seed in spoils
+    ]
+    damaged = [spoil(record).name for spoil, record in zip(spoils.values(), records, strict=True)]
     with pytest.warns(ExperimentWarning, match="left out of the report") as caught:
         write_tables(study := Study(stored))
-    assert any(damaged.name in line for line in study.damaged)
-    assert any("Face / N2 / seed 2" in str(w.message) for w in caught)
-    assert 2 not in study.cases["Face", "6 generations", "searched"].runs["N2"]
-    assert 2 in study.cases["Face", "60 evaluations", "searched"].runs["N2"]
-    with pytest.warns(ExperimentWarning, match=f"{damaged.name}.*computed again"):
+    first = min(f"Face / {method} / seed {seed}" for method, seed in spoils)
+    more = f" and {len(spoils) - 1} more" if len(spoils) > 1 else ""
+    assert any(f"missing: {first} / 6 generations{more}" in str(w.message) for w in caught)
+    for (method, seed), file in zip(spoils, damaged, strict=True):
+        assert any(file in line for line in study.damaged)
+        assert seed not in study.cases["Face", "6 generations", "searched"].runs[method]
+        assert seed in study.cases["Face", "60 evaluations", "searched"].runs[method]
+    with pytest.warns(ExperimentWarning, match="computed again") as caught:
         done = run_experiment(config, stored)
-    assert done.finished == 1
+    for file in damaged:
+        assert any(re.search(f"{re.escape(file)}.*computed again", str(w.message)) for w in caught)
+    assert done.finished == len(spoils)
     write_tables(Study(stored))
     assert results(stored) == results(reference)
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from meshsimp_pymoo.compiling.draws import below, unit
 from meshsimp_pymoo.compiling.functions import OPTIONS
 from meshsimp_pymoo.compiling.linking import EntryCompiler, is_known
 from meshsimp_pymoo.formats.options import Options
@@ -57,50 +56,47 @@ def opened(name):
 
 
 @compiled
-def walk(record, lent, fixed, steps, state, least, most):
-    """Make random moves; return the largest difference between a change that was tried and the one made.
+def step(record, lent, v, w, limit, done):
+    """Try to exchange v for w, or do it.
 
-    In between the number of sites changes, from ``least`` to ``most``.
+    Returns the change of the cost and of the triangles that is announced; cost and triangles before and after.
     """
     ground, books = borrowed(record), borrowed(lent)
-    n = len(fixed)
-    worst = 0.0
-    for _ in range(steps):
-        v = below(state, n)
-        while fixed[v] or not moves.is_site(ground, books, v):
-            v = v + 1 if v + 1 < n else 0
-        w = below(state, n)
-        while moves.is_taken(ground, books, w):
-            w = w + 1 if w + 1 < n else 0
-        kind = unit(state)
-        sites = moves.n_sites(ground, books)
-        if kind < 0.25 and sites < most:
-            v = -1
-        elif kind < 0.5 and sites > least:
-            w = -1
-        before = moves.total_cost(ground, books)
-        change, triangles = moves.try_exchange(ground, books, v, w, np.inf)
-        size = moves.n_triangles(ground, books)
-        if not moves.exchange(ground, books, v, w):
-            return np.inf
-        if moves.n_triangles(ground, books) - size != triangles:
-            return np.inf
-        worst = max(worst, abs(moves.total_cost(ground, books) - before - change))
-    return worst
+    before, size = moves.total_cost(ground, books), moves.n_triangles(ground, books)
+    change, triangles = moves.try_exchange(ground, books, v, w, limit)
+    if done and not moves.exchange(ground, books, v, w):
+        change = np.inf
+    return change, triangles, before, size, moves.total_cost(ground, books), moves.n_triangles(ground, books)
+
+
+def tried(ground, books, v, w, limit):
+    return step(ground, books, v, w, limit, False)[:2]
 
 
 def check_moves(name, measure, steps, every, *, weighted=False):
+    """Make random moves, also such that insert and remove, between 5 and 200 sites."""
     surface = surface_of(name, measure, weighted)
     kept = surface.pinned.copy()
     kept[:: surface.n_vertices // 60] = True
-    ground, state = surface.ground(), np.array([1], np.uint64)
+    ground, rng = surface.ground(), np.random.default_rng(1)
     with surface.books(kept) as books:
-        for _ in range(steps // every):
-            difference = walk(ground, books, surface.pinned, every, state, 5, 200)
+        for number in range(1, steps + 1):
+            v, w = rng.choice(np.flatnonzero(kept & ~surface.pinned)), rng.choice(np.flatnonzero(~kept))
+            kind = rng.random()
+            if kind < 0.25 and kept.sum() < 200:
+                v = -1
+            elif kind < 0.5 and kept.sum() > 5:
+                w = -1
+            change, triangles, before, size, after, new_size = step(ground, books, int(v), int(w), np.inf, True)
+            assert new_size - size == triangles
+            assert abs(after - before - change) <= 1e-9 * (1.0 + after)
+            kept[[row for row in (v, w) if row >= 0]] ^= True
+            if number % every:
+                continue
             sites, cost, triangles = moves.snapshot(ground, books, surface.n_vertices)
-            row = surface.evaluate(sites)[0]
-            assert triangles == row[TRIANGLES] == 2 * sites.sum() - 4
-            assert difference <= 1e-9 * (1.0 + cost)
+            assert np.array_equal(sites, kept)
+            row = surface.evaluate(kept)[0]
+            assert triangles == row[TRIANGLES] == 2 * kept.sum() - 4
             if measure == "max_error":
                 assert books.peaks[1] == pytest.approx(row[MAXIMUM], rel=1e-12)
             else:
@@ -135,11 +131,6 @@ def test_a_change_above_the_limit_is_given_up_and_one_below_it_is_not():
         assert tried(ground, books, v, -1, 1.001 * change) == (change, -2)
         assert tried(ground, books, v, -1, 0.5 * change)[0] == np.inf
         assert tried(ground, books, v, -1, np.inf)[0] == change  # nothing is left of what was given up
-
-
-@compiled
-def tried(ground, books, v, w, limit):
-    return moves.try_exchange(borrowed(ground), borrowed(books), v, w, limit)
 
 
 @pytest.mark.parametrize("measure", COLUMN)
