@@ -17,7 +17,7 @@ TRIANGLES = 1124
 
 
 def searched(problem):
-    return minimize(problem, memetic(24), Moves(400_000), seed=1)
+    return minimize(problem, memetic(24), Moves(150_000), seed=1)
 
 
 def best(result, triangles):
@@ -36,11 +36,11 @@ def front(lined):
 
 
 def test_every_mesh_of_a_front_has_all_forced_edges_and_keeps_to_the_tolerance(lined, front):
-    forced = {tuple(edge) for edge in lined.model.lines.segments.tolist()}
+    forced = lined.model.lines.segments @ [lined.n_var, 1]
     assert len(front.X) > 15
     for row in front.X:
         mesh = lined.simplify(row)
-        assert forced <= {tuple(edge) for edge in edge_table(mesh.faces).ends.tolist()}
+        assert np.isin(forced, edge_table(mesh.faces).ends @ [lined.n_var, 1]).all()
         assert 0.0 <= mesh.quality.line_mean_error <= mesh.quality.line_max_error <= TOLERANCE
 
 

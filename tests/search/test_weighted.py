@@ -30,7 +30,7 @@ Make = Callable[..., Any]
 @pytest.mark.parametrize("w", [0.0, 0.004, 0.02, 1.0])
 def test_the_weighted_ga_finds_the_best_weighted_sum(make: Make, w: float) -> None:
     problem = GridProblem(4)
-    result = minimize(problem, make(w, pop_size=40), ("n_gen", 60), seed=1)
+    result = minimize(problem, make(w, pop_size=40), ("n_gen", 30), seed=1)
     assert_allclose(weighted_sum(result.F, w), [weighted_sum(front_of(problem), w).min()])
 
 
