@@ -23,7 +23,9 @@ from __future__ import annotations
 import contextlib
 import json
 import random
+import re
 import resource
+import select
 import shutil
 import signal
 import subprocess
@@ -186,7 +188,8 @@ def test_a_killed_search_goes_on_and_says_so(tmp_path, whole, monkeypatch, capsy
     step = NSGA2._initialize_infill
     monkeypatch.setattr(NSGA2, "_initialize_infill", lambda self: begun.append(1) or step(self))
     assert run("simplify", *SEARCH, *BUDGET, "-o", out, "--no-page", "--meshes", "none") == 0
-    assert "out holds a search that was stopped after 5 generations, 100 evaluations, 0 s; going on" in one_line(capsys)
+    said = r"out holds a search that was stopped after 5 generations, 100 evaluations, \d+ s; going on"
+    assert re.search(said, one_line(capsys))
     assert begun == []
     assert reproducible(out) == whole
     assert sorted(entry.name for entry in out.iterdir()) == ["front.csv", "front.npz", "front.png", "run.json"]
@@ -524,9 +527,8 @@ def test_a_signal_is_answered_while_a_kernel_runs(tmp_path):
     call = [sys.executable, "-c", code]
     with subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
         assert process.stderr.readline() == "meshsimp: stopping soon\n"
-        answered = time.perf_counter()
+        assert select.select([process.stdout], [], [], 0.0)[0] == []  # the kernel is still at work
         assert process.stdout.readline() == "stopped\n"
-        assert time.perf_counter() - answered > 0.2  # the kernel was still at work
 
 
 def test_a_signal_that_meets_a_place_that_can_raise_nothing_is_raised_after_it(capsys):
@@ -538,7 +540,7 @@ def test_a_signal_that_meets_a_place_that_can_raise_nothing_is_raised_after_it(c
     with interruptible():
         del thing
         with pytest.raises(KeyboardInterrupt):
-            time.sleep(1.0)
+            time.sleep(20.0)
         assert interrupted_code() == 130
     assert capsys.readouterr().err == "meshsimp: stopping\n"
 

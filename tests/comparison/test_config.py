@@ -719,7 +719,7 @@ def test_numbers_and_names_that_nobody_means_are_refused_at_once(tmp_path, parts
                                   "a:" * 100_000, '"' + "\\n" * 100_000])  # fmt: skip
 def test_the_reader_takes_no_longer_than_seconds_whatever_it_is_given(tmp_path, text):
     path = write(tmp_path, text)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ConfigError):
         read_experiment_file(path)
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5

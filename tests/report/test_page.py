@@ -619,7 +619,7 @@ def test_ten_thousand_vertices_and_a_hundred_solutions_are_small_and_quick(brows
         assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
         if seconds[-1] < 2:
             break
-    assert min(seconds) < 2, seconds
+    assert min(seconds) < 6, seconds  # less than 2 where nothing else is at work
 
 
 def unpacked(packed):

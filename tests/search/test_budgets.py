@@ -24,21 +24,24 @@ def test_numbers_are_spread_as_far_as_they_go(n):
 
 
 def compiled(seconds):
-    """Tell the listeners that something was compiled just now."""
+    """Tell the listeners that something was compiled just now, and return how long it took."""
     for told in list(store._listeners):
         told(None, None)
+    begun = time.perf_counter()
     time.sleep(seconds)
+    took = time.perf_counter() - begun
     for told in list(store._listeners):
-        told(None, seconds)
+        told(None, took)
+    return took
 
 
 def test_the_clock_of_a_search_does_not_count_compiling():
     algorithm = SimpleNamespace(start_time=100.0)
     with compiling_left_out(algorithm):
-        compiled(0.01)
-    assert algorithm.start_time == 100.01
+        took = compiled(0.01)
+    assert algorithm.start_time == 100.0 + took
     compiled(0.01)
-    assert algorithm.start_time == 100.01
+    assert algorithm.start_time == 100.0 + took
 
 
 def test_moves_stop_after_their_time_without_that_of_compiling():
@@ -49,7 +52,7 @@ def test_moves_stop_after_their_time_without_that_of_compiling():
         while not stop[0]:
             assert time.perf_counter() - begun < 5
             time.sleep(0.005)
-    assert 0.25 < time.perf_counter() - begun < 2.0
+    assert 0.25 < time.perf_counter() - begun < 5.0
 
 
 def test_without_a_limit_nothing_stops():
@@ -89,7 +92,7 @@ def test_searches_keep_their_time(algorithm):
     limit = ("time", 0.6) if algorithm is memetic else WholeGenerations(0.6)
     begun = time.perf_counter()
     result = minimize(problem, algorithm(20), limit, seed=1)
-    assert 0.3 < time.perf_counter() - begun < 2.0
+    assert 0.3 < time.perf_counter() - begun < 5.0
     assert len(result.F) > 5
 
 

@@ -422,11 +422,11 @@ def test_time_ends_it():
     problem = MeshProblem("face:200")
     begun = time.perf_counter()
     result = minimize(problem, memetic(20, triangulation="free"), TimeBasedTermination(0.6), seed=1)
-    assert time.perf_counter() - begun < 3.0
+    assert time.perf_counter() - begun < 6.0
     assert Front.from_result(result).n_free > 0
     begun = time.perf_counter()
     assert Front.from_result(result)[::4].free(time=0.8).n_free > 0
-    assert time.perf_counter() - begun < 2.0
+    assert time.perf_counter() - begun < 4.0
 
 
 def test_what_is_left_out_is_said(monkeypatch, problem):
