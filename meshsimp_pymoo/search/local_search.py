@@ -71,10 +71,7 @@ PASSES, VISIT = 8, 4_000
 
 @inner
 def _urgent(g: Any, live: Any, first: int, n: int, state: np.ndarray) -> int:
-    """Draw a vertex that is no site, of the n from ``first`` on, from the triangle with the largest error of a few.
-
-    -1: none was met.
-    """
+    """Draw a vertex that is no site, of n from ``first`` on, in the triangle with the largest error of a few; or -1."""
     best = -1
     most = -1.0
     for _ in range(FAR_TRIES):
@@ -130,7 +127,7 @@ def anneal(
     differs: np.ndarray,
     changed: np.ndarray,
 ) -> None:
-    """Walk among the subsets of at most ``most`` triangles; ``differs`` tells which vertices the best one has otherwise.
+    """Walk among the subsets of at most ``most`` triangles; let ``differs`` be True where the best one is not the last.
 
     ``made[0]`` is lowered to the moves that were made where ``stop`` ended them. ``movable`` and ``changed`` are room.
     """
