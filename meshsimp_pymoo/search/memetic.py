@@ -47,18 +47,30 @@ from meshsimp_pymoo.search.free import (
     steps_between,
 )
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
+from meshsimp_pymoo.search.local_search import LARGE as LARGE_MOVES
 from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start, at_hand
 from meshsimp_pymoo.surface.rules import USUAL_RATIO
 from meshsimp_pymoo.surface.surface import Surface, freedom_of, movable_ground
-from meshsimp_pymoo.workers import on_threads
+from meshsimp_pymoo.workers import on_threads, threads_for
 
-# Rungs that get a child in the same generation.
+# Rungs that get a child in the same generation; and generations that pass so many of the largest rungs, which have most
+# of the moves, before the others have their turn. They are much alike: where one of them had all smaller rungs beside
+# it, eight cores would wait for it half of the time.
 CHAINS = 16
-# Above this share of the vertices a rung gets no more moves than there, however many it keeps.
+TOP_GENERATIONS = 3
+# Above this share of the vertices a rung gets no more moves than there, however many it keeps; of large models, for
+# which there is little time, the fewer the more it keeps, and with a deadline none unless there is one for each of its
+# vertices: building its mesh takes longer.
 FULL_SHARE = 0.25
+# Vertices of the model for each kept one from which on looking at them takes most of a move's time. A rung of a large
+# model has the fewer moves for each kept vertex the more there are, by the root of what they take.
+CROWD = 15.0
+BEGINNING = 2.0
+# What building a rung's mesh, thinning and measuring it take about, in moves: for each vertex, and each kept one.
+BUILDING = (0.35, 3.0)
 # Temperatures, in units of the error per kept vertex, and the share left in the end: where a chain begins, and below.
 FRESH = (0.3, 0.03)
 AGAIN = (0.15, 0.1)
@@ -69,17 +81,21 @@ MOVES_PER_VERTEX = (20.0, 1000.0)
 # any is timed.
 FIRST_SHARE = 0.12
 SLOWEST = 4000.0
-SECONDS_A_MOVE = 2e-6
+SECONDS_A_MOVE = 7.5e-7
+# Large models have no quick sweep where there are fewer moves than these for each kept vertex: meshes of all rungs are
+# built, thinned and measured in either sweep, which takes as long as some ten moves for each.
+ONE_SWEEP = 150.0
 # What measuring a subset takes for each vertex of the model, about [s]; and the share of the time that measuring the
-# first population may take, which has so many individuals all the same.
+# first population may take, which has so many individuals all the same, and the ladder as many rungs: in a sweep each
+# takes some five times as long to be built, thinned and measured.
 SECONDS_A_VERTEX = 8e-8
-FIRST_MEASURED = 0.15
-FEWEST = 8
+FIRST_MEASURED = 0.04
+FEWEST = 16
 # Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs; but
 # never more than the second share.
 LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
-MOST_SHARE = 0.3
+MOST_SHARE = 0.25
 # With free meshes as much again of the time, and seconds a million vertices, for measuring what they are to be better
 # than; large models have nothing to be filled then but what their thinning has.
 FREE_SECONDS = 25.0
@@ -175,8 +191,10 @@ class DownTheLadder(Mating):
         self.shares = shares
         self.sweep = 0
         self.step = 0
+        self.first_share = FIRST_SHARE
         self.moves_done = 0
-        self.seconds = 0.0
+        self.effort = 0.0
+        self.begun = 0.0
 
     def do(
         self,
@@ -192,18 +210,31 @@ class DownTheLadder(Mating):
         rungs = self.ladder.rungs
         assert rungs is not None
         rows = self.ladder.best(problem, pop)
-        # Rungs from the largest down, cut into chains; each chain does one rung a generation.
-        chains = [chain for chain in np.array_split(np.arange(len(rungs))[::-1], self.n_chains) if len(chain)]
-        turn = np.array([chain[self.step] for chain in chains if self.step < len(chain)])
+        sweep = turns(len(rungs), self.n_chains)
+        turn, is_first = sweep[self.step]
         turn = turn[rows[turn] >= 0]
         # A chain begins with its own first rung, shaken thoroughly, and hands the result down.
-        fresh = self.step == 0 or not self.inherit
+        fresh = is_first or not self.inherit
         temperature, cooling = FRESH if fresh else AGAIN
         temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
+        work, kept = self._work(problem, pop, rows)
+        if problem.n_var >= LARGE_MOVES and self.inherit:
+            work[np.concatenate([rungs for rungs, is_first in sweep if is_first])] *= BEGINNING
+        effort, building = _effort(problem, kept)
+        moves = self._moves(
+            problem,
+            algorithm,
+            work,
+            effort,
+            building,
+            kept,
+            turn,
+            np.concatenate([turn for turn, _ in sweep[self.step :]]),
+        )
+        if problem.n_var >= LARGE_MOVES and time_limit(algorithm) is not None:
+            turn, moves = turn[moves > 0], moves[moves > 0]
         parents = rows[turn if fresh else turn + 1]
-        moves = self._moves(algorithm, self._work(problem, pop, rows), turn, chains)
         limit = time_limit(algorithm, _subsets_share(algorithm))
-        begun = time.perf_counter()
         children = relocate_all(
             problem.surface,
             np.array([individual.X for individual in pop[parents]]),
@@ -216,58 +247,113 @@ class DownTheLadder(Mating):
             cooling=cooling,
             shares=self.shares,
         )
-        self.seconds += time.perf_counter() - begun
         self.moves_done += int(moves.sum())
+        self.effort += float((moves * effort[turn] + building[turn]).sum())
         self.step += 1
-        if self.step >= max(len(chain) for chain in chains):
+        if self.step >= len(sweep):
             self.step = 0
             self.sweep += 1
         return self.eliminate_duplicates.do(Population.new(X=children), pop)
 
     @staticmethod
-    def _work(problem: Any, pop: Population, rows: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the moves of each rung if there is one for each kept vertex, up to a share of all vertices."""
+    def _work(problem: Any, pop: Population, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return each rung's share of the moves, of a small one as many as it keeps vertices, and how many it keeps."""
         movable = ~problem.pinned
-        kept = np.array([np.count_nonzero(individual.X & movable) for individual in pop])[np.maximum(rows, 0)]
-        return np.minimum(np.maximum(kept, 1), FULL_SHARE * problem.n_var)
+        n_kept = np.array([np.count_nonzero(individual.X & movable) for individual in pop])[np.maximum(rows, 0)]
+        n_kept, full = np.maximum(n_kept, 1), FULL_SHARE * problem.n_var
+        work = np.minimum(n_kept, full)
+        if problem.n_var >= LARGE_MOVES:
+            work *= (full / np.maximum(n_kept, full)) ** 2 / np.sqrt(_effort(problem, n_kept)[0])
+        return work, n_kept
 
     def _moves(
         self,
+        problem: Any,
         algorithm: Any,
         work: NDArray[np.float64],
+        effort: NDArray[np.float64],
+        building: NDArray[np.float64],
+        kept: NDArray[np.int64],
         turn: NDArray[np.int64],
-        chains: list[NDArray[np.int64]],
+        still: NDArray[np.int64],
     ) -> NDArray[np.int64]:
-        """Return the moves of the rungs whose turn it is, given the work of all rungs."""
-        left = sum(work[chain[self.step :]].sum() for chain in chains)
+        """Return the moves of the rungs whose turn it is, given of all rungs the work and what that takes.
+
+        ``still`` are those that are left in a sweep.
+        """
         within = part_of(getattr(algorithm, "termination", None), Moves)
         share = _subsets_share(algorithm)
         deadline = time_limit(algorithm, share)
-        if within is None or deadline is not None:
-            moves = np.ceil(self._pace(deadline, work.sum(), left) * work[turn])
-        if within is not None:
-            planned = self._share_of(round(share * within.n_max_moves), work[turn], left)
+        n_within = None if within is None else round(share * within.n_max_moves)
+        if deadline is not None and not self.effort:
+            self.begun = time.time() - algorithm.start_time
+        spent = 0.0 if deadline is None else time.time() - algorithm.start_time - self.begun
+        a_unit = spent / self.effort if self.effort else SECONDS_A_MOVE / threads_for(len(turn))
+        effort = work * effort
+        if self.sweep == self.step == 0 and problem.n_var >= LARGE_MOVES:
+            pace = np.inf if deadline is None else (deadline[1] / a_unit - building.sum()) / effort.sum()
+            if min(pace, np.inf if n_within is None else n_within / work.sum()) < ONE_SWEEP:
+                self.first_share = 1.0
+        if n_within is None or deadline is not None:
+            pays = np.ones(len(work), np.bool_)
+            for _ in range(1 + (deadline is not None and problem.n_var >= LARGE_MOVES)):
+                left = still[pays[still]]
+                pace = self._pace(deadline, effort[left].sum() * a_unit, building[left].sum() * a_unit, work.sum())
+                pays = (pace * work >= kept) | (kept <= FULL_SHARE * problem.n_var)
+            moves = np.where(pays, np.ceil(pace * work), 0)[turn]
+        if n_within is not None:
+            planned = self._share_of(n_within, work[turn], work[still].sum())
             moves = planned if deadline is None else np.minimum(moves, planned)
         return moves.astype(np.int64)
 
-    def _pace(self, deadline: tuple[float, float, float] | None, whole: float, left: float) -> float:
-        """Return the moves for each kept vertex, given the work of a whole sweep and of what is left of it."""
+    def _pace(self, deadline: tuple[float, float, float] | None, one: float, rest: float, whole: float) -> float:
+        """Return the moves for each kept vertex.
+
+        On what is left of a sweep one for each takes ``one`` seconds, and all but the moves ``rest``.
+        """
         if deadline is None:
             lowest, highest = MOVES_PER_VERTEX
             given = self.moves_per_vertex
             first = min(max(TOTAL_MOVES / whole, lowest), highest) if given is None else given
             return min(first * 2.0**self.sweep, max(first, highest))
-        a_move = self.seconds / self.moves_done if self.moves_done else SECONDS_A_MOVE
         span, remaining, _ = deadline
         if self.sweep == 0:
-            remaining -= (1.0 - FIRST_SHARE) * span
-        return min(max(remaining / (a_move * left), 1.0), SLOWEST)
+            remaining -= (1.0 - self.first_share) * span
+        return min(max((remaining - rest) / one, 1.0), SLOWEST)
 
     def _share_of(self, n_moves: int, work: NDArray[np.float64], left: float) -> NDArray[np.float64]:
         """Return the moves of rungs of so much work out of a number for the whole search, which they never exceed."""
-        of_sweep = round(FIRST_SHARE * n_moves) if self.sweep == 0 else n_moves
+        of_sweep = round(self.first_share * n_moves) if self.sweep == 0 else n_moves
         whole = min(round((of_sweep - self.moves_done) * (work.sum() / left)), int(SLOWEST * work.sum()))
         return np.diff(np.round(np.cumsum(work) / work.sum() * whole), prepend=0.0)
+
+
+def _effort(problem: Any, n_kept: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return about how long a move takes on meshes that keep so many vertices, and all but the moves of a rung.
+
+    In units of a move on a mesh that keeps most vertices.
+    """
+    return 1.0 + problem.n_var / (CROWD * n_kept), BUILDING[0] * problem.n_var + BUILDING[1] * n_kept
+
+
+def turns(n_rungs: int, n_chains: int = CHAINS) -> list[tuple[NDArray[np.int64], bool]]:
+    """Return the rungs that have their turn in each generation of a sweep, and whether their chains begin with them.
+
+    Rungs from the largest down are cut into chains, each of which does one rung a generation: the largest ones into
+    short chains, then the others.
+
+    Examples
+    --------
+    >>> [(rungs.tolist(), is_first) for rungs, is_first in turns(9, 2)]
+    [([8, 6], True), ([7, 5], False), ([4, 1], True), ([3, 0], False), ([2], False)]
+    """
+    order = np.arange(n_rungs)[::-1]
+    found = []
+    for part in np.split(order, [min(TOP_GENERATIONS * n_chains, n_rungs)]):
+        chains = [chain for chain in np.array_split(part, n_chains) if len(chain)]
+        for step in range(max(map(len, chains), default=0)):
+            found.append((np.array([chain[step] for chain in chains if step < len(chain)]), step == 0))
+    return found
 
 
 def time_limit(algorithm: Any, share: float = 1.0) -> tuple[float, float, float] | None:
@@ -331,11 +417,14 @@ class MemeticSearch(GeneticAlgorithm):
             freedom_of(surface, "free meshes", centroids=self.free.centroids)
         super()._setup(problem, **kwargs)
 
-    def _initialize_infill(self) -> Population:
+    @property
+    def _n_rungs(self) -> int:
+        """How many rungs there are, and individuals in the beginning: with a deadline no more than fit."""
         seconds, n = seconds_given(self), self.pop_size
-        if seconds is not None:
-            n = min(n, max(measurable(self.problem, FIRST_MEASURED * seconds), FEWEST))
-        return self.initialization.do(self.problem, n, algorithm=self, random_state=self.random_state)
+        return n if seconds is None else min(n, max(measurable(self.problem, FIRST_MEASURED * seconds), FEWEST))
+
+    def _initialize_infill(self) -> Population:
+        return self.initialization.do(self.problem, self._n_rungs, algorithm=self, random_state=self.random_state)
 
     def _initialize_advance(self, infills: Any = None, **kwargs: Any) -> None:
         ladder = self.survival
@@ -343,7 +432,7 @@ class MemeticSearch(GeneticAlgorithm):
             low, high = (int(f(infills.get("F")[:, 1])) for f in (np.min, np.max))
             if self.triangles is not None:
                 low, high = max(low, self.triangles[0]), min(max(high, low), self.triangles[1])
-            ladder.rungs = np.unique(np.round(np.geomspace(low, max(high, low), self.pop_size)).astype(int))
+            ladder.rungs = np.unique(np.round(np.geomspace(low, max(high, low), self._n_rungs)).astype(int))
         super()._initialize_advance(infills=infills, **kwargs)
 
     def _infill(self) -> Population:
@@ -491,7 +580,7 @@ class MemeticSearch(GeneticAlgorithm):
         if seconds is not None and self.free is not None:
             seconds /= 2.0
         # where subsets were not searched there is nothing to thin
-        share = 1.0 if _subsets_share(self) == 0.0 else 0.5
+        share = 1.0 if _subsets_share(self) == 0.0 else 0.75
         X = between_the_rungs(
             surface,
             pop.get("X"),
