@@ -129,12 +129,12 @@ def bare_deviation(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> flo
 @inner(inline=True)
 def is_inside(g: Ground, a: int, b: int, c: int) -> bool:
     """Whether the footprint holds the centroid of (a, b, c), or the triangle a line."""
-    if g.side == 0:
+    if g.footprint.side == 0:
         return True
     xy = g.xy
     x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
     y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-    return inside(xy, g.side, g.columns, g.state, g.start, g.items, g.faces, x3, y3) or holds_line(xy, g.lines, a, b, c)
+    return inside(xy, g.footprint, x3, y3) or holds_line(xy, g.lines, a, b, c)
 
 
 @inner(inline=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from meshsimp_pymoo.plane.constraints import NO_CONSTRAINTS, Constraints, make_constraints
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.surface.books import RUN
@@ -27,12 +28,7 @@ class Ground(NamedTuple):
     min_height: float  # of a triangle at the hull, in the unit square
     exact_area: float  # up to where double precision is exact, see plane.predicates
     exact_lift: float
-    side: int  # the footprint, see plane.footprint; 0: all of the hull
-    columns: int
-    state: np.ndarray
-    start: np.ndarray
-    items: np.ndarray
-    faces: np.ndarray
+    footprint: Footprint  # of side 0: all of the hull
     lines: Constraints  # forced edges
     boxes: np.ndarray  # (2 N / RUN, 4) of the vertices in each node of the tree over runs of them, see bare
     nearest: bool  # whether an uncovered vertex costs its distance
@@ -62,12 +58,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         min_height=SLIVER_HEIGHT * float(np.hypot(extent[0], extent[1])),
         exact_area=area,
         exact_lift=lift,
-        side=footprint.side if by_footprint else 0,
-        columns=footprint.columns,
-        state=footprint.state,
-        start=footprint.start,
-        items=footprint.items,
-        faces=footprint.faces,
+        footprint=footprint if by_footprint else footprint._replace(side=0),
         lines=NO_CONSTRAINTS
         if model.lines is None
         else make_constraints(xy, model.lines.segments, footprint if by_footprint else None),
