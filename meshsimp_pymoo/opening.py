@@ -388,8 +388,8 @@ def _grid_of_model(model: Model, options: Options) -> HeightGrid:
     row = len(y) - 1 - row
     if len(x) * len(y) > MOST_CROSSINGS * model.n_vertices or not _fills_cells(row, column, model.faces, len(x)):
         raise NoFullGrid(
-            f"{model.name}: its {model.n_vertices} vertices and {len(model.faces)} faces are not those of a height grid "
-            f"of {len(y)} rows and {len(x)} columns; only a height grid can be cut into tiles: leave the tiles out"
+            f"{model.name}: its {model.n_vertices} vertices and {len(model.faces)} faces are not those of a height "
+            f"grid of {len(y)} rows and {len(x)} columns; only a height grid can be cut into tiles: leave the tiles out"
         )
     if model.weights is not None:
         raise ModelError(f"{model.name}: has weights, which tiles do not know; leave the weights or the tiles out")

@@ -116,6 +116,10 @@ class Lattice:
             found[part] = row * self.columns + at * BLOCK + within
         return found
 
+    def has_any(self, top: int, bottom: int, left: int, right: int) -> bool:
+        """Tell whether there are samples between these rows and columns, inclusive; now and then also by one beside."""
+        return bool(self.bits[top : bottom + 1, left >> 3 : (right >> 3) + 1].any())
+
     def without_singles(self) -> Lattice:
         """Return the samples that belong to a face: a cell of four rows and columns has one if it has three samples."""
         found = Lattice.empty(len(self.bits), self.columns)

@@ -463,8 +463,8 @@ class HeightGrid:
         if infinite.any():
             i, j = np.argwhere(infinite)[0]
             raise ModelError(
-                f"{self.name}: the height at row {self.corner[0] + first + i}, column {self.corner[1] + j} is infinite; "
-                "set it to NaN or name the value with nodata"
+                f"{self.name}: the height at row {self.corner[0] + first + i}, column {self.corner[1] + j} is "
+                "infinite; set it to NaN or name the value with nodata"
             )
         return there
 

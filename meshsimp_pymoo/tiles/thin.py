@@ -17,11 +17,13 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
-from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.reprs import brief
@@ -31,8 +33,51 @@ from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import OpenModel, placed_model
 from meshsimp_pymoo.surface.rules import Rules
 
+
+class Elsewhere(NamedTuple):
+    """In which blocks of rows and columns of a grid with gaps there are samples.
+
+    Attributes
+    ----------
+    x, y : (B, 2) float arrays
+        Least and largest coordinate of each column of blocks, ascending, and of each row, descending.
+    before : (rows, columns + 1) int32 array
+        How many blocks of a row that have samples there are before each.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    before: np.ndarray
+
+
 # Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
 FORESIGHT = 3.0
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """What a tile of a grid with gaps needs to know beside.
+
+    Attributes
+    ----------
+    there : (h, w) bool array
+        Which of the samples that count there are.
+    weight : float
+        How many samples of the grid each stands for.
+    footprint : Footprint
+        The faces of the tile, of all its samples.
+    elsewhere : Elsewhere
+        Where there are samples in the whole grid.
+    rules : Rules
+        Which triangles are emitted, and what a sample costs that none covers.
+    """
+
+    there: BoolArray
+    weight: float
+    footprint: Footprint
+    elsewhere: Elsewhere
+    rules: Rules
 
 
 @brief
@@ -66,6 +111,8 @@ class Tile:
         Distance of the rows and columns that count.
     limit : float
         Error that a triangle may be worth, for it to go [model units]; infinite: all go.
+    gaps : Gaps, optional
+        Of a grid with gaps, see :mod:`meshsimp_pymoo.tiles.gaps`.
     """
 
     name: str
@@ -83,6 +130,7 @@ class Tile:
     unit: float
     stride: int
     limit: float
+    gaps: Gaps | None = None
 
 
 def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
@@ -131,7 +179,7 @@ def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
     Parameters
     ----------
     saved : (m + 1,) int array
-        Triangles saved so far, strictly ascending from 0.
+        Triangles saved so far, from 0: strictly ascending, but where a grid has gaps, whose triangles come and go.
     error : (m + 1,) float array
         Error there.
 
@@ -139,7 +187,8 @@ def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
     -------
     (m,) float array
         Ascending. Cutting at any slope s, after the last step of at most s, is the point of the front with the least
-        error + s * triangles.
+        error + s * triangles. Infinite for steps that end with more triangles and more error than an earlier point;
+        a point with more triangles and less error than an earlier one is passed by.
 
     Examples
     --------
@@ -156,7 +205,15 @@ def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
     m = len(saved)
     hull = np.empty(m, np.int64)
     n = 0
+    first = 0
     for k in range(m):
+        if n > 0 and saved[k] <= saved[hull[n - 1]]:
+            # nothing is saved on the way here: worth it where it costs less, but not less than nothing
+            if saved[k] < saved[hull[n - 1]] or error[k] > error[hull[n - 1]]:
+                continue
+            n -= 1
+            if n == 0:
+                first = k
         while n >= 2:
             a = hull[n - 2]
             b = hull[n - 1]
@@ -166,12 +223,16 @@ def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
         hull[n] = k
         n += 1
     level = np.empty(max(m - 1, 0))
+    for k in range(hull[n - 1], m - 1):
+        level[k] = np.inf
     for q in range(n - 1):
         a = hull[q]
         b = hull[q + 1]
         slope = (error[b] - error[a]) / (saved[b] - saved[a])
         for k in range(a, b):
             level[k] = slope
+    for k in range(first):
+        level[k] = min(level[first], 0.0) if first < m - 1 else 0.0
     # rounding may turn two almost equal slopes around
     for k in range(1, m - 1):
         level[k] = max(level[k], level[k - 1])
@@ -223,6 +284,35 @@ def _model(
     return placed_model(tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight)
 
 
+@inner(inline=True)
+def circle_of(xy: np.ndarray, a: int, b: int, c: int) -> tuple[float, float, float]:
+    """Return the centre of the circle through three sites, and its radius squared."""
+    ux = xy[2 * b] - xy[2 * a]
+    uy = xy[2 * b + 1] - xy[2 * a + 1]
+    vx = xy[2 * c] - xy[2 * a]
+    vy = xy[2 * c + 1] - xy[2 * a + 1]
+    area = 2.0 * (ux * vy - uy * vx)
+    uu = ux * ux + uy * uy
+    vv = vx * vx + vy * vy
+    sx = (vy * uu - uy * vv) / area
+    sy = (ux * vv - vx * uu) / area
+    rr = sx * sx + sy * sy
+    return sx + xy[2 * a], sy + xy[2 * a + 1], rr
+
+
+@inner(inline=True)
+def is_within(sx: float, sy: float, rr: float, box: np.ndarray, domain: np.ndarray) -> bool:
+    """Whether a circle, as far as it lies within the whole grid, lies in a box: beyond its sides there is nothing."""
+    over_x = max(max(sx - domain[1], domain[0] - sx), 0.0)
+    over_y = max(max(sy - domain[3], domain[2] - sy), 0.0)
+    reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
+    reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
+    known: bool = (
+        sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
+    )
+    return known
+
+
 @entry
 def _fix_foreign(
     xy: np.ndarray,
@@ -244,26 +334,8 @@ def _fix_foreign(
             continue
         known = not (foreign[a] or foreign[b] or foreign[c])
         if known:
-            ux = xy[2 * b] - xy[2 * a]
-            uy = xy[2 * b + 1] - xy[2 * a + 1]
-            vx = xy[2 * c] - xy[2 * a]
-            vy = xy[2 * c + 1] - xy[2 * a + 1]
-            area = 2.0 * (ux * vy - uy * vx)
-            uu = ux * ux + uy * uy
-            vv = vx * vx + vy * vy
-            sx = (vy * uu - uy * vv) / area
-            sy = (ux * vv - vx * uu) / area
-            rr = sx * sx + sy * sy
-            sx += xy[2 * a]
-            sy += xy[2 * a + 1]
-            # How far the circle reaches within the whole grid: beyond its sides there is nothing.
-            over_x = max(max(sx - domain[1], domain[0] - sx), 0.0)
-            over_y = max(max(sy - domain[3], domain[2] - sy), 0.0)
-            reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
-            reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
-            known = (
-                sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
-            )
+            sx, sy, rr = circle_of(xy, a, b, c)
+            known = is_within(sx, sy, rr, box, domain)
         if not known:
             fixed[a] = True
             fixed[b] = True
