@@ -42,6 +42,14 @@ def sum_of_three(a: float, b: float, c: float) -> float:
 
 
 @inner(inline=True)
+def is_in_faces(model_xy: np.ndarray, footprint: Footprint, xy: np.ndarray, a: int, b: int, c: int) -> bool:
+    """Whether the footprint of the model, whose side is not 0, holds the centroid of (a, b, c)."""
+    x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
+    y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+    return inside(model_xy, footprint, x3, y3)
+
+
+@inner(inline=True)
 def emit(
     xy: np.ndarray,
     mesh: np.ndarray,
@@ -84,9 +92,7 @@ def emit(
             continue
         if footprint.side > 0:
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
-            x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
-            y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-            if not inside(model_xy, footprint, x3, y3) and not holds_line(
+            if not is_in_faces(model_xy, footprint, xy, a, b, c) and not holds_line(
                 model_xy, lines, sites[a], sites[b], sites[c]
             ):
                 emitted[t // RECORD] = 0

@@ -1,11 +1,12 @@
 """One tile of a grid with gaps: a model of the samples that there are, with its own faces.
 
 What a tile may do follows from circles, as in :mod:`~meshsimp_pymoo.tiles.thin`; but where there are gaps no circle is
-asked for. A triangle that is not emitted lies in a gap, which counts as known to be empty, and so does what a circle
-holds of blocks without samples, wherever they are: else the vertices along a gap that is longer than tiles would stay
-to the end. So the *decisions* are not quite exact there: beside a gap another triangle may fill a star than the tile
-believes, and the point of the mesh that is nearest to an uncovered sample may be in another tile. The numbers of the
-front are exact all the same, as they are measured afterwards over all samples.
+asked for. A triangle outside the original faces lies in a gap, which counts as known to be empty, and so does what a
+circle holds of blocks without samples, wherever they are: else the vertices along a gap that is longer than tiles would
+stay to the end. So the *decisions* are not quite exact there: beside a gap another triangle may fill a star than the
+tile believes, and the point of the mesh that is nearest to an uncovered sample may be in another tile. Where all of the
+hull is covered, what a tile does not cover the whole does: there such a sample costs its distance, whatever the rule.
+The numbers of the front are exact all the same, as they are measured afterwards over all samples.
 
 The samples on a side that the tile shares with another are fixed, since both have them. Of each such side the first and
 the last sample are sites in any case, so that the samples along it are covered; none are made up.
@@ -13,14 +14,18 @@ the last sample are sites in any case, so that the samples along it are covered;
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.emission import is_in_faces
+from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.order import find_corners, vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.greedy import thin
-from meshsimp_pymoo.surface.books import EMITTED, END
+from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
@@ -112,10 +117,13 @@ def thin_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
         weights=None if tile.stride == 1 else weight,
         footprint=gaps.footprint,
     )
-    surface = HeightSurface(model, gaps.rules)
+    box, is_shared = _sides(tile)
+    rules = gaps.rules
+    if rules.footprint == "hull" and is_shared.any():
+        rules = replace(rules, outside="nearest")
+    surface = HeightSurface(model, rules)
     ground = surface.ground()
     fixed = np.isin(number, tile.corners) | ~is_ours
-    box, is_shared = _sides(tile)
     for k, side in enumerate(box):
         if is_shared[k]:
             fixed |= xy[:, k // 2] == side
@@ -123,8 +131,8 @@ def thin_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
     try:
         with surface.books(is_site) as live:
             _fix_beside_gaps(
-                ground.xy, live.mesh, live.kind, int(live.tally[END]), ~is_ours, box, tile.domain, *gaps.elsewhere,
-                fixed,
+                ground.xy, live.mesh, int(live.tally[END]), ~is_ours, box, tile.domain, gaps.footprint,
+                *gaps.elsewhere, fixed,
             )  # fmt: skip
             n = int((is_site & ~fixed).sum())
             removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
@@ -227,20 +235,20 @@ def _holds_samples(
 def _fix_beside_gaps(
     xy: np.ndarray,
     mesh: np.ndarray,
-    kind: np.ndarray,
     end: int,
     foreign: np.ndarray,
     box: np.ndarray,
     domain: np.ndarray,
+    footprint: Footprint,
     block_x: np.ndarray,
     block_y: np.ndarray,
     before: np.ndarray,
     fixed: np.ndarray,
 ) -> None:
-    """Fix the corners of all emitted triangles that need not be triangles of the whole; see `thin._fix_foreign`."""
+    """Fix the corners of triangles on the original faces that need not be in the whole; see `thin._fix_foreign`."""
     for t in range(0, end, RECORD):
         a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
-        if (a | b | c) > LAST_INDEX or (kind[t >> 3] & EMITTED) == 0:
+        if (a | b | c) > LAST_INDEX or not is_in_faces(xy, footprint, xy, a, b, c):
             continue
         known = not (foreign[a] or foreign[b] or foreign[c])
         if known:
