@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray, are_distinct
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, NoFullGrid, warn_of
+from meshsimp_pymoo.errors import ModelError, NoHeightGrid, warn_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -380,14 +380,14 @@ def _fills_cells(row: IntArray, column: IntArray, faces: IntArray, n_columns: in
 def _grid_of_model(model: Model, options: Options) -> HeightGrid:
     """Find the rows and columns of a model's vertices."""
     if not isinstance(model, OpenModel):
-        raise NoFullGrid(
+        raise NoHeightGrid(
             f"{model.name}: is a closed surface; only a height grid can be cut into tiles: leave the tiles out"
         )
     x, column = _steps(model.xy[:, 0])
     y, row = _steps(model.xy[:, 1])
     row = len(y) - 1 - row
     if len(x) * len(y) > MOST_CROSSINGS * model.n_vertices or not _fills_cells(row, column, model.faces, len(x)):
-        raise NoFullGrid(
+        raise NoHeightGrid(
             f"{model.name}: its {model.n_vertices} vertices and {len(model.faces)} faces are not those of a height "
             f"grid of {len(y)} rows and {len(x)} columns; only a height grid can be cut into tiles: leave the tiles out"
         )

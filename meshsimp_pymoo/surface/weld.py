@@ -201,7 +201,7 @@ def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, 
     grid : HeightGrid
         The grid.
     faces : (M, 3) int array
-        The mesh, its corners by sample.
+        The mesh, its corners by vertex of the grid.
     size : int
         Samples along one side of a tile.
 
@@ -211,7 +211,7 @@ def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, 
         Row and column of the tile, from the north-west, as a name; its triangles. Tiles without a triangle are left
         out.
     """
-    row, column = np.divmod(faces, grid.shape[1])
+    row, column = np.divmod(grid.numbers(faces.ravel()).reshape(-1, 3), grid.shape[1])
     tile_row, tile_column = row.sum(axis=1) // (3 * size), column.sum(axis=1) // (3 * size)
     number = tile_row * (grid.shape[1] // size + 1) + tile_column
     order = np.argsort(number, kind="stable")

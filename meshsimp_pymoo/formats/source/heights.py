@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray
-from meshsimp_pymoo.errors import ModelError, NoFullGrid
+from meshsimp_pymoo.errors import ModelError, NoHeightGrid
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
 from meshsimp_pymoo.formats.source.missing import is_nodata, warn_of_nodata
@@ -69,11 +69,11 @@ class Grid:
 
         Raises
         ------
-        NoFullGrid
+        NoHeightGrid
             If its rows do not run from north to south and its columns from west to east, each at a place of its own.
         """
         if not ((np.diff(self.x) > 0).all() and (np.diff(self.y) < 0).all()):
-            raise NoFullGrid(
+            raise NoHeightGrid(
                 f"{name}: its rows do not run to the south and its columns to the east, as tiles want them; turn it, "
                 "with its axes (numpy.flipud, numpy.fliplr), or leave the tiles out (--tile none)"
             )
