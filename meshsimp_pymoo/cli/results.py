@@ -177,8 +177,8 @@ def _tell(front: Front, output: Output, wish: Wish) -> None:
     whole = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
     if "rows" in run["model"]:
         rows, columns = run["model"]["rows"], run["model"]["columns"]
-        there = f", {model.n_vertices:,} of them there" * (model.n_vertices < rows * columns)
-        whole = f"{rows:,} x {columns:,} samples{there}, thinned tile by tile"
+        with_data = f", {model.n_vertices:,} of them with data" * (model.n_vertices < rows * columns)
+        whole = f"{rows:,} x {columns:,} samples{with_data}, thinned tile by tile"
     tell(f"{Path(model.name).name}: {whole}" + f"; {system}" * bool(system))
     effort = [f"{run['seconds']:.1f} s"]
     if "evaluations" in run:
