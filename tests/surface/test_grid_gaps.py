@@ -161,9 +161,7 @@ def test_islands_of_a_model_with_an_empty_row_between_them_do_not_grow_together(
 def test_a_model_that_lacks_a_face_of_its_cells_is_no_grid():
     source = grid_source(HILLS[:5, :6])
     for faces in (np.delete(source.faces, 7, axis=0), np.r_[source.faces[:-1], source.faces[:1]]):
-        with pytest.raises(
-            NoHeightGrid, match=r"\d+ faces are not those of a height grid of 5 rows and 6"
-        ):
+        with pytest.raises(NoHeightGrid, match=r"\d+ faces are not those of a height grid of 5 rows and 6"):
             open_grid(dataclasses.replace(build_model(source, up="z"), faces=faces.astype(np.int32)))
     model = build_model(grid_source(KINDS["a void"]), up="z")
     with pytest.raises(ModelError, match="has weights"):
