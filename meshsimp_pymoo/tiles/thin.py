@@ -16,7 +16,9 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +28,10 @@ from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.search.raster import raster_insertion
 from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.model import OpenModel, placed_model
+from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
 
 # Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
@@ -66,6 +69,8 @@ class Tile:
         Distance of the rows and columns that count.
     limit : float
         Error that a triangle may be worth, for it to go [model units]; infinite: all go.
+    inserted : int
+        How many samples are inserted to begin with, those of the tile's border included; where ``sites`` is None.
     """
 
     name: str
@@ -83,6 +88,40 @@ class Tile:
     unit: float
     stride: int
     limit: float
+    inserted: int = 0
+
+
+def start_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
+    """Thin a tile that has all its samples, to the end: from those that insertion finds, and all of the tile's border.
+
+    Along a border that has all its samples no edge of the mesh crosses it, whatever is kept elsewhere: two samples
+    beside one another have an empty circle. So the tile is a whole of its own.
+
+    Parameters
+    ----------
+    tile : Tile
+        The tile, without ``sites``.
+
+    Returns
+    -------
+    samples : (m,) int array
+        Numbers of the samples that are worth a look; the others were never inserted.
+    level : (m,) float array
+        The slope at which each goes, as :func:`thin_tile` says; infinite: never, along the border.
+    """
+    on_border = np.ones(tile.heights.shape, bool)
+    on_border[1:-1, 1:-1] = False
+    border = np.flatnonzero(on_border)
+    number, xy, z, *_ = _samples(tile)
+    order = vector_order(xy, z)
+    rank = np.argsort(order)
+    first = order[np.sort(rank[border])]
+    is_site = np.zeros(len(z), bool)
+    is_site[rank[raster_insertion(tile.x, tile.y, tile.heights, first, tile.inserted)]] = True
+    surface = _surface(tile, number[order], xy[order], z[order], None)
+    removed, level = _thin(surface, is_site, lambda ground, live: on_border.ravel()[order], np.inf)
+    samples = np.concatenate([number[border], number[order[removed]]])
+    return samples, np.concatenate([np.full(len(border), np.inf), level])
 
 
 def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
@@ -104,25 +143,37 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     number, xy, z, weight, is_site, is_ours = _samples(tile)
     order = vector_order(xy, z)
     number, xy, z, is_site, is_ours = number[order], xy[order], z[order], is_site[order], is_ours[order]
-    box = np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
-    corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
-    model = _model(tile, number, xy, z, None if weight is None else weight[order], corners)
-    surface = HeightSurface(model, Rules(footprint="hull", outside="ignore"))
-    ground = surface.ground()
-    fixed = np.isin(number, tile.corners) | ~is_ours
+    surface = _surface(tile, number, xy, z, None if weight is None else weight[order])
     # beyond the whole grid there is nothing that a circle could hold
+    box = _box(tile)
     open_sides = np.where(box == tile.domain, np.array([-np.inf, np.inf, -np.inf, np.inf]), box)
-    with surface.books(is_site) as live:
+
+    def fix(ground: Any, live: Any) -> BoolArray:
+        fixed = np.isin(number, tile.corners) | ~is_ours
         _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
+        return fixed
+
+    removed, level = _thin(surface, is_site, fix, tile.limit)
+    return number[removed], level
+
+
+def _thin(
+    surface: HeightSurface, is_site: BoolArray, fix: Callable[[Any, Any], BoolArray], limit: float
+) -> tuple[IntArray, FloatArray]:
+    """Thin sites to a slope, but for those that ``fix`` says of a ground and its books; return what goes and levels."""
+    ground = surface.ground()
+    with surface.books(is_site) as live:
+        fixed = fix(ground, live)
         n = int((is_site & ~fixed).sum())
         removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-        limit = FORESIGHT * 2.0 * tile.limit
         stop = np.zeros(1, np.bool_)
-        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, stop, removed, error, triangles)
+        n_removed = thin(
+            ground, live, len(is_site), fixed, 0, FORESIGHT * 2.0 * limit, np.inf, stop, removed, error, triangles
+        )
     saved = (triangles[0] - triangles[: n_removed + 1]).astype(np.int64)
     level = hull_levels(saved, error[: n_removed + 1])
-    n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
-    return number[removed[:n_wanted]], level[:n_wanted]
+    n_wanted = int(np.searchsorted(level, limit, side="right"))
+    return removed[:n_wanted], level[:n_wanted]
 
 
 def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
@@ -213,14 +264,22 @@ def _samples(
     )
 
 
-def _model(
-    tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: FloatArray | None, corners: IntArray
-) -> OpenModel:
-    """Return the tile as a model: the arrays that triangulating needs, and two faces for its extent."""
+def _box(tile: Tile) -> FloatArray:
+    """Return the least and largest x, least and largest y of a tile."""
+    return np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
+
+
+def _surface(
+    tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: FloatArray | None
+) -> HeightSurface:
+    """Return the surface of a tile as a model: the arrays that triangulating needs, and two faces for its extent."""
+    box = _box(tile)
+    corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
     points = np.column_stack([xy * tile.unit, z])
     a, b, c, d = corners[np.lexsort((xy[corners, 0], xy[corners, 1]))]
     faces = np.array([[a, b, d], [a, d, c]])
-    return placed_model(tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight)
+    model = placed_model(tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight)
+    return HeightSurface(model, Rules(footprint="hull", outside="ignore"))
 
 
 @entry
