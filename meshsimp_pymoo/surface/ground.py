@@ -8,6 +8,7 @@ import numpy as np
 
 from meshsimp_pymoo.plane.constraints import NO_CONSTRAINTS, Constraints, make_constraints
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.footprint import make_footprint
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.surface.books import RUN
@@ -50,7 +51,8 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
     xy = np.ascontiguousarray(model.xy)
     extent = np.ptp(xy, axis=0)
     area, lift = exact_ranges(xy)
-    footprint, by_footprint = model.footprint, rules.footprint == "model"
+    by_footprint = rules.footprint == "model"
+    footprint = model.footprint if by_footprint else make_footprint(xy, model.faces, np.empty((0, 2)), convex=True)
     weight = np.empty(0) if model.weights is None else model.weights
     power = OBJECTIVES[rules.measure].power
     return Ground(
@@ -62,7 +64,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         min_height=SLIVER_HEIGHT * float(np.hypot(extent[0], extent[1])),
         exact_area=area,
         exact_lift=lift,
-        side=footprint.side if by_footprint else 0,
+        side=footprint.side,
         columns=footprint.columns,
         state=footprint.state,
         start=footprint.start,

@@ -52,7 +52,7 @@ from meshsimp_pymoo.tiles.thin import Tile, start_tile, thin_tile
 from meshsimp_pymoo.workers import Engine, Serial
 
 #: Samples along one side of a tile.
-TILE = 512
+TILE = 256
 LEAST_TILE = 64
 # The finest solution has at most this share of the grid's triangles, and at most so many, unless more are asked for.
 FINEST = 0.1
@@ -70,8 +70,9 @@ LAST_STEP = 0.1
 # How far above the wanted size the finest solution may be.
 ABOUT = 1.1
 SHIFTS = (0.0, 1 / 3, 2 / 3)
-# Samples that are inserted to begin with, for each vertex of the finest row; and the least and the most of all samples.
-# Thinned from there a row has at most some 2 % more error than thinned from all.
+# Samples that are inserted to begin with, for each vertex of the finest row, and the least share of all samples: thinned
+# from there a row has at most some 2 % more error than thinned from all (six DEMs). Where it would be more than the last
+# share there is little to be saved, and all are thinned.
 INSERTED, LEAST_INSERTED, MOST_INSERTED = 3.0, 0.15, 0.3
 LOST = "a finished tile was stored, but is gone or damaged; start the same call again"
 
@@ -436,7 +437,9 @@ class _Phases:
             return stored["kept"], float(stored["slope"])
         n = self.grid.n_vertices
         boxes = self.boxes(SHIFTS[0], 1)
-        inserted = min(max(INSERTED * n_vertices / n, LEAST_INSERTED), MOST_INSERTED)
+        inserted = max(INSERTED * n_vertices / n, LEAST_INSERTED)
+        if inserted > MOST_INSERTED:
+            inserted = 1.0
         histogram = np.zeros(1 << 16, np.int64)
         greatest, n_free = 0.0, 0
         for k, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None, inserted):

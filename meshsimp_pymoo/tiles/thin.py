@@ -70,7 +70,7 @@ class Tile:
     limit : float
         Error that a triangle may be worth, for it to go [model units]; infinite: all go.
     inserted : int
-        How many samples are inserted to begin with, those of the tile's border included; where ``sites`` is None.
+        How many samples there are to begin with, those of the tile's border included; where ``sites`` is None.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Tile:
 
 
 def start_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
-    """Thin a tile that has all its samples, to the end: from those that insertion finds, and all of the tile's border.
+    """Thin a tile to the end: from all its samples, or from those that insertion finds and all of its border.
 
     Along a border that has all its samples no edge of the mesh crosses it, whatever is kept elsewhere: two samples
     beside one another have an empty circle. So the tile is a whole of its own.
@@ -112,12 +112,14 @@ def start_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     on_border = np.ones(tile.heights.shape, bool)
     on_border[1:-1, 1:-1] = False
     border = np.flatnonzero(on_border)
-    number, xy, z, *_ = _samples(tile)
+    number, xy, z = _window(tile)
     order = vector_order(xy, z)
-    rank = np.argsort(order)
-    first = order[np.sort(rank[border])]
-    is_site = np.zeros(len(z), bool)
-    is_site[rank[raster_insertion(tile.x, tile.y, tile.heights, first, tile.inserted)]] = True
+    is_site = np.ones(len(z), bool)
+    if tile.inserted < len(z):
+        rank = np.argsort(order)
+        first = order[np.sort(rank[border])]
+        is_site[:] = False
+        is_site[rank[raster_insertion(tile.x, tile.y, tile.heights, first, tile.inserted)]] = True
     surface = _surface(tile, number[order], xy[order], z[order], None)
     removed, level = _thin(surface, is_site, lambda ground, live: on_border.ravel()[order], np.inf)
     samples = np.concatenate([number[border], number[order[removed]]])
@@ -229,6 +231,13 @@ def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
     return level
 
 
+def _window(tile: Tile) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the samples of a tile that count, row by row: number, place, height."""
+    number = (tile.rows[:, None] * tile.n_columns + tile.columns).ravel()
+    xy = np.column_stack([np.tile(tile.x, len(tile.y)), np.repeat(tile.y, len(tile.x))])
+    return number, xy, tile.heights.ravel()
+
+
 def _samples(
     tile: Tile,
 ) -> tuple[IntArray, FloatArray, FloatArray, FloatArray | None, BoolArray, BoolArray]:
@@ -237,12 +246,8 @@ def _samples(
     The corners of the tile are sites in any case, so that all samples are covered; those that are not kept are not ours
     to change, nor is anything at a triangle with them.
     """
-    grid = (tile.rows[:, None] * tile.n_columns + tile.columns).ravel()
-    xy = np.column_stack([np.tile(tile.x, len(tile.y)), np.repeat(tile.y, len(tile.x))])
-    z = tile.heights.ravel()
-    if tile.sites is None or tile.site_xy is None or tile.site_z is None:
-        everywhere = np.ones(len(z), bool)
-        return grid, xy, z, None, everywhere, everywhere.copy()
+    grid, xy, z = _window(tile)
+    assert tile.sites is not None and tile.site_xy is not None and tile.site_z is not None
     kept = np.isin(grid, tile.sites, assume_unique=True)
     extra = ~np.isin(tile.sites, grid, assume_unique=True)
     n_extra = int(extra.sum())
