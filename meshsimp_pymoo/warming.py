@@ -132,7 +132,8 @@ def _moves(make: Callable[[], Any] = _square) -> None:
     surface = make()
     records, n, rows, state = _records(surface), surface.n_vertices, np.zeros(9, np.int64), np.zeros(1, np.uint64)
     graph, shares, stop = (surface.border, *surface.neighbours), tuple(map(float, USUAL_MOVES)), np.zeros(1, np.bool_)
-    _compile_for(anneal, *records, n, rows, n, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows, rows)
+    flags = surface.pinned
+    _compile_for(anneal, *records, n, flags, rows, *graph, 1, 0.1, 0.1, 8, shares, state, stop, rows, flags, rows)
     _compile_for(fit_size, *records, n, surface.pinned, True, 8, state, stop)
 
 
@@ -252,7 +253,8 @@ PARTS = (
     Part(
         "tiles",
         (
-            "plane.triangulation:triangulate_once", "tiles.thin:_hull_levels", "tiles.thin:_fix_foreign",
+            "plane.triangulation:triangulate_once", "search.raster:_insert_worst", "tiles.thin:_hull_levels",
+            "tiles.thin:_fix_foreign",
             "surface.weld:_measure_rows", "surface.weld:_measure_cells",
         ),
         _tiles, 2.5, False,

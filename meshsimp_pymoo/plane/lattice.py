@@ -120,6 +120,12 @@ class Lattice:
         """Tell whether there are samples between these rows and columns, inclusive; now and then also by one beside."""
         return bool(self.bits[top : bottom + 1, left >> 3 : (right >> 3) + 1].any())
 
+    def count_in(self, top: int, bottom: int, left: int, right: int) -> int:
+        """Return how many samples there are between these rows and columns, inclusive."""
+        step = max(1, UNPACKED // self.columns)
+        bands = ((first, min(first + step, bottom + 1)) for first in range(top, bottom + 1, step))
+        return sum(int(self.rows(first, end)[:, left : right + 1].sum()) for first, end in bands)
+
     def without_singles(self) -> Lattice:
         """Return the samples that belong to a face: a cell of four rows and columns has one if it has three samples."""
         found = Lattice.empty(len(self.bits), self.columns)

@@ -8,7 +8,7 @@ import numpy as np
 
 from meshsimp_pymoo.plane.constraints import NO_CONSTRAINTS, Constraints, make_constraints
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
-from meshsimp_pymoo.plane.footprint import Footprint
+from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.surface.books import RUN
@@ -46,7 +46,8 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
     xy = np.ascontiguousarray(model.xy)
     extent = np.ptp(xy, axis=0)
     area, lift = exact_ranges(xy)
-    footprint, by_footprint = model.footprint, rules.footprint == "model"
+    by_footprint = rules.footprint == "model"
+    footprint = model.footprint if by_footprint else make_footprint(xy, model.faces, np.empty((0, 2)), convex=True)
     weight = np.empty(0) if model.weights is None else model.weights
     power = OBJECTIVES[rules.measure].power
     return Ground(
@@ -58,7 +59,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         min_height=SLIVER_HEIGHT * float(np.hypot(extent[0], extent[1])),
         exact_area=area,
         exact_lift=lift,
-        footprint=footprint if by_footprint else footprint._replace(side=0),
+        footprint=footprint,
         lines=NO_CONSTRAINTS
         if model.lines is None
         else make_constraints(xy, model.lines.segments, footprint if by_footprint else None),

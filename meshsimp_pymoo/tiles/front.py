@@ -50,29 +50,35 @@ from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.weld import measure, weld
-from meshsimp_pymoo.tiles.gaps import blocks_of, gaps_in, thin_with_gaps
-from meshsimp_pymoo.tiles.thin import Tile, thin_tile
+from meshsimp_pymoo.tiles.gaps import blocks_of, gaps_in, start_with_gaps, thin_with_gaps
+from meshsimp_pymoo.tiles.thin import Tile, start_tile, thin_tile
 from meshsimp_pymoo.workers import Engine, Serial
 
 #: Samples along one side of a tile.
-TILE = 512
+TILE = 256
 LEAST_TILE = 64
 # The finest solution has at most this share of the grid's triangles, and at most so many, unless more are asked for.
 FINEST = 0.1
 MOST_TRIANGLES = 1_200_000
-# From row to row the slope grows by this factor, the number of triangles falls by about a ninth.
+# From row to row the slope grows by this factor, the number of triangles falls by about a ninth; and rows of a phase,
+# whose levels tell them apart.
 SLOPE_STEP = 1.2
+ROWS = 2
 # Phases that thin less than this share of the vertices make no row; the next step is twice as large.
 LEAST_CHANGE = 0.01
 # After so many phases without one tiles grow.
 MOST_IDLE = 10
 # Samples for each vertex, above which only every second row and column of them is looked at.
-ENOUGH_SAMPLES = 64
+ENOUGH_SAMPLES = 32
 # Where one tile holds everything, each solution has this share of vertices less than the one before.
 LAST_STEP = 0.1
 # How far above the wanted size the finest solution may be.
 ABOUT = 1.1
 SHIFTS = (0.0, 1 / 3, 2 / 3)
+# Samples that are inserted to begin with, for each vertex of the finest row, and the least share of all samples: thinned
+# from there a row has at most some 2 % more error than thinned from all (six DEMs). Where it would be more than the last
+# share there is little to be saved, and all are thinned.
+INSERTED, LEAST_INSERTED, MOST_INSERTED = 3.0, 0.15, 0.3
 LOST = "a finished tile was stored, but is gone or damaged; start the same call again"
 
 # Called with (share done, what is being done).
@@ -182,10 +188,11 @@ def identity(grid: HeightGrid, *, tile: int = TILE, most: int | None = None, rul
         **({} if grid.lattice is None else {"footprint": rules.footprint, "outside": rules.outside}),
         "tile": tile,
         "most": most or usual_most(grid),
-        "slope_step": SLOPE_STEP,
+        "slopes": [SLOPE_STEP, ROWS],
+        "inserted": [INSERTED, LEAST_INSERTED, MOST_INSERTED],
         "enough_samples": ENOUGH_SAMPLES,
         "searched": [SEARCHED, SAMPLES, MOVES],
-        "format": 3,
+        "format": 4,
     }
 
 
@@ -245,10 +252,10 @@ def tiled_front(
     level = np.full(len(samples), np.inf)
     slopes = [slope]
     n_kept, n_row = len(samples), len(samples)
-    phase, stride, step, n_idle = len(SHIFTS), 1, SLOPE_STEP, 0
+    phase, stride, step, n_idle = len(SHIFTS), 1, SLOPE_STEP**ROWS, 0
     while True:
         if n_idle == MOST_IDLE:
-            stride, step, n_idle = 2 * stride, SLOPE_STEP, 0
+            stride, step, n_idle = 2 * stride, SLOPE_STEP**ROWS, 0
         while ENOUGH_SAMPLES * stride**2 * n_kept < grid.n_vertices:
             stride *= 2
         if work.is_one_tile(stride):
@@ -259,8 +266,8 @@ def tiled_front(
         phase += 1
         n_kept -= len(removed)
         if n_kept <= (1.0 - LEAST_CHANGE) * n_row:
-            slopes.append(slope)
-            n_row, step, n_idle = n_kept, SLOPE_STEP, 0
+            slopes += np.geomspace(before, slope, ROWS + 1)[1:].tolist()
+            n_row, step, n_idle = n_kept, SLOPE_STEP**ROWS, 0
         else:
             step *= 2.0
             n_idle += 1
@@ -412,7 +419,15 @@ class _Phases:
         lattice = self.grid.lattice
         return boxes if lattice is None else [box for box in boxes if lattice.has_any(*box)]
 
-    def task(self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None) -> Tile:
+    def n_samples(self, box: tuple[int, int, int, int]) -> int:
+        """Return how many samples a tile has."""
+        top, bottom, left, right = box
+        lattice = self.grid.lattice
+        return (bottom - top + 1) * (right - left + 1) if lattice is None else lattice.count_in(*box)
+
+    def task(
+        self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None, inserted: float = 1.0
+    ) -> Tile:
         """Return what a tile's task needs to know."""
         grid, n_columns = self.grid, self.grid.shape[1]
         top, bottom, left, right = box
@@ -439,24 +454,22 @@ class _Phases:
             unit=grid.unit,
             stride=stride,
             limit=limit,
+            inserted=int(inserted * len(rows) * len(columns)),
             gaps=None
             if self.elsewhere is None
             else gaps_in(grid, box, rows, columns, elsewhere=self.elsewhere, rules=self.rules),
         )
 
     def thin(
-        self, name: str, shift: float, stride: int, limit: float, kept: IntArray | None
+        self, name: str, shift: float, stride: int, limit: float, kept: IntArray | None, inserted: float = 1.0
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
-        """Thin all tiles that are not in the store; yield (tile, removed, level) of all, in their order."""
+        """Thin all tiles that are not in the store; yield (tile, samples, level) of all, in their order."""
         boxes = self.boxes(shift, stride)
         missing = [k for k in range(len(boxes)) if self.store.get(f"{name}_{k}") is None]
         n_done = len(boxes) - len(missing)
-        tasks = (self.task(boxes[k], stride, limit, kept) for k in missing)
-        for place, (removed, level) in self.engine.each(_thin, tasks):
-            if kept is None:  # nearly all samples of the grid: in half the space
-                level = level.astype(np.float32)
-                removed = removed.astype(np.min_scalar_type(self.grid.shape[0] * self.grid.shape[1]))
-            self.store.put(f"{name}_{missing[place]}", removed=removed, level=level)
+        tasks = (self.task(boxes[k], stride, limit, kept, inserted) for k in missing)
+        for place, (samples, level) in self.engine.each(_start if kept is None else _thin, tasks):
+            self.store.put(f"{name}_{missing[place]}", samples=samples, level=level)
             n_done += 1
             n_left = 1.0 if kept is None else len(kept) / self.grid.n_vertices
             share = 0.6 * n_done / len(boxes) if kept is None else 0.6 + 0.2 * (1.0 - n_left) ** 8
@@ -465,7 +478,7 @@ class _Phases:
             piece = self.store.get(f"{name}_{k}")
             if piece is None:
                 raise ResultError(f"{self.grid.name}: {LOST}")
-            yield k, piece["removed"], piece["level"]
+            yield k, piece["samples"], piece["level"]
 
     def start(self, n_vertices: int) -> tuple[IntArray, float]:
         """Return the finest row: thin all tiles to the end, find the slope, and go over the tiles' edges."""
@@ -473,21 +486,26 @@ class _Phases:
         if stored is not None:
             return stored["kept"], float(stored["slope"])
         n = self.grid.n_vertices
+        boxes = self.boxes(SHIFTS[0], 1)
+        inserted = max(INSERTED * n_vertices / n, LEAST_INSERTED)
+        if inserted > MOST_INSERTED:
+            inserted = 1.0
         histogram = np.zeros(1 << 16, np.int64)
-        greatest = 0.0
-        for _, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
-            histogram += np.bincount(_bins(level), minlength=len(histogram))
-            greatest = max(greatest, float(level.max(initial=0.0)))
+        greatest, n_free = 0.0, 0
+        for k, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None, inserted):
+            free = level[np.isfinite(level)]
+            n_free += self.n_samples(boxes[k]) - (len(level) - len(free))
+            histogram += np.bincount(_bins(free), minlength=len(histogram))
+            greatest = max(greatest, float(free.max(initial=0.0)))
         # What the finest row is to keep, of the vertices that were free; those that were not will be in their turn.
-        most = int(histogram.sum()) * n_vertices / n
+        most = n_free * n_vertices / n
         above = histogram[::-1].cumsum()[::-1]
         # the least bin such that no more than wanted are above it
         bin_ = int(np.argmax(np.r_[above[1:], 0] <= most))
         slope = max(_bin_end(bin_), 1e-9 * greatest) or 1.0
-        lattice = self.grid.lattice
-        keep = np.ones(n, bool) if lattice is None else lattice.rows(0, self.grid.shape[0]).ravel()
-        for _, removed, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
-            keep[removed[level <= slope]] = False
+        keep = np.zeros(self.grid.shape[0] * self.grid.shape[1], bool)
+        for _, samples, level in self.thin("start", SHIFTS[0], 1, np.inf, None, inserted):
+            keep[samples[level > slope]] = True
         kept = np.flatnonzero(keep)
         del keep
         for phase in range(1, len(SHIFTS)):
@@ -569,6 +587,10 @@ class _Phases:
             quality.append(q)
             self.progress(0.8 + 0.2 * (k + 1) / len(solutions), f"solution {k + 1} of {len(solutions)} measured")
         return quality
+
+
+def _start(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
+    return start_tile(task) if task.gaps is None or task.gaps.there.all() else start_with_gaps(task)
 
 
 def _thin(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:

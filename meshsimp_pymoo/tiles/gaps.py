@@ -15,6 +15,7 @@ the last sample are sites in any case, so that the samples along it are covered;
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -24,13 +25,12 @@ from meshsimp_pymoo.plane.emission import is_in_faces
 from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.order import find_corners, vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
-from meshsimp_pymoo.search.greedy import thin
 from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.tiles.thin import FORESIGHT, Elsewhere, Gaps, Tile, circle_of, hull_levels, is_within
+from meshsimp_pymoo.tiles.thin import Elsewhere, Gaps, Tile, circle_of, is_within, thin_sites
 
 # Blocks along one side of a grid, at most, and samples along one side of a block, at least.
 MOST_BLOCKS, LEAST_BLOCK = 256, 8
@@ -70,14 +70,9 @@ def gaps_in(
     """
     lattice = grid.lattice
     assert lattice is not None
-    top, bottom, left, right = box
     there = lattice.at(rows[:, None], columns)
     footprint = lattice.footprint(grid.x, grid.y, box)
-    n_samples = sum(
-        int(lattice.rows(first, min(first + 1024, bottom + 1))[:, left : right + 1].sum())
-        for first in range(top, bottom + 1, 1024)
-    )
-    return Gaps(there, n_samples / max(int(there.sum()), 1), footprint, elsewhere, rules)
+    return Gaps(there, lattice.count_in(*box) / max(int(there.sum()), 1), footprint, elsewhere, rules)
 
 
 def start_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
@@ -122,29 +117,24 @@ def thin_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
     if rules.footprint == "hull" and is_shared.any():
         rules = replace(rules, outside="nearest")
     surface = HeightSurface(model, rules)
-    ground = surface.ground()
     fixed = np.isin(number, tile.corners) | ~is_ours
     for k, side in enumerate(box):
         if is_shared[k]:
             fixed |= xy[:, k // 2] == side
     box = np.where(is_shared, box, np.array([-np.inf, np.inf, -np.inf, np.inf]))
+
+    def fix(ground: Any, live: Any) -> BoolArray:
+        _fix_beside_gaps(
+            ground.xy, live.mesh, int(live.tally[END]), ~is_ours, box, tile.domain, gaps.footprint, *gaps.elsewhere,
+            fixed,
+        )  # fmt: skip
+        return fixed
+
     try:
-        with surface.books(is_site) as live:
-            _fix_beside_gaps(
-                ground.xy, live.mesh, int(live.tally[END]), ~is_ours, box, tile.domain, gaps.footprint,
-                *gaps.elsewhere, fixed,
-            )  # fmt: skip
-            n = int((is_site & ~fixed).sum())
-            removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-            limit = FORESIGHT * 2.0 * tile.limit
-            stop = np.zeros(1, np.bool_)
-            n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, stop, removed, error, triangles)
+        removed, level = thin_sites(surface, is_site, fix, tile.limit)
     except ValueError:  # what the books say of sites that span no triangle, and of nothing else
         return nothing
-    saved = (triangles[0] - triangles[: n_removed + 1]).astype(np.int64)
-    level = hull_levels(saved, error[: n_removed + 1])
-    n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
-    n_wanted = min(n_wanted, int(np.searchsorted(level, np.inf)))
+    n_wanted = int(np.searchsorted(level, np.inf))
     return number[removed[:n_wanted]], level[:n_wanted]
 
 
