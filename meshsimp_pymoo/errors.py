@@ -22,8 +22,8 @@ class ModelError(InputError):
     """The input cannot be used. One line: the file, the cause with its value, the way out."""
 
 
-class NoFullGrid(ModelError):
-    """The model is not a full grid of heights along its axes, which can be cut into tiles."""
+class NoHeightGrid(ModelError):
+    """The model is no grid of heights along its axes, which can be cut into tiles."""
 
 
 class ResultError(InputError):

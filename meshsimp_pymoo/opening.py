@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import are_distinct
+from meshsimp_pymoo.arrays import FloatArray, IntArray, are_distinct
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, NoFullGrid, warn_of
+from meshsimp_pymoo.errors import ModelError, NoHeightGrid, warn_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh
-from meshsimp_pymoo.formats.source.heights import PlacedHeights, placed_heights
+from meshsimp_pymoo.formats.source.heights import EVEN, PlacedHeights, placed_heights
 from meshsimp_pymoo.formats.source.metric import in_metric_frame
 from meshsimp_pymoo.formats.source.scenes import from_trimesh
 from meshsimp_pymoo.formats.table import (
@@ -28,6 +28,7 @@ from meshsimp_pymoo.formats.table import (
     read_source,
     refuse_foreign,
 )
+from meshsimp_pymoo.plane.lattice import cells
 from meshsimp_pymoo.settings import by_name, settings_of, taken
 from meshsimp_pymoo.surface.closed.model import ClosedModel, closed_model, topology
 from meshsimp_pymoo.surface.grid import HeightGrid
@@ -252,9 +253,10 @@ def open_grid(
     ----------
     model : path, built-in name, (R, C) array, OpenModel or HeightGrid
         A ``.npy`` file is mapped into memory and a GeoTIFF opened, and both are read by windows only; any other file is
-        read whole first. A model's vertices must be all the crossings of rows and columns, and nothing else.
+        read whole first. A model's vertices must be crossings of rows and columns, and its faces those of all cells
+        between them of which at least three corners are there.
     options : Options, optional
-        How it is read; a grid with samples of the height ``nodata`` is refused, as is what cannot apply.
+        How it is read; what cannot apply is refused.
     **kwargs
         Settings of :class:`~meshsimp_pymoo.formats.options.Options` that differ from those, such as ``spacing``.
 
@@ -332,26 +334,68 @@ def _grid_of_heights(name: str, found: PlacedHeights, options: Options) -> Heigh
     )
 
 
+# Crossings of rows and columns to a vertex: of more nearly all would be gaps.
+MOST_CROSSINGS = 1000
+
+
+def _steps(places: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the different coordinates, ascending, and which of them each place (N,) has.
+
+    Where they are evenly spaced but for gaps, those in the gaps too, so that nothing lies next to what is beyond.
+    """
+    steps, number = np.unique(places, return_inverse=True)
+    gaps = np.diff(steps)
+    if not len(gaps):
+        return steps, number
+    n_steps = np.rint(gaps / gaps.min())
+    if n_steps.max() == 1 or n_steps.sum() > MOST_CROSSINGS * len(steps):
+        return steps, number
+    even = np.abs(gaps / n_steps / gaps.min() - 1.0).max() <= EVEN
+    if not even:
+        return steps, number
+    at = np.concatenate([[0], np.cumsum(n_steps.astype(np.int64))])
+    return np.interp(np.arange(at[-1] + 1), at, steps), at[number]
+
+
+def _fills_cells(row: IntArray, column: IntArray, faces: IntArray, n_columns: int) -> bool:
+    """Tell whether vertices (N,) are different crossings, and faces (T, 3) all of cells with three or four of them."""
+    number = row * n_columns + column
+    if not are_distinct(number):
+        return False
+    there = np.zeros((int(row.max()) + 1, n_columns), bool)
+    there[row, column] = True
+    i, j = row[faces], column[faces]
+    top, left = i.min(axis=1), j.min(axis=1)
+    if (np.ptp(i, axis=1) != 1).any() or (np.ptp(j, axis=1) != 1).any() or not there.any(axis=None):
+        return False
+    wanted = cells(there)
+    missing = 6 - (2 * (i - top[:, None]) + j - left[:, None]).sum(axis=1)  # 0 to 3: which corner of its cell
+    cell = top * (n_columns - 1) + left
+    count = np.bincount(cell, minlength=wanted.size)
+    opposite = np.bincount(cell, missing, minlength=wanted.size)
+    is_full = wanted.ravel() == 2
+    return bool((count == wanted.ravel()).all() and (opposite[is_full] == 3).all())
+
+
 def _grid_of_model(model: Model, options: Options) -> HeightGrid:
     """Find the rows and columns of a model's vertices."""
     if not isinstance(model, OpenModel):
-        raise NoFullGrid(
+        raise NoHeightGrid(
             f"{model.name}: is a closed surface; only a height grid can be cut into tiles: leave the tiles out"
         )
-    x, column = np.unique(model.xy[:, 0], return_inverse=True)
-    y, row = np.unique(model.xy[:, 1], return_inverse=True)
-    number = (len(y) - 1 - row) * len(x) + column
-    n_cells = 2 * (len(x) - 1) * (len(y) - 1)
-    if model.n_vertices != len(x) * len(y) or not are_distinct(number) or len(model.faces) != n_cells:
-        raise NoFullGrid(
-            f"{model.name}: its {model.n_vertices} vertices are not all crossings of {len(y)} rows and {len(x)} "
-            "columns; only a height grid without gaps can be cut into tiles: leave the tiles out"
+    x, column = _steps(model.xy[:, 0])
+    y, row = _steps(model.xy[:, 1])
+    row = len(y) - 1 - row
+    if len(x) * len(y) > MOST_CROSSINGS * model.n_vertices or not _fills_cells(row, column, model.faces, len(x)):
+        raise NoHeightGrid(
+            f"{model.name}: its {model.n_vertices} vertices and {len(model.faces)} faces are not those of a height "
+            f"grid of {len(y)} rows and {len(x)} columns; only a height grid can be cut into tiles: leave the tiles out"
         )
     if model.weights is not None:
         raise ModelError(f"{model.name}: has weights, which tiles do not know; leave the weights or the tiles out")
-    row_of = np.empty(model.n_vertices, np.int64)
-    row_of[number] = np.arange(model.n_vertices)
-    heights = model.points[row_of, 2].reshape(len(y), len(x))
+    row_of = np.argsort(row * len(x) + column)
+    heights = np.full((len(y), len(x)), np.nan)
+    heights[row, column] = model.points[:, 2]
     return HeightGrid(
         model.name,
         heights,

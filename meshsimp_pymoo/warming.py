@@ -253,7 +253,8 @@ PARTS = (
     Part(
         "tiles",
         (
-            "plane.triangulation:triangulate_once", "tiles.thin:_hull_levels", "tiles.thin:_fix_foreign",
+            "plane.triangulation:triangulate_once", "search.raster:_insert_worst", "tiles.thin:_hull_levels",
+            "tiles.thin:_fix_foreign",
             "surface.weld:_measure_rows", "surface.weld:_measure_cells",
         ),
         _tiles, 2.5, False,

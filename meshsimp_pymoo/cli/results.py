@@ -63,9 +63,7 @@ def lacks_pictures(output: Output, what: Mapping[str, Any]) -> bool:
 
 
 def triangles_of(model: Mapping[str, Any]) -> int:
-    """Return how many triangles an original has, by its record; a grid of tiles has two for each square."""
-    if "rows" in model:
-        return 2 * (int(model["rows"]) - 1) * (int(model["columns"]) - 1)
+    """Return how many triangles an original has, by its record."""
     return int(model["triangles"])
 
 
@@ -178,7 +176,9 @@ def _tell(front: Front, output: Output, wish: Wish) -> None:
     unit, system = front.unit, reference_system(model.georeference)
     whole = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
     if "rows" in run["model"]:
-        whole = f"{run['model']['rows']:,} x {run['model']['columns']:,} samples, thinned tile by tile"
+        rows, columns = run["model"]["rows"], run["model"]["columns"]
+        with_data = f", {model.n_vertices:,} of them with data" * (model.n_vertices < rows * columns)
+        whole = f"{rows:,} x {columns:,} samples{with_data}, thinned tile by tile"
     tell(f"{Path(model.name).name}: {whole}" + f"; {system}" * bool(system))
     effort = [f"{run['seconds']:.1f} s"]
     if "evaluations" in run:

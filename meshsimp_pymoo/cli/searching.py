@@ -33,7 +33,7 @@ from meshsimp_pymoo.cli.terminal import (
     stop_if_interrupted,
 )
 from meshsimp_pymoo.cli.tiling import refuse_alone, simplify_tiled, wants_tiles
-from meshsimp_pymoo.errors import ModelError, NoFullGrid, ResultError, UsageError
+from meshsimp_pymoo.errors import ModelError, NoHeightGrid, ResultError, UsageError
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, listed
 from meshsimp_pymoo.front import Freeing, Front, FrontSolution, starting_front
@@ -103,7 +103,7 @@ def _simplify(request: Request, shown: Stages) -> int:
     if wants_tiles(request):
         try:
             return simplify_tiled(request, shown)
-        except NoFullGrid as reason:
+        except NoHeightGrid as reason:
             if request.tiling.tile is not None:
                 raise
             # nobody asked for tiles

@@ -11,7 +11,7 @@ from typing import Any
 
 from meshsimp_pymoo.cli.preparing import compiling
 from meshsimp_pymoo.cli.requests import TILED_FROM, Free, Output, Request, Search, Tiling
-from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures, triangles_of
+from meshsimp_pymoo.cli.results import hand_over, hand_over_stored, lacks_pictures
 from meshsimp_pymoo.cli.terminal import INTERRUPTED, WRITING, Stages, answering, say, stop_if_interrupted
 from meshsimp_pymoo.errors import ModelError, ResultError, UsageError, reason_of
 from meshsimp_pymoo.formats.options import Options
@@ -69,10 +69,12 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     with compiling((*SEARCH, "tiles"), shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             grid = open_grid(request.model, request.options)
+            has_gaps = grid.lattice is not None  # all samples are read once
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish()
-    rows, columns = grid.shape
-    wish = request.wish.among(lambda: triangles_of({"rows": rows, "columns": columns}))
+    if request.wish.triangles == 1 and not has_gaps:
+        raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
+    wish = request.wish.among(lambda: len(grid.faces))
     request = replace(request, wish=wish)
     what["settings"] |= wish.limits
     rules = replace(request.rules, measure=request.measure or Rules().measure)
@@ -85,7 +87,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     most = max(wish.triangles or 2, usual_most(grid))
     check_memory(grid, tile=tile, most=most, jobs=jobs, remote=tiling.dask is not None)
     try:
-        identity_of_tiles = identity(grid, tile=tile, most=most)
+        identity_of_tiles = identity(grid, tile=tile, most=most, rules=rules)
     except ValueError as problem:
         if isinstance(problem, ModelError):
             raise
@@ -183,8 +185,6 @@ def _refuse_unknown(request: Request) -> None:
                     f"--{item.name.replace('_', '-')} does not go with tiles, which are thinned and not searched; "
                     "leave it out, or do without tiles (--tile none)"
                 )
-    if request.wish.triangles == 1:
-        raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
 
 
 def _claim(output: Output) -> None:

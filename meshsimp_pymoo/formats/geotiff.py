@@ -17,7 +17,7 @@ from meshsimp_pymoo.errors import (
     LONGEST_REASON,
     ModelError,
     ModelWarning,
-    NoFullGrid,
+    NoHeightGrid,
     printable,
     raise_if_memory,
     reason_of,
@@ -161,7 +161,7 @@ class RasterHeights:
             place, mirrored = _placement(raster, steps, name)
             a, b, _, d = tuple(raster.transform)[:4]
             if mirrored or (b, d) != (0, 0) or a < 0:
-                raise NoFullGrid(
+                raise NoHeightGrid(
                     f"{name}: its transform turns or mirrors it, and tiles want rows from north to south; warp it "
                     "(gdalwarp), or leave the tiles out (--tile none)"
                 )

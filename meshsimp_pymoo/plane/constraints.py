@@ -361,15 +361,13 @@ def _vertices_on(xy: np.ndarray, segments: np.ndarray, boxes: np.ndarray, exact_
 def _lean_left(
     xy: np.ndarray,
     segments: np.ndarray,
-    side: int,
-    columns: int,
-    state: np.ndarray,
-    start: np.ndarray,
-    items: np.ndarray,
-    faces: np.ndarray,
+    footprint: Footprint,
     left: np.ndarray,
 ) -> None:
     """Mark the segments on whose left there is at least as much of the original as on their right."""
+    side = footprint.side
+    columns = footprint.columns
+    n_rows = len(footprint.state) // max(columns, 1)
     for s in range(len(segments) if side > 0 else 0):  # else all of the hull is inside, and nobody asks
         a, b = segments[s, 0], segments[s, 1]
         ax, ay = xy[2 * a], xy[2 * a + 1]
@@ -383,8 +381,8 @@ def _lean_left(
                     x = ax + t * ux - sign * depth * uy
                     y = ay + t * uy + sign * depth * ux
                     # in the box of the model, which the cells cover
-                    if 0.0 <= x < (columns - 1) / side and 0.0 <= y < (len(state) // columns - 1) / side:
-                        if inside(xy, side, columns, state, start, items, faces, 3.0 * x, 3.0 * y):
+                    if 0.0 <= x < (columns - 1) / side and 0.0 <= y < (n_rows - 1) / side:
+                        if inside(xy, footprint, 3.0 * x, 3.0 * y):
                             more += sign
             depth *= 0.5
         left[s] = more >= 0
@@ -433,5 +431,5 @@ def make_constraints(xy: FloatArray, segments: IntArray, footprint: Footprint | 
     listed = np.insert(segment[order], first, count)
     left = np.ones(len(segments), np.int32)
     if footprint is not None:
-        _lean_left(flat, segments, *footprint, left)
+        _lean_left(flat, segments, footprint, left)
     return Constraints(at, listed.astype(np.int32), by_segment.astype(np.int32), along.astype(np.int32), left)

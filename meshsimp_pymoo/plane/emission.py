@@ -6,7 +6,7 @@ import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
 from meshsimp_pymoo.plane.constraints import Constraints, holds_line
-from meshsimp_pymoo.plane.footprint import inside
+from meshsimp_pymoo.plane.footprint import Footprint, inside
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE
 
 # A hull triangle lower than this, in diagonals of the model's bounding box in the plane, is an artefact of rounding.
@@ -42,18 +42,21 @@ def sum_of_three(a: float, b: float, c: float) -> float:
 
 
 @inner(inline=True)
+def is_in_faces(model_xy: np.ndarray, footprint: Footprint, xy: np.ndarray, a: int, b: int, c: int) -> bool:
+    """Whether the footprint of the model, whose side is not 0, holds the centroid of (a, b, c)."""
+    x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
+    y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
+    return inside(model_xy, footprint, x3, y3)
+
+
+@inner(inline=True)
 def emit(
     xy: np.ndarray,
     mesh: np.ndarray,
     end: int,
     min_height: float,
     model_xy: np.ndarray,
-    side: int,
-    columns: int,
-    state: np.ndarray,
-    start: np.ndarray,
-    items: np.ndarray,
-    faces: np.ndarray,
+    footprint: Footprint,
     lines: Constraints,
     sites: np.ndarray,
     emitted: np.ndarray,
@@ -87,11 +90,9 @@ def emit(
     for t in range(0, end, RECORD):
         if emitted[t // RECORD] == 0:
             continue
-        if side > 0:
+        if footprint.side > 0:
             a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
-            x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
-            y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-            if not inside(model_xy, side, columns, state, start, items, faces, x3, y3) and not holds_line(
+            if not is_in_faces(model_xy, footprint, xy, a, b, c) and not holds_line(
                 model_xy, lines, sites[a], sites[b], sites[c]
             ):
                 emitted[t // RECORD] = 0

@@ -3,6 +3,9 @@
 ``footprint="model"`` asks this for the centroid of every triangle, thousands of times an evaluation. So the plane is
 cut once into square cells: those that no outline edge crosses are inside or outside as a whole; only in the others are
 the few faces that touch the cell asked.
+
+The samples of a height grid with gaps are crossings of rows and columns, and its faces follow from which of them are
+there: two to a cell with four samples, one to a cell with three. So a bit a sample is all that is asked for there.
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ import numpy as np
 from meshsimp_pymoo.compiling.functions import entry, inner
 
 OUTSIDE, INSIDE, MIXED = 0, 1, 2
+# How far from three times a point rounding may put the sum of three corners.
+TOUCH = 4e-15
 # Cells there are at most.
 MOST_CELLS = 2**26
 
@@ -25,16 +30,19 @@ class Footprint(NamedTuple):
     ----------
     side : int
         Cells along one side of the unit square; 0 where the projection is convex, so that all of the hull is inside.
+        Of a lattice 1.
     columns : int
-        Cells in a row: rows and columns end beyond the mesh.
+        Cells in a row: rows and columns end beyond the mesh. Of a lattice the bytes in a row of bits.
     state : (rows * columns,) uint8 array
-        OUTSIDE, INSIDE or MIXED.
+        OUTSIDE, INSIDE or MIXED. Of a lattice which samples there are: column k is bit k % 8 of byte k // 8 of its row.
     start : (rows * columns + 1,) int32 array
         Where the faces of a MIXED cell begin in ``items``.
     items : (M,) int32 array
         Faces that touch the MIXED cells.
     faces : (T, 3) int32 array
         Vertex rows of the faces.
+    x, y : (C,), (R,) float arrays
+        Where the columns of a lattice are, ascending, and its rows, descending; empty where faces are listed.
     """
 
     side: int
@@ -43,6 +51,23 @@ class Footprint(NamedTuple):
     start: np.ndarray
     items: np.ndarray
     faces: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+
+
+def lattice_footprint(bits: np.ndarray, x: np.ndarray, y: np.ndarray) -> Footprint:
+    """Return the projection of a height grid with gaps.
+
+    Parameters
+    ----------
+    bits : (R, B) uint8 array
+        Which samples belong to its faces, packed from the lowest bit on; B >= C / 8.
+    x, y : (C,), (R,) float arrays
+        Where its columns are, ascending, and its rows, descending, in the unit square.
+    """
+    none = np.zeros(0, np.int32)
+    state = np.ascontiguousarray(bits).ravel()
+    return Footprint(1, bits.shape[1], state, none, none, none.reshape(0, 3), np.array(x, float), np.array(y, float))
 
 
 @inner
@@ -78,24 +103,78 @@ def _in_some_face(
 
 
 @inner(inline=True)
-def inside(
-    xy: np.ndarray,
-    side: int,
-    columns: int,
-    state: np.ndarray,
-    start: np.ndarray,
-    items: np.ndarray,
-    faces: np.ndarray,
-    x3: float,
-    y3: float,
-) -> bool:
+def inside(xy: np.ndarray, footprint: Footprint, x3: float, y3: float) -> bool:
     """Whether a third of (x3, y3), in the unit square, lies in the closed projection; ``xy``: the model's."""
-    scale = side / 3.0
-    cell = int(y3 * scale) * columns + int(x3 * scale)
-    kind = state[cell]
+    if len(footprint.x) > 0:
+        return _in_lattice(footprint.state, footprint.columns, footprint.x, footprint.y, x3, y3)
+    scale = footprint.side / 3.0
+    cell = int(y3 * scale) * footprint.columns + int(x3 * scale)
+    kind = footprint.state[cell]
     if kind == MIXED:
-        return _in_some_face(xy, start, items, faces, cell, x3, y3)
+        return _in_some_face(xy, footprint.start, footprint.items, footprint.faces, cell, x3, y3)
     return kind == INSIDE
+
+
+@inner
+def _step_of(places: np.ndarray, sign: float, place3: float) -> int:
+    """Return the last but one, at most, of the ascending ``sign * places`` that is not above a third of place3."""
+    low = 0
+    high = len(places) - 1
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if 3.0 * sign * places[middle] <= place3:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@inner
+def is_there(bits: np.ndarray, columns: int, i: int, j: int) -> bool:
+    """Whether there is a sample in row i and column j."""
+    return ((bits[i * columns + (j >> 3)] >> (j & 7)) & 1) != 0
+
+
+@inner
+def _holds(ax: float, ay: float, bx: float, by: float, cx: float, cy: float, x3: float, y3: float) -> bool:
+    """Do what :func:`_in_face` does, of a triangle by its corners."""
+    ax, ay = 3.0 * ax - x3, 3.0 * ay - y3
+    bx, by = 3.0 * bx - x3, 3.0 * by - y3
+    cx, cy = 3.0 * cx - x3, 3.0 * cy - y3
+    u = ax * by - ay * bx
+    v = bx * cy - by * cx
+    w = cx * ay - cy * ax
+    return (u >= 0.0 and v >= 0.0 and w >= 0.0) or (u <= 0.0 and v <= 0.0 and w <= 0.0)
+
+
+@inner
+def _in_lattice(bits: np.ndarray, columns: int, x: np.ndarray, y: np.ndarray, x3: float, y3: float) -> bool:
+    """Whether a third of (x3, y3) lies in a face of a lattice: the cell is looked up, and those that it may touch."""
+    row = _step_of(y, -1.0, -y3)
+    column = _step_of(x, 1.0, x3)
+    for i in range(max(row - 1, 0), min(row + 2, len(y) - 1)):
+        if y3 > 3.0 * y[i] + TOUCH or y3 < 3.0 * y[i + 1] - TOUCH:
+            continue
+        for j in range(max(column - 1, 0), min(column + 2, len(x) - 1)):
+            if x3 < 3.0 * x[j] - TOUCH or x3 > 3.0 * x[j + 1] + TOUCH:
+                continue
+            nw = is_there(bits, columns, i, j)
+            ne = is_there(bits, columns, i, j + 1)
+            sw = is_there(bits, columns, i + 1, j)
+            se = is_there(bits, columns, i + 1, j + 1)
+            west, east, north, south = x[j], x[j + 1], y[i], y[i + 1]
+            # as heights.grid_mesh cuts them
+            if nw and se:
+                if sw and _holds(west, north, west, south, east, south, x3, y3):
+                    return True
+                if ne and _holds(west, north, east, south, east, north, x3, y3):
+                    return True
+            elif sw and ne:
+                if se and _holds(west, south, east, south, east, north, x3, y3):
+                    return True
+                if nw and _holds(west, north, west, south, east, north, x3, y3):
+                    return True
+    return False
 
 
 @inner
@@ -221,7 +300,7 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     none = np.zeros(0, np.int32)
     faces = np.ascontiguousarray(faces, np.int32)
     if convex:
-        return Footprint(0, 0, np.zeros(0, np.uint8), none, none, faces)
+        return Footprint(0, 0, np.zeros(0, np.uint8), none, none, faces, np.empty(0), np.empty(0))
     flat = np.ascontiguousarray(xy, float).ravel()
     # Two cells a face in the box of the mesh: fine enough that few cells are mixed and each of those has few faces, and
     # still small beside the model.
@@ -238,4 +317,4 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     items = np.zeros(start[-1], np.int32)
     cursor = start.copy()
     _face_cells(flat, faces, side, columns, state, cursor, items, True)
-    return Footprint(side, columns, state, start.astype(np.int32), items, faces)
+    return Footprint(side, columns, state, start.astype(np.int32), items, faces, np.empty(0), np.empty(0))

@@ -25,6 +25,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import BoolArray, require_bool
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
+from meshsimp_pymoo.search.heap import make_heap, sift_down, sift_up
 from meshsimp_pymoo.surface.moves import (
     cells_around,
     effort,
@@ -271,56 +272,6 @@ PATIENCE = 0.125
 # How often all sites are costed again where the one that adds the least adds too much.
 MOST_PASSES = 4
 
-# ------------------------------------------------------------------------------------------------- a heap of keys
-
-
-@inner(inline=True)
-def _before(key: np.ndarray, a: int, b: int) -> bool:
-    """Order of the heap: by both keys, then by index, so that ties do not depend on history."""
-    if key[2 * a] != key[2 * b]:
-        return key[2 * a] < key[2 * b]
-    if key[2 * a + 1] != key[2 * b + 1]:
-        return key[2 * a + 1] < key[2 * b + 1]
-    return a < b
-
-
-@inner
-def _sift_up(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int) -> None:
-    v = heap[k]
-    while k > 0:
-        parent = (k - 1) >> 1
-        if not _before(key, v, heap[parent]):
-            break
-        heap[k] = heap[parent]
-        at[heap[k]] = k
-        k = parent
-    heap[k] = v
-    at[v] = k
-
-
-@inner
-def _sift_down(heap: np.ndarray, at: np.ndarray, key: np.ndarray, k: int, n: int) -> None:
-    v = heap[k]
-    while True:
-        child = 2 * k + 1
-        if child >= n:
-            break
-        if child + 1 < n and _before(key, heap[child + 1], heap[child]):
-            child += 1
-        if not _before(key, heap[child], v):
-            break
-        heap[k] = heap[child]
-        at[heap[k]] = k
-        k = child
-    heap[k] = v
-    at[v] = k
-
-
-@inner
-def _make_heap(heap: np.ndarray, at: np.ndarray, key: np.ndarray, n: int) -> None:
-    for k in range(n // 2 - 1, -1, -1):
-        _sift_down(heap, at, key, k, n)
-
 
 @inner
 def _cost_again(g: Any, live: Any, v: int, key: np.ndarray, patience: np.ndarray) -> None:
@@ -377,7 +328,7 @@ def begin_thinning(
             heap[n] = v
             at[v] = n
             n += 1
-    _make_heap(heap, at, key, n)
+    make_heap(heap, at, key, n)
     error[0] = error_now(g, live)
     triangles[0] = n_triangles(g, live)
     return n
@@ -406,7 +357,7 @@ def go_on_thinning(
         v = heap[0]
         if patience[v] < 0:
             _cost_again(g, live, v, key, patience)
-            _sift_down(heap, at, key, 0, n)
+            sift_down(heap, at, key, 0, n)
             continue
         if not key[2 * v] < np.inf or key[2 * v] > limit:
             # A hub that waits may cost less by now.
@@ -417,14 +368,14 @@ def go_on_thinning(
                     n_waiting += 1
             if n_waiting == 0:
                 break
-            _make_heap(heap, at, key, n)
+            make_heap(heap, at, key, n)
             continue
         n -= 1
         heap[0] = heap[n]
         at[heap[0]] = 0
         at[v] = -1
         if n > 0:
-            _sift_down(heap, at, key, 0, n)
+            sift_down(heap, at, key, 0, n)
         m = sites_around(g, live, v, around)
         if not exchange(g, live, v, -1):
             continue
@@ -441,14 +392,14 @@ def go_on_thinning(
             heap[n] = v
             at[v] = n
             n += 1
-            _sift_up(heap, at, key, n - 1)
+            sift_up(heap, at, key, n - 1)
             if key[2 * v] > before:
                 continue
             if is_fresh or n_passes == MOST_PASSES:
                 break
             for k in range(n):
                 _cost_again(g, live, heap[k], key, patience)
-            _make_heap(heap, at, key, n)
+            make_heap(heap, at, key, n)
             is_fresh = True
             n_passes += 1
             continue
@@ -466,8 +417,8 @@ def go_on_thinning(
                 if patience[w] != 0:
                     continue
             _cost_again(g, live, w, key, patience)
-            _sift_up(heap, at, key, at[w])
-            _sift_down(heap, at, key, at[w], n)
+            sift_up(heap, at, key, at[w])
+            sift_down(heap, at, key, at[w], n)
     return n_removed, n
 
 
@@ -564,8 +515,8 @@ def _grow(
                 heap[n] = r
                 at[r] = n
                 n += 1
-            _sift_up(heap, at, key, at[r])
-            _sift_down(heap, at, key, at[r], n)
+            sift_up(heap, at, key, at[r])
+            sift_down(heap, at, key, at[r], n)
         if n_inserted == len(inserted) or n == 0 or stop[0] or error[n_inserted] <= least:
             return n_inserted
         if key[2 * heap[0]] == np.inf:

@@ -12,8 +12,7 @@ import numpy as np
 
 from meshsimp_pymoo.compiling.functions import inner
 from meshsimp_pymoo.plane.constraints import holds_line
-from meshsimp_pymoo.plane.emission import is_sliver, sum_of_three
-from meshsimp_pymoo.plane.footprint import inside
+from meshsimp_pymoo.plane.emission import is_in_faces, is_sliver
 from meshsimp_pymoo.surface.books import LARGEST
 from meshsimp_pymoo.surface.evaluate import COVER_TOLERANCE, REACH
 from meshsimp_pymoo.surface.ground import Ground
@@ -129,12 +128,9 @@ def bare_deviation(g: Ground, a: int, b: int, c: int, i: int, gap: float) -> flo
 @inner(inline=True)
 def is_inside(g: Ground, a: int, b: int, c: int) -> bool:
     """Whether the footprint holds the centroid of (a, b, c), or the triangle a line."""
-    if g.side == 0:
+    if g.footprint.side == 0:
         return True
-    xy = g.xy
-    x3 = sum_of_three(xy[2 * a], xy[2 * b], xy[2 * c])
-    y3 = sum_of_three(xy[2 * a + 1], xy[2 * b + 1], xy[2 * c + 1])
-    return inside(xy, g.side, g.columns, g.state, g.start, g.items, g.faces, x3, y3) or holds_line(xy, g.lines, a, b, c)
+    return is_in_faces(g.xy, g.footprint, g.xy, a, b, c) or holds_line(g.xy, g.lines, a, b, c)
 
 
 @inner(inline=True)

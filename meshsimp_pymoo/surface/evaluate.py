@@ -97,6 +97,49 @@ def _gather(
     return n
 
 
+@inner(inline=True)
+def beside_mesh(
+    site_xy: np.ndarray,
+    site_z: np.ndarray,
+    ends: np.ndarray,
+    key: np.ndarray,
+    boxes: np.ndarray,
+    stack: np.ndarray,
+    unit: float,
+    nearest: bool,
+    x: float,
+    y: float,
+    z: float,
+    guess: int,
+) -> tuple[float, bool, int]:
+    """Return d_p of a sample at (x, y, z) in no emitted triangle, whether one covers it all the same, and its segment.
+
+    The mesh's outline are the segments ``ends`` with their ranks ``key`` and ``boxes``; ``guess`` is any of them, and
+    ``stack`` has room for 64 nodes.
+    """
+    guess, t, d2 = nearest_segment(site_xy, ends, key, len(key), boxes, stack, x, y, guess)
+    a, b, c = ends[guess, 0], ends[guess, 1], ends[guess, 2]
+    ux = site_xy[2 * b] - site_xy[2 * a]
+    uy = site_xy[2 * b + 1] - site_xy[2 * a + 1]
+    vx = site_xy[2 * c] - site_xy[2 * a]
+    vy = site_xy[2 * c + 1] - site_xy[2 * a + 1]
+    px = x - site_xy[2 * a]
+    py = y - site_xy[2 * a + 1]
+    area = ux * vy - uy * vx
+    wb = (px * vy - py * vx) / area
+    wc = (py * ux - px * uy) / area
+    wa = 1.0 - wb - wc
+    is_near = d2 <= REACH * REACH
+    is_covered = is_near and wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
+    if is_covered:
+        # Within rounding of the border, as on the sides of a turned rectangle.
+        d = abs(wa * site_z[a] + wb * site_z[b] + wc * site_z[c] - z)
+    else:
+        dz = (1.0 - t) * site_z[a] + t * site_z[b] - z
+        d = np.sqrt(d2 * unit * unit + dz * dz) if nearest else 0.0
+    return d, is_covered, guess
+
+
 @inner
 def _measure_bare(
     xy: np.ndarray,
@@ -123,29 +166,11 @@ def _measure_bare(
     guess = 0
     for q in range(n_bare):
         i = bare[q]
-        x = xy[2 * i]
-        y = xy[2 * i + 1]
-        guess, t, d2 = nearest_segment(site_xy, ends, key, len(key), boxes, stack, x, y, guess)
-        a, b, c = ends[guess, 0], ends[guess, 1], ends[guess, 2]
-        ux = site_xy[2 * b] - site_xy[2 * a]
-        uy = site_xy[2 * b + 1] - site_xy[2 * a + 1]
-        vx = site_xy[2 * c] - site_xy[2 * a]
-        vy = site_xy[2 * c + 1] - site_xy[2 * a + 1]
-        px = x - site_xy[2 * a]
-        py = y - site_xy[2 * a + 1]
-        area = ux * vy - uy * vx
-        wb = (px * vy - py * vx) / area
-        wc = (py * ux - px * uy) / area
-        wa = 1.0 - wb - wc
-        is_near = d2 <= REACH * REACH
-        is_covered = is_near and wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
-        if is_covered:
-            # Within rounding of the border, as on the sides of a turned rectangle.
-            d = abs(wa * site_z[a] + wb * site_z[b] + wc * site_z[c] - z[i])
-        else:
+        d, is_covered, guess = beside_mesh(
+            site_xy, site_z, ends, key, boxes, stack, unit, nearest, xy[2 * i], xy[2 * i + 1], z[i], guess
+        )
+        if not is_covered:
             row[UNCOVERED] += 1
-            dz = (1.0 - t) * site_z[a] + t * site_z[b] - z[i]
-            d = np.sqrt(d2 * unit * unit + dz * dz) if nearest else 0.0
         w = weight[i] if len(weight) > 0 else 1.0
         row[ERROR] += w * d
         row[SQUARES] += w * d * d
@@ -255,12 +280,7 @@ def _evaluate_one(
         end,
         ground.min_height,
         xy,
-        ground.side,
-        ground.columns,
-        ground.state,
-        ground.start,
-        ground.items,
-        ground.faces,
+        ground.footprint,
         ground.lines,
         sites,
         emitted,

@@ -336,7 +336,7 @@ def tried(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -> 
 def is_inside_all(free: Freedom, fan: Fan) -> bool:
     """Whether the footprint holds all triangles of the fan."""
     g = free.ground
-    if g.side == 0:
+    if g.footprint.side == 0:
         return True
     for k in range(fan.number[N_FAN]):
         a, b = np.int64(fan.ring[side_of(fan, k)]), np.int64(fan.ring[side_of(fan, k + 1)])

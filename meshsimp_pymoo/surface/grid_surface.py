@@ -18,7 +18,7 @@ from meshsimp_pymoo.arrays import BoolArray, Csr, FloatArray, IntArray, Rows, re
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.heights import MESH_SAMPLE_BYTES, grid_mesh
 from meshsimp_pymoo.memory import check_free
-from meshsimp_pymoo.plane.faces import canonical_faces, one_rings
+from meshsimp_pymoo.plane.faces import border_vertices, canonical_faces, one_rings
 from meshsimp_pymoo.reprs import in_short
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -26,9 +26,9 @@ from meshsimp_pymoo.surface.measures import REGIONS
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
-from meshsimp_pymoo.surface.weld import measured, tabulated, weld
+from meshsimp_pymoo.surface.weld import WeldedMesh, measured, tabulated, weld
 
-#: Rules that may be anything: a grid without gaps fills its hull. The others are as they are where nothing is said.
+#: Rules that may be anything. The others are as they are where nothing is said.
 FREE_RULES = ("footprint", "outside")
 
 
@@ -38,7 +38,7 @@ class GridSurface:
     Parameters
     ----------
     grid : HeightGrid
-        The grid of N samples.
+        The grid of N vertices.
     rules : Rules
         What counts.
 
@@ -63,17 +63,17 @@ class GridSurface:
 
     @property
     def n_vertices(self) -> int:
-        """Number N of samples."""
+        """Number N of samples that belong to a face."""
         return self.model.n_vertices
 
     @property
     def points(self) -> Any:
-        """The samples (N, 3) from a local origin [model units]."""
+        """The vertices (N, 3) from a local origin [model units]."""
         grid = self.model
         if grid.model is not None:
             row_of, points = grid.row_of, grid.model.points
-            return Rows(lambda samples: points[row_of[samples]], self.n_vertices)  # type: ignore[index]
-        return Rows(lambda samples: grid.file_points[samples] * self.view.scale - self.view.pivot, self.n_vertices)
+            return Rows(lambda vertices: points[row_of[vertices]], self.n_vertices)  # type: ignore[index]
+        return Rows(lambda vertices: grid.file_points[vertices] * self.view.scale - self.view.pivot, self.n_vertices)
 
     @property
     def faces(self) -> Any:
@@ -82,14 +82,14 @@ class GridSurface:
 
     @cached_property
     def pinned(self) -> BoolArray:
-        """The four corners."""
+        """The corners."""
         pinned = np.zeros(self.n_vertices, bool)
-        pinned[self.model.corners] = True
+        pinned[self.model.vertices(self.model.corners)] = True
         return pinned
 
     @property
     def total_weight(self) -> float:
-        """All samples count alike."""
+        """All vertices count alike."""
         return float(self.n_vertices)
 
     @cached_property
@@ -104,7 +104,9 @@ class GridSurface:
 
     @property
     def border(self) -> IntArray:
-        """The samples of the first and last rows and columns."""
+        """The vertices of the first and last rows and columns; with gaps those at edges of one original face."""
+        if self.model.lattice is not None:
+            return border_vertices(np.asarray(self.faces))
         rows, columns = self.model.shape
         inside = np.zeros((rows, columns), bool)
         inside[1:-1, 1:-1] = True
@@ -112,8 +114,9 @@ class GridSurface:
 
     @property
     def places(self) -> Any:
-        """The samples (N, 2) in the unit square."""
-        return Rows(self.model.xy_at, self.n_vertices)
+        """The vertices (N, 2) in the unit square."""
+        grid = self.model
+        return Rows(lambda vertices: grid.xy_at(grid.numbers(vertices)), self.n_vertices)
 
     @cached_property
     def view(self) -> View:
@@ -127,19 +130,49 @@ class GridSurface:
         return View(high - low, np.eye(3), low, scale)
 
     def selection(self, most: int) -> BoolArray:
-        """Return at most so many samples (N,), spread evenly, the corners among them."""
-        (rows, columns), stride = self.model.shape, 1
+        """Return at most so many vertices (N,), spread evenly, the corners among them."""
+        grid = self.model
+        (rows, columns), stride = grid.shape, 1
+        selected = np.zeros(self.n_vertices, bool)
+        if grid.lattice is not None:
+            # as many crossings as leave so many vertices, if they are spread evenly over all
+            most = max(most - len(grid.corners), 4)
+            share = self.n_vertices / (rows * columns)
+            while True:
+                n_crossings = (-(-(rows - 1) // stride) + 1) * (-(-(columns - 1) // stride) + 1)
+                if share * n_crossings <= most:
+                    row, column = (np.r_[0 : n - 1 : stride, n - 1] for n in (rows, columns))
+                    at = np.flatnonzero(grid.lattice.at(row[:, None], column))
+                    if len(at) <= most:
+                        break
+                stride += 1
+            i, j = np.divmod(at, len(column))
+            selected[grid.vertices(np.concatenate([row[i] * columns + column[j], grid.corners]))] = True
+            return selected
         while (-(-(rows - 1) // stride) + 1) * (-(-(columns - 1) // stride) + 1) > most:
             stride += 1
-        selected = np.zeros((rows, columns), bool)
-        at = [np.r_[0 : n - 1 : stride, n - 1] for n in (rows, columns)]
-        selected[np.ix_(*at)] = True
-        return selected.ravel()
+        every = selected.reshape(rows, columns)
+        every[np.ix_(*(np.r_[0 : n - 1 : stride, n - 1] for n in (rows, columns)))] = True
+        return selected
 
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""
-        mesh = weld(self.model, np.flatnonzero(self._checked(kept)))
-        return canonical_faces(mesh.samples[mesh.faces])
+        return self._faces_of(self._welded(kept))
+
+    def _welded(self, kept: BoolArray, *, may_be_none: bool = False) -> WeldedMesh:
+        """Return the mesh of one subset (N,)."""
+        grid = self.model
+        mesh = weld(grid, grid.numbers(np.flatnonzero(self._checked(kept))), self.rules)
+        if not may_be_none and mesh.n_triangles == 0:
+            raise ValueError(
+                f"{int(np.sum(kept))} kept vertices of {grid.name} span no triangle of the mesh; keep more of them, "
+                "the corners first"
+            )
+        return mesh
+
+    def _faces_of(self, mesh: WeldedMesh) -> IntArray:
+        """Return the triangles (M, 3) of a mesh as vertices."""
+        return canonical_faces(self.model.vertices(mesh.samples)[mesh.faces])
 
     def evaluate(self, kept: BoolArray, *, threads: int = 1, regions: int = 0) -> FloatArray:
         """Return the table (P, 6) of numbers of subsets (P, N)."""
@@ -149,7 +182,7 @@ class GridSurface:
         found = [
             tabulated(
                 self.model,
-                weld(self.model, np.flatnonzero(self._checked(row))),
+                self._welded(row, may_be_none=True),
                 none,
                 between=False,
                 n_threads=threads,
@@ -159,12 +192,17 @@ class GridSurface:
         return np.array(found).reshape(-1, REGIONS)
 
     def simplify(self, kept: BoolArray, *, rows: IntArray | None = None) -> Simplified:
-        """Return the mesh of one subset (N,), and its deviation at all samples or at those of ``rows``, ascending."""
-        mesh = weld(self.model, np.flatnonzero(self._checked(kept)))
-        at = np.arange(self.n_vertices) if rows is None else rows
-        quality, deviation = measured(self.model, mesh, at, n_threads=os.cpu_count() or 1)
-        faces = canonical_faces(mesh.samples[mesh.faces])
-        return Simplified(faces, quality, deviation, np.ones(len(at), bool))
+        """Return the mesh of one subset (N,), and its deviation at all vertices or at those of ``rows``, ascending.
+
+        Raises
+        ------
+        ValueError
+            If no triangle is emitted, as all lie in gaps.
+        """
+        grid, mesh = self.model, self._welded(kept)
+        at = grid.numbers(np.arange(self.n_vertices) if rows is None else rows)
+        quality, deviation, covered = measured(grid, mesh, at, n_threads=os.cpu_count() or 1)
+        return Simplified(self._faces_of(mesh), quality, deviation, covered)
 
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Refuse: free meshes are made and measured with a model in one piece."""
@@ -178,7 +216,7 @@ class GridSurface:
 
     @cached_property
     def _whole(self) -> tuple[OpenModel, IntArray]:
-        """The grid as a model in one piece, and the row of each sample in it."""
+        """The grid as a model in one piece, and the row of each vertex in it."""
         grid = self.model
         if grid.model is not None and grid.row_of is not None:
             return grid.model, grid.row_of
@@ -189,7 +227,7 @@ class GridSurface:
         )
         source = grid_mesh(
             np.asarray(grid.heights[:, :]),
-            np.zeros(grid.shape, bool),
+            np.zeros(grid.shape, bool) if grid.lattice is None else ~grid.lattice.rows(0, grid.shape[0]),
             lambda i, j: (grid.file_x[j], grid.file_y[i]),
             nodata=None,
             name=grid.name,

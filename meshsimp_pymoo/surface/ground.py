@@ -8,6 +8,7 @@ import numpy as np
 
 from meshsimp_pymoo.plane.constraints import NO_CONSTRAINTS, Constraints, make_constraints
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
+from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.nearest import boxes_of_runs
 from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.surface.books import RUN
@@ -27,12 +28,7 @@ class Ground(NamedTuple):
     min_height: float  # of a triangle at the hull, in the unit square
     exact_area: float  # up to where double precision is exact, see plane.predicates
     exact_lift: float
-    side: int  # the footprint, see plane.footprint; 0: all of the hull
-    columns: int
-    state: np.ndarray
-    start: np.ndarray
-    items: np.ndarray
-    faces: np.ndarray
+    footprint: Footprint  # of side 0: all of the hull
     lines: Constraints  # forced edges
     boxes: np.ndarray  # (2 N / RUN, 4) of the vertices in each node of the tree over runs of them, see bare
     nearest: bool  # whether an uncovered vertex costs its distance
@@ -50,7 +46,8 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
     xy = np.ascontiguousarray(model.xy)
     extent = np.ptp(xy, axis=0)
     area, lift = exact_ranges(xy)
-    footprint, by_footprint = model.footprint, rules.footprint == "model"
+    by_footprint = rules.footprint == "model"
+    footprint = model.footprint if by_footprint else make_footprint(xy, model.faces, np.empty((0, 2)), convex=True)
     weight = np.empty(0) if model.weights is None else model.weights
     power = OBJECTIVES[rules.measure].power
     return Ground(
@@ -62,12 +59,7 @@ def make_ground(model: OpenModel, rules: Rules) -> Ground:
         min_height=SLIVER_HEIGHT * float(np.hypot(extent[0], extent[1])),
         exact_area=area,
         exact_lift=lift,
-        side=footprint.side if by_footprint else 0,
-        columns=footprint.columns,
-        state=footprint.state,
-        start=footprint.start,
-        items=footprint.items,
-        faces=footprint.faces,
+        footprint=footprint,
         lines=NO_CONSTRAINTS
         if model.lines is None
         else make_constraints(xy, model.lines.segments, footprint if by_footprint else None),

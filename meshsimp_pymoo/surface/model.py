@@ -360,6 +360,7 @@ def placed_model(
     unit: float,
     source_index: IntArray,
     weights: FloatArray | None = None,
+    footprint: Footprint | None = None,
 ) -> OpenModel:
     """Return a model of arrays that are upright and in vector order already, without a look at them.
 
@@ -381,8 +382,10 @@ def placed_model(
         Row of each vertex in whatever they come from.
     weights : (N,) float array, optional
         See :class:`OpenModel`.
+    footprint : Footprint, optional
+        Where its faces are, if ``faces`` do not say so.
     """
-    return OpenModel(
+    model = OpenModel(
         name=name,
         points=points,
         faces=faces.astype(np.int32),
@@ -398,6 +401,9 @@ def placed_model(
         unit=unit,
         weights=weights,
     )
+    if footprint is not None:
+        vars(model)["footprint"] = footprint
+    return model
 
 
 def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:

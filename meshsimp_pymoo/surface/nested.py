@@ -115,5 +115,6 @@ class Chromosomes:
 
     def __getitem__(self, number: Any) -> Any:
         kept = np.zeros(self._model.n_vertices, bool)
-        kept[self._model.samples_of_rows(self._nested.subset(number))] = True
+        model = self._model
+        kept[model.vertices(model.samples_of_rows(self._nested.subset(number)))] = True
         return kept

@@ -311,7 +311,7 @@ def tried(g: Ground, live: Live, v: int, w: int, limit: float) -> tuple[float, i
         return unknown
     gone_change = change
     # Where all triangles are emitted, at the hull as well, no vertex is bare that lies in one that comes.
-    if at_outline and (g.side > 0 or live.tally[N_BARE] > 0 or live.tally[N_THIN] > 0):
+    if at_outline and (g.footprint.side > 0 or live.tally[N_BARE] > 0 or live.tally[N_THIN] > 0):
         change = _at_outline(g, live, v, w, limit, gone_change, n_gone, n_star, n_ears, n_rim, n)
         return change, n_shown - n_emitted
     head = live.head

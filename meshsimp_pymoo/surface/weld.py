@@ -1,8 +1,9 @@
 """The mesh of a kept subset of a height grid, and its error over all samples.
 
 The mesh is the Delaunay triangulation of the kept samples, the same triangles that
-:func:`~meshsimp_pymoo.surface.evaluate.simplify` gives for the same subset of the same grid in memory. Its error is
-added up over all samples, band by band, so that memory holds the mesh and a few rows of heights.
+:meth:`~meshsimp_pymoo.surface.height.HeightSurface.simplify` gives for the same subset of the same grid in memory. Its
+error is added up over all samples, band by band, so that memory holds the mesh and a few rows of heights. Where the
+grid has gaps, a triangle may lie outside its faces and a sample outside the mesh: see `meshsimp_pymoo.surface.gaps`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, height_on, lo
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.centroids import Between
 from meshsimp_pymoo.surface.evaluate import measure_between
+from meshsimp_pymoo.surface.gaps import emitted_of, tabulated_with_gaps
 from meshsimp_pymoo.surface.grid import Cells, HeightGrid
 from meshsimp_pymoo.surface.measures import (
     ERROR,
@@ -33,6 +35,7 @@ from meshsimp_pymoo.surface.measures import (
     Quality,
     as_quality,
 )
+from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.workers import on_threads
 
@@ -50,12 +53,18 @@ class WeldedMesh:
         Their coordinates in the unit square and heights [file units].
     records : uint32 array
         The triangles with their neighbours; see :mod:`meshsimp_pymoo.plane.triangulation`.
+    emitted : bool array
+        Which of the records are triangles of the mesh: not the ghosts beyond the hull, nor what the rules leave out.
+    nearest : bool
+        Whether a sample outside the mesh costs its distance.
     """
 
     samples: IntArray
     xy: FloatArray
     z: FloatArray
     records: npt.NDArray[np.uint32]
+    emitted: BoolArray
+    nearest: bool = True
 
     @property
     def faces(self) -> IntArray:
@@ -68,17 +77,12 @@ class WeldedMesh:
         return self.records.reshape(-1, RECORD)[self.emitted, :3].astype(np.int64)
 
     @property
-    def emitted(self) -> BoolArray:
-        """Which of the records are triangles: not the ghosts beyond the hull."""
-        return self.records.reshape(-1, RECORD)[:, :3].max(axis=1) <= LAST_INDEX
-
-    @property
     def n_triangles(self) -> int:
         """Number of triangles."""
         return int(self.emitted.sum())
 
 
-def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
+def weld(grid: HeightGrid, kept: IntArray, rules: Rules = DEFAULT) -> WeldedMesh:
     """Triangulate kept samples.
 
     Parameters
@@ -86,7 +90,9 @@ def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
     grid : HeightGrid
         The grid.
     kept : (V,) int array
-        Numbers of the samples, the four corners among them.
+        Numbers of the samples, the corners among them.
+    rules : Rules
+        Which triangles are emitted, and what a sample costs that none of them covers, where the grid has gaps.
 
     Raises
     ------
@@ -95,7 +101,7 @@ def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
     """
     kept = np.sort(np.asarray(kept, np.int64))
     if not np.isin(grid.corners, kept).all():
-        raise ValueError(f"the {len(kept)} samples lack a corner of {grid.name}; keep all four")
+        raise ValueError(f"the {len(kept)} samples lack a corner of {grid.name}; keep all of them")
     xy, z = grid.xy_at(kept), grid.height_at(kept)
     order = vector_order(xy, z)
     samples, xy, z = kept[order], np.ascontiguousarray(xy[order]), z[order]
@@ -105,7 +111,12 @@ def weld(grid: HeightGrid, kept: IntArray) -> WeldedMesh:
         xy.ravel(), len(samples), first, np.empty(0, np.int64), np.empty(len(samples), np.uint8), records,
         *grid.exact_ranges,
     )  # fmt: skip
-    return WeldedMesh(samples, xy, z, records[:end])
+    records, rules = records[:end], rules.of_heights
+    if grid.lattice is None:
+        emitted = records.reshape(-1, RECORD)[:, :3].max(axis=1) <= LAST_INDEX
+    else:
+        emitted = emitted_of(grid, xy, records, rules)
+    return WeldedMesh(samples, xy, z, records, emitted, rules.outside == "nearest")
 
 
 def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Quality:
@@ -113,20 +124,27 @@ def measure(grid: HeightGrid, mesh: WeldedMesh, *, n_threads: int = 1) -> Qualit
     return measured(grid, mesh, np.empty(0, np.int64), n_threads=n_threads)[0]
 
 
-def measured(grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int = 1) -> tuple[Quality, FloatArray]:
-    """Measure a mesh over all samples of the grid and return its deviation at some too, numbered ascending."""
-    row, deviation, between = tabulated(grid, mesh, at, between=True, n_threads=n_threads)
+def measured(
+    grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, n_threads: int = 1
+) -> tuple[Quality, FloatArray, BoolArray]:
+    """Measure a mesh over all samples of the grid; return its deviation at some too, ascending, and its cover there."""
+    row, deviation, covered, between = tabulated(grid, mesh, at, between=True, n_threads=n_threads)
     angles = measured_angles(mesh.xy, mesh.unsorted_faces)
-    return as_quality(row, grid.n_vertices, surface_error=between, **angles), deviation
+    return as_quality(row, grid.n_vertices, surface_error=between, **angles), deviation, covered
 
 
 def tabulated(
     grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, between: bool, n_threads: int = 1
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return the numbers (6,) of a mesh over all samples, its deviation at some, and its mean between them, if wanted.
+) -> tuple[FloatArray, FloatArray, BoolArray, float]:
+    """Return the numbers (6,) of a mesh over all samples, and its mean between them, if wanted.
+
+    Between these two: its deviation at the samples ``at``, ascending, and whether it covers them.
 
     The sums are taken row by row and then over the rows, so they do not depend on the number of threads.
     """
+    if grid.lattice is not None:
+        arrays = mesh.xy, mesh.z, mesh.records, mesh.emitted
+        return tabulated_with_gaps(grid, arrays, mesh.nearest, at, between=between, n_threads=n_threads)
     n_rows, n_columns = grid.shape
     table = np.zeros((n_rows, 4))
     centroids = grid.between if between else None
@@ -169,7 +187,7 @@ def tabulated(
         surface_error = measure_between(
             centroids, flat, mesh.z, mesh.records, len(mesh.records), emitted, grid.unit, True, False
         )
-    return row, deviation, surface_error
+    return row, deviation, np.ones(len(at), bool), surface_error
 
 
 def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, IntArray]]:
@@ -183,7 +201,7 @@ def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, 
     grid : HeightGrid
         The grid.
     faces : (M, 3) int array
-        The mesh, its corners by sample.
+        The mesh, its corners by vertex of the grid.
     size : int
         Samples along one side of a tile.
 
@@ -193,7 +211,7 @@ def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, 
         Row and column of the tile, from the north-west, as a name; its triangles. Tiles without a triangle are left
         out.
     """
-    row, column = np.divmod(faces, grid.shape[1])
+    row, column = np.divmod(grid.numbers(faces.ravel()).reshape(-1, 3), grid.shape[1])
     tile_row, tile_column = row.sum(axis=1) // (3 * size), column.sum(axis=1) // (3 * size)
     number = tile_row * (grid.shape[1] // size + 1) + tile_column
     order = np.argsort(number, kind="stable")

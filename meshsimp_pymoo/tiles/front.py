@@ -10,11 +10,13 @@ The vertices along the tiles' edges were fixed, too many of them. So the same is
 third of their side, and by two thirds: whatever lay along an edge lies inside a tile in one of three phases. From then
 on each phase thins to a somewhat larger slope, cut otherwise than the one before. Every phase ends with one row of the
 front, a subset of the row before. When few vertices are left, tiles grow: every second row and column of samples then
-stands for the others, and so on, until one tile holds the whole; it is thinned to the end. The vertices of the
+stands for the others, and so on, until one tile holds the whole; it is thinned to the end. Tiles grow as well where
+many phases came to nothing: so there are only so many of them, whatever the vertices are held by. The vertices of the
 smallest solutions are moved then, each solution's for itself (see `meshsimp_pymoo.search.coarse`): these alone are no
 subsets of the ones before.
 
-The errors of the front are measured afterwards, for each row over all samples.
+The errors of the front are measured afterwards, for each row over all samples. Where a grid has gaps the triangles are
+counted that are emitted, and tiles without samples are left out; see `meshsimp_pymoo.tiles.gaps`.
 
 References
 ----------
@@ -40,7 +42,7 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError, SearchWarning, reason_of
 from meshsimp_pymoo.files import new_file
 from meshsimp_pymoo.front import Front
-from meshsimp_pymoo.search.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGrid, move, strided
+from meshsimp_pymoo.search.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGaps, CoarseGrid, move, strided
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.grid_surface import GridSurface
@@ -48,26 +50,35 @@ from meshsimp_pymoo.surface.measures import MEASURES, Quality, quality_of
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.weld import measure, weld
-from meshsimp_pymoo.tiles.thin import Tile, thin_tile
+from meshsimp_pymoo.tiles.gaps import blocks_of, gaps_in, start_with_gaps, thin_with_gaps
+from meshsimp_pymoo.tiles.thin import Tile, start_tile, thin_tile
 from meshsimp_pymoo.workers import Engine, Serial
 
 #: Samples along one side of a tile.
-TILE = 512
+TILE = 256
 LEAST_TILE = 64
 # The finest solution has at most this share of the grid's triangles, and at most so many, unless more are asked for.
 FINEST = 0.1
 MOST_TRIANGLES = 1_200_000
-# From row to row the slope grows by this factor, the number of triangles falls by about a ninth.
+# From row to row the slope grows by this factor, the number of triangles falls by about a ninth; and rows of a phase,
+# whose levels tell them apart.
 SLOPE_STEP = 1.2
+ROWS = 2
 # Phases that thin less than this share of the vertices make no row; the next step is twice as large.
 LEAST_CHANGE = 0.01
+# After so many phases without one tiles grow.
+MOST_IDLE = 10
 # Samples for each vertex, above which only every second row and column of them is looked at.
-ENOUGH_SAMPLES = 64
+ENOUGH_SAMPLES = 32
 # Where one tile holds everything, each solution has this share of vertices less than the one before.
 LAST_STEP = 0.1
 # How far above the wanted size the finest solution may be.
 ABOUT = 1.1
 SHIFTS = (0.0, 1 / 3, 2 / 3)
+# Samples that are inserted to begin with, for each vertex of the finest row, and the least share of all samples: thinned
+# from there a row has at most some 2 % more error than thinned from all (six DEMs). Where it would be more than the last
+# share there is little to be saved, and all are thinned.
+INSERTED, LEAST_INSERTED, MOST_INSERTED = 3.0, 0.15, 0.3
 LOST = "a finished tile was stored, but is gone or damaged; start the same call again"
 
 # Called with (share done, what is being done).
@@ -158,7 +169,7 @@ def usual_most(grid: HeightGrid) -> int:
     return max(2, min(int(FINEST * len(grid.faces)), MOST_TRIANGLES))
 
 
-def identity(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> dict[str, Any]:
+def identity(grid: HeightGrid, *, tile: int = TILE, most: int | None = None, rules: Rules = DEFAULT) -> dict[str, Any]:
     """Return what the pieces of a call of :func:`tiled_front` depend on, and check it.
 
     Raises
@@ -170,14 +181,18 @@ def identity(grid: HeightGrid, *, tile: int = TILE, most: int | None = None) -> 
         raise ValueError(f"tile is {tile}; a tile needs at least {LEAST_TILE} samples along its side")
     if most is not None and most < 2:
         raise ValueError(f"most is {most}; a mesh of the grid has at least 2 triangles")
+    rules = rules.of_heights
     return {
         "model": grid.hash,
+        # without gaps they make no difference
+        **({} if grid.lattice is None else {"footprint": rules.footprint, "outside": rules.outside}),
         "tile": tile,
         "most": most or usual_most(grid),
-        "slope_step": SLOPE_STEP,
+        "slopes": [SLOPE_STEP, ROWS],
+        "inserted": [INSERTED, LEAST_INSERTED, MOST_INSERTED],
         "enough_samples": ENOUGH_SAMPLES,
         "searched": [SEARCHED, SAMPLES, MOVES],
-        "format": 3,
+        "format": 4,
     }
 
 
@@ -228,16 +243,19 @@ def tiled_front(
     SearchWarning
         If there was not the time to move the vertices of all small solutions.
     """
-    what = identity(grid, tile=tile, most=most)
-    work = _Phases(grid, tile, engine or Serial(), store or InMemory(), progress or (lambda share, text: None))
-    n_wanted = what["most"] // 2
+    what = identity(grid, tile=tile, most=most, rules=rules)
+    surface = GridSurface(grid, rules)
+    work = _Phases(grid, tile, engine or Serial(), store or InMemory(), progress or (lambda share, text: None), rules)
+    n_wanted = work.vertices_of(what["most"])
     # A tile with few vertices could thin hardly any: all lie near its edge. So tiles this small begin finer.
     samples, slope = work.start(max(n_wanted, grid.n_vertices // ENOUGH_SAMPLES))
     level = np.full(len(samples), np.inf)
     slopes = [slope]
     n_kept, n_row = len(samples), len(samples)
-    phase, stride, step = len(SHIFTS), 1, SLOPE_STEP
+    phase, stride, step, n_idle = len(SHIFTS), 1, SLOPE_STEP**ROWS, 0
     while True:
+        if n_idle == MOST_IDLE:
+            stride, step, n_idle = 2 * stride, SLOPE_STEP**ROWS, 0
         while ENOUGH_SAMPLES * stride**2 * n_kept < grid.n_vertices:
             stride *= 2
         if work.is_one_tile(stride):
@@ -248,18 +266,18 @@ def tiled_front(
         phase += 1
         n_kept -= len(removed)
         if n_kept <= (1.0 - LEAST_CHANGE) * n_row:
-            slopes.append(slope)
-            n_row, step = n_kept, SLOPE_STEP
+            slopes += np.geomspace(before, slope, ROWS + 1)[1:].tolist()
+            n_row, step, n_idle = n_kept, SLOPE_STEP**ROWS, 0
         else:
             step *= 2.0
+            n_idle += 1
     removed, at = work.finish(stride, samples[np.isinf(level)])
-    cuts = _last_cuts(at, len(grid.corners))
+    cuts = _last_cuts(at, n_kept - len(removed))
     at = _above(slope, _ascending(at))
     level[np.searchsorted(samples, removed)] = at
     slopes += at[cuts - 1].tolist()
     # what is finer than asked for was needed on the way only
-    n_left = len(level) - np.searchsorted(np.sort(level), slopes, side="right")
-    slopes = slopes[int(np.argmax(n_left <= max(ABOUT * n_wanted, len(grid.corners)))) :]
+    slopes = work.of_about(what["most"], samples, level, slopes)
     samples, level = samples[level > slopes[0]], level[level > slopes[0]]
     moved = work.move([samples[level > at] for at in slopes], until)
     quality = work.measure(
@@ -272,9 +290,8 @@ def tiled_front(
             quality[row].triangles > quality[rows[-1]].triangles and quality[row].error < quality[rows[-1]].error
         ):
             rows.append(row)
-    new = [None if kept is None else grid.source_index[kept] for kept in moved]
-    nested = Nested(grid.source_index[samples], level, np.array(slopes), tuple(new)).take(rows)
-    surface = GridSurface(grid, rules)
+    new = [None if kept is None else grid.rows_of_samples(kept) for kept in moved]
+    nested = Nested(grid.rows_of_samples(samples), level, np.array(slopes), tuple(new)).take(rows)
     return Front([quality[row] for row in rows], nested, surface=surface, run={"options": plain(grid.options)})
 
 
@@ -297,21 +314,21 @@ def _ascending(level: FloatArray) -> FloatArray:
     return level - np.abs(level) * n_after * 1e-12
 
 
-def _last_cuts(level: FloatArray, n_corners: int) -> IntArray:
+def _last_cuts(level: FloatArray, n_last: int) -> IntArray:
     """Return how many samples are gone in each of the last solutions: along the hull, but with steps that are not long.
 
     Parameters
     ----------
     level : (n,) float array
         Ascending; samples of one level belong to one side of the hull.
-    n_corners : int
+    n_last : int
         Samples that never go.
     """
     on_hull = np.flatnonzero(np.r_[level[1:] > level[:-1], True]) + 1
     cuts = []
     n_gone = 0
     while n_gone < len(level):
-        step = max(1, int(LAST_STEP * (len(level) - n_gone + n_corners)))
+        step = max(1, int(LAST_STEP * (len(level) - n_gone + n_last)))
         near = on_hull[(on_hull > n_gone) & (on_hull <= n_gone + 2 * step)]
         n_gone = int(near[np.argmin(np.abs(near - n_gone - step))]) if len(near) else n_gone + step
         cuts.append(n_gone)
@@ -353,25 +370,64 @@ class _Phases:
     """One call's work on a grid."""
 
     def __init__(
-        self, grid: HeightGrid, tile: int, engine: Engine, store: Folder | InMemory, progress: Progress
+        self,
+        grid: HeightGrid,
+        tile: int,
+        engine: Engine,
+        store: Folder | InMemory,
+        progress: Progress,
+        rules: Rules = DEFAULT,
     ) -> None:
-        self.grid = grid
+        self.grid, self.rules = grid, rules.of_heights
         self.tile = tile
         self.engine = engine
         self.store = store
         self.progress = progress
-        self.domain = np.array([grid.x[0], grid.x[-1], grid.y[-1], grid.y[0]])
+        self.elsewhere = blocks_of(grid)
+
+    def vertices_of(self, triangles: int) -> int:
+        """Return about how many vertices a mesh of so many triangles has."""
+        if self.grid.lattice is None:
+            return triangles // 2
+        return -(-triangles * self.grid.n_vertices // len(self.grid.faces))
+
+    def triangles_of(self, kept: IntArray) -> int:
+        """Return how many triangles the mesh of these samples has."""
+        if self.grid.lattice is None:
+            return int(self.grid.triangles_of(kept).sum()) - 2
+        return weld(self.grid, kept, self.rules).n_triangles
+
+    def of_about(self, most: int, samples: IntArray, level: FloatArray, slopes: list[float]) -> list[float]:
+        """Return the slopes of the solutions of about so many triangles and less: the others were on the way only."""
+        if self.grid.lattice is None:
+            n_left = len(level) - np.searchsorted(np.sort(level), slopes, side="right")
+            n_most = max(ABOUT * (most // 2), len(self.grid.corners))
+            return slopes[int(np.argmax(n_left <= n_most)) :]
+        counts = np.array([self.triangles_of(samples[level > at]) for at in slopes])
+        # where they lie in gaps altogether it is no mesh
+        first = int(np.argmax((counts > 0) & (counts <= max(ABOUT * most, counts[counts > 0].min()))))
+        return [at for at, count in zip(slopes[first:], counts[first:], strict=True) if count > 0]
 
     def is_one_tile(self, stride: int) -> bool:
         """Whether at this stride one tile holds the whole."""
         return all(len(cut_axis(n, self.tile, 0.0, stride)) == 2 for n in self.grid.shape)
 
     def boxes(self, shift: float, stride: int) -> list[tuple[int, int, int, int]]:
-        """Return first and last row, first and last column of each tile."""
+        """Return first and last row, first and last column of each tile that has samples."""
         rows, columns = (cut_axis(n, self.tile, shift, stride).tolist() for n in self.grid.shape)
-        return [(top, bottom, left, right) for top, bottom in pairwise(rows) for left, right in pairwise(columns)]
+        boxes = [(top, bottom, left, right) for top, bottom in pairwise(rows) for left, right in pairwise(columns)]
+        lattice = self.grid.lattice
+        return boxes if lattice is None else [box for box in boxes if lattice.has_any(*box)]
 
-    def task(self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None) -> Tile:
+    def n_samples(self, box: tuple[int, int, int, int]) -> int:
+        """Return how many samples a tile has."""
+        top, bottom, left, right = box
+        lattice = self.grid.lattice
+        return (bottom - top + 1) * (right - left + 1) if lattice is None else lattice.count_in(*box)
+
+    def task(
+        self, box: tuple[int, int, int, int], stride: int, limit: float, kept: IntArray | None, inserted: float = 1.0
+    ) -> Tile:
         """Return what a tile's task needs to know."""
         grid, n_columns = self.grid, self.grid.shape[1]
         top, bottom, left, right = box
@@ -394,25 +450,26 @@ class _Phases:
             site_z=site_z,
             n_columns=n_columns,
             corners=grid.corners,
-            domain=self.domain,
+            domain=grid.domain,
             unit=grid.unit,
             stride=stride,
             limit=limit,
+            inserted=int(inserted * len(rows) * len(columns)),
+            gaps=None
+            if self.elsewhere is None
+            else gaps_in(grid, box, rows, columns, elsewhere=self.elsewhere, rules=self.rules),
         )
 
     def thin(
-        self, name: str, shift: float, stride: int, limit: float, kept: IntArray | None
+        self, name: str, shift: float, stride: int, limit: float, kept: IntArray | None, inserted: float = 1.0
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
-        """Thin all tiles that are not in the store; yield (tile, removed, level) of all, in their order."""
+        """Thin all tiles that are not in the store; yield (tile, samples, level) of all, in their order."""
         boxes = self.boxes(shift, stride)
         missing = [k for k in range(len(boxes)) if self.store.get(f"{name}_{k}") is None]
         n_done = len(boxes) - len(missing)
-        tasks = (self.task(boxes[k], stride, limit, kept) for k in missing)
-        for place, (removed, level) in self.engine.each(_thin, tasks):
-            if kept is None:  # nearly all samples of the grid: in half the space
-                level = level.astype(np.float32)
-                removed = removed.astype(np.min_scalar_type(self.grid.n_vertices))
-            self.store.put(f"{name}_{missing[place]}", removed=removed, level=level)
+        tasks = (self.task(boxes[k], stride, limit, kept, inserted) for k in missing)
+        for place, (samples, level) in self.engine.each(_start if kept is None else _thin, tasks):
+            self.store.put(f"{name}_{missing[place]}", samples=samples, level=level)
             n_done += 1
             n_left = 1.0 if kept is None else len(kept) / self.grid.n_vertices
             share = 0.6 * n_done / len(boxes) if kept is None else 0.6 + 0.2 * (1.0 - n_left) ** 8
@@ -421,7 +478,7 @@ class _Phases:
             piece = self.store.get(f"{name}_{k}")
             if piece is None:
                 raise ResultError(f"{self.grid.name}: {LOST}")
-            yield k, piece["removed"], piece["level"]
+            yield k, piece["samples"], piece["level"]
 
     def start(self, n_vertices: int) -> tuple[IntArray, float]:
         """Return the finest row: thin all tiles to the end, find the slope, and go over the tiles' edges."""
@@ -429,20 +486,26 @@ class _Phases:
         if stored is not None:
             return stored["kept"], float(stored["slope"])
         n = self.grid.n_vertices
+        boxes = self.boxes(SHIFTS[0], 1)
+        inserted = max(INSERTED * n_vertices / n, LEAST_INSERTED)
+        if inserted > MOST_INSERTED:
+            inserted = 1.0
         histogram = np.zeros(1 << 16, np.int64)
-        greatest = 0.0
-        for _, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
-            histogram += np.bincount(_bins(level), minlength=len(histogram))
-            greatest = max(greatest, float(level.max(initial=0.0)))
+        greatest, n_free = 0.0, 0
+        for k, _, level in self.thin("start", SHIFTS[0], 1, np.inf, None, inserted):
+            free = level[np.isfinite(level)]
+            n_free += self.n_samples(boxes[k]) - (len(level) - len(free))
+            histogram += np.bincount(_bins(free), minlength=len(histogram))
+            greatest = max(greatest, float(free.max(initial=0.0)))
         # What the finest row is to keep, of the vertices that were free; those that were not will be in their turn.
-        most = int(histogram.sum()) * n_vertices / n
+        most = n_free * n_vertices / n
         above = histogram[::-1].cumsum()[::-1]
         # the least bin such that no more than wanted are above it
         bin_ = int(np.argmax(np.r_[above[1:], 0] <= most))
         slope = max(_bin_end(bin_), 1e-9 * greatest) or 1.0
-        keep = np.ones(n, bool)
-        for _, removed, level in self.thin("start", SHIFTS[0], 1, np.inf, None):
-            keep[removed[level <= slope]] = False
+        keep = np.zeros(self.grid.shape[0] * self.grid.shape[1], bool)
+        for _, samples, level in self.thin("start", SHIFTS[0], 1, np.inf, None, inserted):
+            keep[samples[level > slope]] = True
         kept = np.flatnonzero(keep)
         del keep
         for phase in range(1, len(SHIFTS)):
@@ -480,16 +543,16 @@ class _Phases:
         small = [
             k
             for k, kept in enumerate(solutions)
-            if len(kept) > len(self.grid.corners) and int(self.grid.triangles_of(kept).sum()) - 2 <= SEARCHED
+            if len(kept) > len(self.grid.corners) and self.triangles_of(kept) <= SEARCHED
         ]
         moved: list[IntArray | None] = [None] * len(solutions)
         if not small:
             return moved
-        coarse = CoarseGrid(self.grid)
+        coarse = CoarseGrid(self.grid, self.rules)
         missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
         in_time = (k for k in missing if until is None or time.perf_counter() < until)
-        tasks = (coarse.task(solutions[k], int(self.grid.triangles_of(solutions[k]).sum()) - 2) for k in in_time)
-        for place, rows in self.engine.each(_move, tasks):
+        tasks = (coarse.task(solutions[k], self.triangles_of(solutions[k])) for k in in_time)
+        for place, rows in self.engine.each(_move, tasks, coarse.gaps):
             self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
         n_left = 0
@@ -517,7 +580,7 @@ class _Phases:
             name = f"quality_{k:04d}"
             stored = self.store.get(name)
             if stored is None:
-                q = measure(self.grid, weld(self.grid, kept), n_threads=threads)
+                q = measure(self.grid, weld(self.grid, kept, self.rules), n_threads=threads)
                 self.store.put(name, numbers=np.array(list(asdict(q).values()), np.float64))
             else:
                 q = quality_of(zip(MEASURES, stored["numbers"].tolist(), strict=True))
@@ -526,12 +589,16 @@ class _Phases:
         return quality
 
 
+def _start(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
+    return start_tile(task) if task.gaps is None or task.gaps.there.all() else start_with_gaps(task)
+
+
 def _thin(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
-    return thin_tile(task)
+    return thin_tile(task) if task.gaps is None else thin_with_gaps(task)
 
 
-def _move(task: Coarse, shared: None) -> IntArray:
-    return move(task)
+def _move(task: Coarse, shared: CoarseGaps | None) -> IntArray:
+    return move(task, shared)
 
 
 def _bins(level: FloatArray) -> IntArray:

@@ -42,8 +42,8 @@ def check_memory(grid: HeightGrid, *, tile: int, most: int, jobs: int, remote: b
 
     def short_of(side: int) -> tuple[float, float] | None:
         """Return what is needed and what is free, if that is less."""
-        own: float = PROCESS_BYTES + SAMPLE_BYTES * grid.n_vertices + TRIANGLE_BYTES * most
         rows, columns = grid.shape
+        own: float = PROCESS_BYTES + SAMPLE_BYTES * rows * columns + TRIANGLE_BYTES * most
         tile_bytes = TILE_SAMPLE_BYTES * min(LONGEST * side, rows) * min(LONGEST * side, columns)
         workers = 0 if remote or jobs == 1 else jobs
         if jobs == 1 and not remote:

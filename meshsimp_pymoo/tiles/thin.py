@@ -16,23 +16,70 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
-from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.order import vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import thin
+from meshsimp_pymoo.search.raster import raster_insertion
 from meshsimp_pymoo.surface.books import END
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.model import OpenModel, placed_model
+from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
+
+
+class Elsewhere(NamedTuple):
+    """In which blocks of rows and columns of a grid with gaps there are samples.
+
+    Attributes
+    ----------
+    x, y : (B, 2) float arrays
+        Least and largest coordinate of each column of blocks, ascending, and of each row, descending.
+    before : (rows, columns + 1) int32 array
+        How many blocks of a row that have samples there are before each.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    before: np.ndarray
+
 
 # Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
 FORESIGHT = 3.0
+
+
+@brief
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """What a tile of a grid with gaps needs to know beside.
+
+    Attributes
+    ----------
+    there : (h, w) bool array
+        Which of the samples that count there are.
+    weight : float
+        How many samples of the grid each stands for.
+    footprint : Footprint
+        The faces of the tile, of all its samples.
+    elsewhere : Elsewhere
+        Where there are samples in the whole grid.
+    rules : Rules
+        Which triangles are emitted, and what a sample costs that none covers.
+    """
+
+    there: BoolArray
+    weight: float
+    footprint: Footprint
+    elsewhere: Elsewhere
+    rules: Rules
 
 
 @brief
@@ -66,6 +113,10 @@ class Tile:
         Distance of the rows and columns that count.
     limit : float
         Error that a triangle may be worth, for it to go [model units]; infinite: all go.
+    inserted : int
+        How many samples there are to begin with, those of the tile's border included; where ``sites`` is None.
+    gaps : Gaps, optional
+        Of a grid with gaps, see :mod:`meshsimp_pymoo.tiles.gaps`.
     """
 
     name: str
@@ -83,6 +134,43 @@ class Tile:
     unit: float
     stride: int
     limit: float
+    inserted: int = 0
+    gaps: Gaps | None = None
+
+
+def start_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
+    """Thin a tile to the end: from all its samples, or from those that insertion finds and all of its border.
+
+    Along a border that has all its samples no edge of the mesh crosses it, whatever is kept elsewhere: two samples
+    beside one another have an empty circle. So the tile is a whole of its own.
+
+    Parameters
+    ----------
+    tile : Tile
+        The tile, without ``sites``.
+
+    Returns
+    -------
+    samples : (m,) int array
+        Numbers of the samples that are worth a look; the others were never inserted.
+    level : (m,) float array
+        The slope at which each goes, as :func:`thin_tile` says; infinite: never, along the border.
+    """
+    on_border = np.ones(tile.heights.shape, bool)
+    on_border[1:-1, 1:-1] = False
+    border = np.flatnonzero(on_border)
+    number, xy, z = _window(tile)
+    order = vector_order(xy, z)
+    is_site = np.ones(len(z), bool)
+    if tile.inserted < len(z):
+        rank = np.argsort(order)
+        first = order[np.sort(rank[border])]
+        is_site[:] = False
+        is_site[rank[raster_insertion(tile.x, tile.y, tile.heights, first, tile.inserted)]] = True
+    surface = _surface(tile, number[order], xy[order], z[order], None)
+    removed, level = thin_sites(surface, is_site, lambda ground, live: on_border.ravel()[order], np.inf)
+    samples = np.concatenate([number[border], number[order[removed]]])
+    return samples, np.concatenate([np.full(len(border), np.inf), level])
 
 
 def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
@@ -104,25 +192,37 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     number, xy, z, weight, is_site, is_ours = _samples(tile)
     order = vector_order(xy, z)
     number, xy, z, is_site, is_ours = number[order], xy[order], z[order], is_site[order], is_ours[order]
-    box = np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
-    corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
-    model = _model(tile, number, xy, z, None if weight is None else weight[order], corners)
-    surface = HeightSurface(model, Rules(footprint="hull", outside="ignore"))
-    ground = surface.ground()
-    fixed = np.isin(number, tile.corners) | ~is_ours
+    surface = _surface(tile, number, xy, z, None if weight is None else weight[order])
     # beyond the whole grid there is nothing that a circle could hold
+    box = _box(tile)
     open_sides = np.where(box == tile.domain, np.array([-np.inf, np.inf, -np.inf, np.inf]), box)
-    with surface.books(is_site) as live:
+
+    def fix(ground: Any, live: Any) -> BoolArray:
+        fixed = np.isin(number, tile.corners) | ~is_ours
         _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
+        return fixed
+
+    removed, level = thin_sites(surface, is_site, fix, tile.limit)
+    return number[removed], level
+
+
+def thin_sites(
+    surface: HeightSurface, is_site: BoolArray, fix: Callable[[Any, Any], BoolArray], limit: float
+) -> tuple[IntArray, FloatArray]:
+    """Thin sites to a slope, but for those that ``fix`` says of a ground and its books; return what goes and levels."""
+    ground = surface.ground()
+    with surface.books(is_site) as live:
+        fixed = fix(ground, live)
         n = int((is_site & ~fixed).sum())
         removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
-        limit = FORESIGHT * 2.0 * tile.limit
         stop = np.zeros(1, np.bool_)
-        n_removed = thin(ground, live, len(z), fixed, 0, limit, np.inf, stop, removed, error, triangles)
+        n_removed = thin(
+            ground, live, len(is_site), fixed, 0, FORESIGHT * 2.0 * limit, np.inf, stop, removed, error, triangles
+        )
     saved = (triangles[0] - triangles[: n_removed + 1]).astype(np.int64)
     level = hull_levels(saved, error[: n_removed + 1])
-    n_wanted = int(np.searchsorted(level, tile.limit, side="right"))
-    return number[removed[:n_wanted]], level[:n_wanted]
+    n_wanted = int(np.searchsorted(level, limit, side="right"))
+    return removed[:n_wanted], level[:n_wanted]
 
 
 def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
@@ -131,7 +231,7 @@ def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
     Parameters
     ----------
     saved : (m + 1,) int array
-        Triangles saved so far, strictly ascending from 0.
+        Triangles saved so far, from 0: strictly ascending, but where a grid has gaps, whose triangles come and go.
     error : (m + 1,) float array
         Error there.
 
@@ -139,7 +239,8 @@ def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:
     -------
     (m,) float array
         Ascending. Cutting at any slope s, after the last step of at most s, is the point of the front with the least
-        error + s * triangles.
+        error + s * triangles. Infinite for steps that end with more triangles and more error than an earlier point;
+        a point with more triangles and less error than an earlier one is passed by.
 
     Examples
     --------
@@ -156,7 +257,15 @@ def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
     m = len(saved)
     hull = np.empty(m, np.int64)
     n = 0
+    first = 0
     for k in range(m):
+        if n > 0 and saved[k] <= saved[hull[n - 1]]:
+            # nothing is saved on the way here: worth it where it costs less, but not less than nothing
+            if saved[k] < saved[hull[n - 1]] or error[k] > error[hull[n - 1]]:
+                continue
+            n -= 1
+            if n == 0:
+                first = k
         while n >= 2:
             a = hull[n - 2]
             b = hull[n - 1]
@@ -166,16 +275,27 @@ def _hull_levels(saved: np.ndarray, error: np.ndarray) -> np.ndarray:
         hull[n] = k
         n += 1
     level = np.empty(max(m - 1, 0))
+    for k in range(hull[n - 1], m - 1):
+        level[k] = np.inf
     for q in range(n - 1):
         a = hull[q]
         b = hull[q + 1]
         slope = (error[b] - error[a]) / (saved[b] - saved[a])
         for k in range(a, b):
             level[k] = slope
+    for k in range(first):
+        level[k] = min(level[first], 0.0) if first < m - 1 else 0.0
     # rounding may turn two almost equal slopes around
     for k in range(1, m - 1):
         level[k] = max(level[k], level[k - 1])
     return level
+
+
+def _window(tile: Tile) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the samples of a tile that count, row by row: number, place, height."""
+    number = (tile.rows[:, None] * tile.n_columns + tile.columns).ravel()
+    xy = np.column_stack([np.tile(tile.x, len(tile.y)), np.repeat(tile.y, len(tile.x))])
+    return number, xy, tile.heights.ravel()
 
 
 def _samples(
@@ -186,12 +306,8 @@ def _samples(
     The corners of the tile are sites in any case, so that all samples are covered; those that are not kept are not ours
     to change, nor is anything at a triangle with them.
     """
-    grid = (tile.rows[:, None] * tile.n_columns + tile.columns).ravel()
-    xy = np.column_stack([np.tile(tile.x, len(tile.y)), np.repeat(tile.y, len(tile.x))])
-    z = tile.heights.ravel()
-    if tile.sites is None or tile.site_xy is None or tile.site_z is None:
-        everywhere = np.ones(len(z), bool)
-        return grid, xy, z, None, everywhere, everywhere.copy()
+    grid, xy, z = _window(tile)
+    assert tile.sites is not None and tile.site_xy is not None and tile.site_z is not None
     kept = np.isin(grid, tile.sites, assume_unique=True)
     extra = ~np.isin(tile.sites, grid, assume_unique=True)
     n_extra = int(extra.sum())
@@ -213,14 +329,49 @@ def _samples(
     )
 
 
-def _model(
-    tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: FloatArray | None, corners: IntArray
-) -> OpenModel:
-    """Return the tile as a model: the arrays that triangulating needs, and two faces for its extent."""
+def _box(tile: Tile) -> FloatArray:
+    """Return the least and largest x, least and largest y of a tile."""
+    return np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
+
+
+def _surface(tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: FloatArray | None) -> HeightSurface:
+    """Return the surface of a tile as a model: the arrays that triangulating needs, and two faces for its extent."""
+    box = _box(tile)
+    corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
     points = np.column_stack([xy * tile.unit, z])
     a, b, c, d = corners[np.lexsort((xy[corners, 0], xy[corners, 1]))]
     faces = np.array([[a, b, d], [a, d, c]])
-    return placed_model(tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight)
+    model = placed_model(tile.name, points, faces, corners, xy=xy, unit=tile.unit, source_index=number, weights=weight)
+    return HeightSurface(model, Rules(footprint="hull", outside="ignore"))
+
+
+@inner(inline=True)
+def circle_of(xy: np.ndarray, a: int, b: int, c: int) -> tuple[float, float, float]:
+    """Return the centre of the circle through three sites, and its radius squared."""
+    ux = xy[2 * b] - xy[2 * a]
+    uy = xy[2 * b + 1] - xy[2 * a + 1]
+    vx = xy[2 * c] - xy[2 * a]
+    vy = xy[2 * c + 1] - xy[2 * a + 1]
+    area = 2.0 * (ux * vy - uy * vx)
+    uu = ux * ux + uy * uy
+    vv = vx * vx + vy * vy
+    sx = (vy * uu - uy * vv) / area
+    sy = (ux * vv - vx * uu) / area
+    rr = sx * sx + sy * sy
+    return sx + xy[2 * a], sy + xy[2 * a + 1], rr
+
+
+@inner(inline=True)
+def is_within(sx: float, sy: float, rr: float, box: np.ndarray, domain: np.ndarray) -> bool:
+    """Whether a circle, as far as it lies within the whole grid, lies in a box: beyond its sides there is nothing."""
+    over_x = max(max(sx - domain[1], domain[0] - sx), 0.0)
+    over_y = max(max(sy - domain[3], domain[2] - sy), 0.0)
+    reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
+    reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
+    known: bool = (
+        sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
+    )
+    return known
 
 
 @entry
@@ -244,26 +395,8 @@ def _fix_foreign(
             continue
         known = not (foreign[a] or foreign[b] or foreign[c])
         if known:
-            ux = xy[2 * b] - xy[2 * a]
-            uy = xy[2 * b + 1] - xy[2 * a + 1]
-            vx = xy[2 * c] - xy[2 * a]
-            vy = xy[2 * c + 1] - xy[2 * a + 1]
-            area = 2.0 * (ux * vy - uy * vx)
-            uu = ux * ux + uy * uy
-            vv = vx * vx + vy * vy
-            sx = (vy * uu - uy * vv) / area
-            sy = (ux * vv - vx * uu) / area
-            rr = sx * sx + sy * sy
-            sx += xy[2 * a]
-            sy += xy[2 * a + 1]
-            # How far the circle reaches within the whole grid: beyond its sides there is nothing.
-            over_x = max(max(sx - domain[1], domain[0] - sx), 0.0)
-            over_y = max(max(sy - domain[3], domain[2] - sy), 0.0)
-            reach_x = np.sqrt(max(rr - over_y * over_y, 0.0))
-            reach_y = np.sqrt(max(rr - over_x * over_x, 0.0))
-            known = (
-                sx - reach_x >= box[0] and sx + reach_x <= box[1] and sy - reach_y >= box[2] and sy + reach_y <= box[3]
-            )
+            sx, sy, rr = circle_of(xy, a, b, c)
+            known = is_within(sx, sy, rr, box, domain)
         if not known:
             fixed[a] = True
             fixed[b] = True

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from pyramid import hostile_array, refusal, write
 
-from meshsimp_pymoo.errors import ModelError, ModelWarning, NoFullGrid
+from meshsimp_pymoo.errors import ModelError, ModelWarning, NoHeightGrid
 from meshsimp_pymoo.formats.npz import AXES
 from meshsimp_pymoo.formats.npz import DEGREES as DEGREES_AXES
 from meshsimp_pymoo.formats.options import Options
@@ -101,7 +101,7 @@ def test_samples_lie_where_the_axes_say_in_any_order(tmp_path_factory, names, fl
         grid = open_grid(path)
         assert_array_equal(grid.file_points[np.arange(6)], source.points)
     else:
-        with pytest.raises(NoFullGrid, match="as tiles want them"):
+        with pytest.raises(NoHeightGrid, match="as tiles want them"):
             open_grid(path)
 
 

@@ -21,7 +21,7 @@ from meshsimp_pymoo.surface.measures import MEASURES, quality_of
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.weld import measure, pieces, weld
 from meshsimp_pymoo.tiles.front import Folder, InMemory, _Phases, cut_axis, identity, tiled_front
-from meshsimp_pymoo.tiles.thin import hull_levels, thin_tile
+from meshsimp_pymoo.tiles.thin import hull_levels, start_tile, thin_tile
 from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))
@@ -82,26 +82,28 @@ def test_the_size_of_an_ascii_grid_is_read_from_its_header(tmp_path):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda z: np.where(z == z[5, 7], np.nan, z), r"no height at row 5, column 7"),
+        (lambda z: np.where(z == z[5, 7], np.inf, z), r"the height at row 5, column 7 is infinite; set it to NaN"),
+        (lambda z: np.where(z == z[5, 7], z, np.nan), r"only 1 of 713 samples have data and no cell has three"),
+        (lambda z: z * np.nan, r"only 0 of 713 samples have data"),
         (lambda z: z[0], r"shape \(31,\); give a grid"),
         (lambda z: z.astype(complex), r"type complex128"),
     ],
 )
-def test_what_is_no_full_grid_is_refused(make, message):
+def test_what_is_no_grid_is_refused(make, message):
     z = np.random.default_rng(1).normal(size=(23, 31))
     with pytest.raises(ModelError, match=message):
         tiled_front(open_grid(make(z)), tile=64)
 
 
-def test_a_height_that_means_no_sample_is_refused():
+def test_a_height_that_means_no_sample_is_none():
     z = np.arange(70.0, dtype=np.float32).reshape(7, 10)
-    with pytest.raises(ModelError, match="no height at row 3, column 4"):
-        tiled_front(open_grid(z, nodata=34), tile=64)
+    assert open_grid(z, nodata=34).n_vertices == 69
+    assert open_grid(z, nodata=34).hash == open_grid(np.where(z == 34, np.nan, z)).hash != open_grid(z).hash
     assert open_grid(z, nodata=-LARGEST).hash == open_grid(z).hash  # beyond what its heights can be
 
 
 def test_a_scan_a_weighted_model_and_a_broken_file_are_refused(tmp_path):
-    with pytest.raises(ModelError, match="not all crossings"):
+    with pytest.raises(ModelError, match="are not those of a height grid"):
         open_grid(build_model(load("face:200")))
     with pytest.raises(ModelError, match="has weights"):
         open_grid(SMALL.with_weights(np.full(SMALL.n_vertices, 2.0)))
@@ -212,18 +214,32 @@ def test_what_tiles_remove_changes_the_error_of_the_whole_by_what_they_say(share
         assert len(removed) > 0.4 * share * GRID.shape[1] * (high - low)
 
 
-def test_all_samples_as_sites_are_the_same_tile_as_no_sites_given():
+@pytest.mark.parametrize("inserted", [0.2, 1.0])
+def test_tiles_that_begin_are_thinned_as_parts_of_the_whole(inserted):
+    """Along borders that have all their samples: the sum of the levels up to a slope is the change of the whole."""
     work = _Phases(GRID, 64, Serial(), InMemory(), lambda *_: None)
-    box = (20, 60, 30, 80)
-    some = thin_tile(work.task(box, 1, np.inf, None))
-    same = thin_tile(work.task(box, 1, np.inf, np.arange(GRID.n_vertices)))
-    assert np.array_equal(some[0], same[0])
-    assert np.array_equal(some[1], same[1])
+    found = [
+        start_tile(work.task((top, bottom, left, right), 1, np.inf, None, inserted))
+        for top, bottom in itertools.pairwise([0, 57, GRID.shape[0] - 1])
+        for left, right in itertools.pairwise([0, 50, 100, GRID.shape[1] - 1])
+    ]
+    samples, level = (np.concatenate(column) for column in zip(*found, strict=True))
+    candidates = np.unique(samples)
+    assert len(candidates) == GRID.n_vertices if inserted == 1.0 else len(candidates) < 0.21 * GRID.n_vertices
+    assert np.isinf(level[np.isin(samples, samples[np.isinf(level)])]).all()  # fixed in one tile, fixed in all
+    for slope in (3.0, 40.0):
+        gone = level <= slope
+        rest = np.setdiff1d(candidates, samples[gone])
+        assert len(rest) < len(candidates)
+        table = SURFACE.evaluate(np.array([as_chromosome(GRID, candidates), as_chromosome(GRID, rest)]))
+        change = 2.0 * float(level[gone].sum())
+        assert table[1, 0] - table[0, 0] == pytest.approx(change, rel=1e-6, abs=1e-6 * table[1, 0])
 
 
-def test_the_only_tile_of_a_grid_is_thinned_as_the_whole():
+def test_a_tile_that_holds_all_is_thinned_as_the_whole():
     work = _Phases(SMALL_GRID, 512, Serial(), InMemory(), lambda *_: None)
-    gone, _ = thin_tile(work.task((0, SMALL_GRID.shape[0] - 1, 0, SMALL_GRID.shape[1] - 1), 1, np.inf, None))
+    box = (0, SMALL_GRID.shape[0] - 1, 0, SMALL_GRID.shape[1] - 1)
+    gone, _ = thin_tile(work.task(box, 1, np.inf, np.arange(SMALL_GRID.n_vertices)))
     assert SMALL_GRID.row_of[gone].tolist() == thinning(HeightSurface(SMALL)).order[::-1].tolist()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray
-from meshsimp_pymoo.errors import ModelError, NoFullGrid
+from meshsimp_pymoo.errors import ModelError, NoHeightGrid
 from meshsimp_pymoo.formats.options import Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh, build_source
 from meshsimp_pymoo.formats.source.missing import is_nodata, warn_of_nodata
@@ -69,20 +69,20 @@ class Grid:
 
         Raises
         ------
-        NoFullGrid
-            If samples are masked, or its rows do not run from north to south and its columns from west to east, each
-            at a place of its own.
+        NoHeightGrid
+            If its rows do not run from north to south and its columns from west to east, each at a place of its own.
         """
-        if np.ma.getmask(self.heights).any():
-            raise NoFullGrid(f"{name}: has masked samples; only a grid without gaps can be cut into tiles")
         if not ((np.diff(self.x) > 0).all() and (np.diff(self.y) < 0).all()):
-            raise NoFullGrid(
+            raise NoHeightGrid(
                 f"{name}: its rows do not run to the south and its columns to the east, as tiles want them; turn it, "
                 "with its axes (numpy.flipud, numpy.fliplr), or leave the tiles out (--tile none)"
             )
         column, row, columns, rows = check_window(window, self.shape, name)
+        heights = self.heights[row : row + rows, column : column + columns]
+        if np.ma.getmask(heights).any():
+            heights = np.ma.filled(heights.astype(np.float64), np.nan)
         return PlacedHeights(
-            np.ma.getdata(self.heights)[row : row + rows, column : column + columns],
+            np.ma.getdata(heights),
             self.x[column : column + columns],
             self.y[row : row + rows],
             self.nodata,
@@ -361,6 +361,6 @@ def placed_heights(heights: AnyArray, name: str, options: Options) -> PlacedHeig
     Raises
     ------
     ModelError
-        For anything but a grid of at least 2 x 2 real numbers with a positive spacing, and none of them masked.
+        For anything but a grid of at least 2 x 2 real numbers with a positive spacing.
     """
     return even_grid(heights, *(options.steps or ()), nodata=options.nodata, name=name).placed(name, options.window)
