@@ -272,6 +272,7 @@ PATIENCE = 0.125
 # How often all sites are costed again where the one that adds the least adds too much.
 MOST_PASSES = 4
 
+
 @inner
 def _cost_again(g: Any, live: Any, v: int, key: np.ndarray, patience: np.ndarray) -> None:
     change, _ = try_exchange(g, live, v, -1, np.inf)

@@ -21,7 +21,7 @@ from meshsimp_pymoo.surface.measures import MEASURES, quality_of
 from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.weld import measure, pieces, weld
 from meshsimp_pymoo.tiles.front import Folder, InMemory, _Phases, cut_axis, identity, tiled_front
-from meshsimp_pymoo.tiles.thin import start_tile, hull_levels, thin_tile
+from meshsimp_pymoo.tiles.thin import hull_levels, start_tile, thin_tile
 from meshsimp_pymoo.workers import Processes, Serial
 
 MODEL = build_model(load("jacksboro:3"))
