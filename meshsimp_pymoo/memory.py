@@ -65,6 +65,33 @@ def fits_in_one_piece(n_vertices: int) -> bool:
     return PROCESS_BYTES + VERTEX_BYTES * n_vertices <= min(free_memory())
 
 
+def check_one_piece(n_vertices: int, name: str, way_out: str) -> None:
+    """Refuse a search of so many vertices where it does not fit into the memory that is free.
+
+    Parameters
+    ----------
+    n_vertices : int
+        Number of vertices.
+    name : str
+        What messages call the model.
+    way_out : str
+        Ends the message.
+
+    Raises
+    ------
+    ModelError
+        With both sizes and the number of vertices that fit.
+    """
+    if not fits_in_one_piece(n_vertices):
+        free = min(free_memory())
+        most = max(free - PROCESS_BYTES, 0.0) / VERTEX_BYTES
+        raise ModelError(
+            f"{name}: to search {n_vertices:,} vertices in one piece needs about "
+            f"{spelled(PROCESS_BYTES + VERTEX_BYTES * n_vertices)}, and {spelled(free)} are free, enough for some "
+            f"{float(f'{most:.2g}'):,.0f}; {way_out}"
+        )
+
+
 def free_memory() -> tuple[float, float]:
     """Return the bytes that are free for all processes together, and for each one; infinite where nobody says.
 

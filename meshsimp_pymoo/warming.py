@@ -254,7 +254,7 @@ PARTS = (
         "tiles",
         (
             "plane.triangulation:triangulate_once", "search.raster:_insert_worst", "tiles.thin:_hull_levels",
-            "tiles.thin:_fix_foreign",
+            "tiles.thin:_find_foreign",
             "surface.weld:_measure_rows", "surface.weld:_measure_cells",
         ),
         _tiles, 2.5, False,

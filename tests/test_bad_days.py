@@ -18,11 +18,12 @@ import pytest
 
 import meshsimp_pymoo.report.figures
 import meshsimp_pymoo.report.page
-from meshsimp_pymoo import Front, LiveTriangulation, MeshProblem, greedy_insertion, thinning
-from meshsimp_pymoo.cli import main
+from meshsimp_pymoo import Front, LiveTriangulation, MeshProblem, greedy_insertion, memory, thinning
+from meshsimp_pymoo.cli import main, tiling
 from meshsimp_pymoo.comparison.tables import Table
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, PictureWarning
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import write_mesh
 from meshsimp_pymoo.search import starting
 from meshsimp_pymoo.storage import CHECKPOINT, read_front
@@ -367,3 +368,35 @@ def test_no_error_is_negative_on_grids_of_whole_numbers_with_holes(tmp_path):
 def test_weights_whose_total_is_no_number_are_refused_before_the_search():
     with pytest.raises(ModelError, match=r"weights add up to 9e\+307, beyond 1e\+100; divide them all by one number"):
         MeshProblem("roof:3", weights=np.full(9, 1e307))
+
+
+@pytest.mark.parametrize(
+    ("name", "way_out"),
+    [
+        ("cloud.xyz", "take one class of points (--classes 2), or thin the cloud before (PDAL: filters.sample)"),
+        ("grid.npy", "take tiles (--tile 256), or a part of it (--window COLUMN,ROW,COLUMNS,ROWS)"),
+        ("mesh.ply", "take a part of it, or free some"),
+    ],
+)
+def test_a_model_whose_search_does_not_fit_is_refused_with_the_number_that_does(
+    tmp_path, monkeypatch, capsys, name, way_out
+):
+    heights = np.random.default_rng(1).normal(size=(10, 12))
+    points = np.column_stack([np.arange(120) % 12, np.arange(120) // 12, heights.ravel()])
+    path = tmp_path / name
+    if name == "grid.npy":
+        np.save(path, heights)
+    elif name == "cloud.xyz":
+        np.savetxt(path, points)
+    else:
+        write_mesh(path, points, grid_source(heights).faces)
+    free = memory.PROCESS_BYTES + 100.0 * memory.VERTEX_BYTES
+    monkeypatch.setattr(memory, "free_memory", lambda: (float("inf"), free))
+    monkeypatch.setattr(tiling, "fits_in_one_piece", lambda _: True)
+    assert main(["simplify", str(path), "-o", str(tmp_path / "out"), "--quiet"]) == 2
+    said = capsys.readouterr().err.strip().splitlines()[-1]
+    assert said == (
+        f"meshsimp: {path}: to search 120 vertices in one piece needs about 400 MiB, and 400 MiB are free, enough for "
+        f"some 100; {way_out}"
+    )
+    assert not (tmp_path / "out").exists()

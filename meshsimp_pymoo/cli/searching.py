@@ -37,6 +37,8 @@ from meshsimp_pymoo.errors import ModelError, NoHeightGrid, ResultError, UsageEr
 from meshsimp_pymoo.files import locked, put_back
 from meshsimp_pymoo.formats.table import format_to_write, listed
 from meshsimp_pymoo.front import Freeing, Front, FrontSolution, starting_front
+from meshsimp_pymoo.memory import check_one_piece
+from meshsimp_pymoo.opening import count_samples
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.search.budgets import Moves, WholeGenerations, moves_of
 from meshsimp_pymoo.search.checkpoint import (
@@ -72,6 +74,7 @@ from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.smallest import tolerance_for
 from meshsimp_pymoo.surface.surface import Refitted
+from meshsimp_pymoo.tiles.front import TILE
 from meshsimp_pymoo.warming import CLOSED_SEARCH, CLOSED_WISH, FREE, LINED, SEARCH, WISH, missing
 
 # Seconds that freeing a front is thought to take where nobody says how long.
@@ -123,6 +126,7 @@ def _simplify(request: Request, shown: Stages) -> int:
             as_found = _of_kind(request, "closed" if isinstance(problem.model, ClosedModel) else "height")
             refuse(as_found)
             format_to_write(output.format).check(problem.model)
+            check_one_piece(problem.n_var, problem.model.name, _smaller(request.model, problem.model))
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish(_parts(as_found))
         request = replace(request, wish=request.wish.among(lambda: len(problem.model.faces)))
@@ -146,6 +150,15 @@ def _simplify(request: Request, shown: Stages) -> int:
         del found, keeper
         gc.collect()
         return hand_over(request, surface, shown) if ended is None else ended
+
+
+def _smaller(path: str, model: Any) -> str:
+    """Return how to come to a model that fits into the memory."""
+    if "points" in model.georeference:
+        return "take one class of points (--classes 2), or thin the cloud before (PDAL: filters.sample)"
+    if count_samples(path) is not None:
+        return f"take tiles (--tile {TILE}), or a part of it (--window COLUMN,ROW,COLUMNS,ROWS)"
+    return "take a part of it, or free some"
 
 
 def _of_kind(request: Request, kind: str) -> Request:

@@ -114,6 +114,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
                     threads=threads,
                     progress=show,
                     until=None if request.search.time is None else start + request.search.time,
+                    wish=wish.limits,
                 )
                 chosen, _ = wish.of(front)
                 stop_if_interrupted()

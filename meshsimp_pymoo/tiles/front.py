@@ -28,7 +28,7 @@ from __future__ import annotations
 import json
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from itertools import pairwise
@@ -42,7 +42,18 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError, SearchWarning, reason_of
 from meshsimp_pymoo.files import new_file
 from meshsimp_pymoo.front import Front
-from meshsimp_pymoo.search.coarse import MOVES, SAMPLES, SEARCHED, Coarse, CoarseGaps, CoarseGrid, move, strided
+from meshsimp_pymoo.search.coarse import (
+    MOVES,
+    SAMPLES,
+    SEARCHED,
+    Coarse,
+    CoarseGaps,
+    CoarseGrid,
+    move,
+    slope_of,
+    strided,
+)
+from meshsimp_pymoo.search.wishes import shortfall
 from meshsimp_pymoo.settings import plain
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.grid_surface import GridSurface
@@ -51,6 +62,7 @@ from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.weld import measure, weld
 from meshsimp_pymoo.tiles.gaps import blocks_of, gaps_in, start_with_gaps, thin_with_gaps
+from meshsimp_pymoo.tiles.moving import Moving, move_sites
 from meshsimp_pymoo.tiles.thin import Tile, start_tile, thin_tile
 from meshsimp_pymoo.workers import Engine, Serial
 
@@ -75,9 +87,12 @@ LAST_STEP = 0.1
 # How far above the wanted size the finest solution may be.
 ABOUT = 1.1
 SHIFTS = (0.0, 1 / 3, 2 / 3)
-# Samples that are inserted to begin with, for each vertex of the finest row, and the least share of all samples: thinned
-# from there a row has at most some 2 % more error than thinned from all (six DEMs). Where it would be more than the last
-# share there is little to be saved, and all are thinned.
+# How often at most the vertices of larger solutions are moved, and what a number of a solution is less than.
+MOST_SWEEPS = 100
+SEEDS = 1 << 20
+# Samples that are inserted to begin with, for each vertex of the finest row, and the least share of all samples:
+# thinned from there a row has at most some 3 % more error than thinned from all (six DEMs). Where it would be more than
+# the last share there is little to be saved, and all are thinned.
 INSERTED, LEAST_INSERTED, MOST_INSERTED = 3.0, 0.15, 0.3
 LOST = "a finished tile was stored, but is gone or damaged; start the same call again"
 
@@ -207,6 +222,7 @@ def tiled_front(
     threads: int = 1,
     progress: Progress | None = None,
     until: float | None = None,
+    wish: Mapping[str, float] | None = None,
 ) -> Front:
     """Thin a height grid tile by tile to a whole front, nested but for its smallest solutions.
 
@@ -230,8 +246,12 @@ def tiled_front(
     progress : callable, optional
         Told about the progress.
     until : float, optional
-        The vertices of the smallest solutions are moved only as far as ``time.perf_counter() = until``; thinning takes
-        what it takes.
+        Vertices are moved as far as ``time.perf_counter() = until``: those of the smallest solutions first, then tile
+        by tile those of the others, again and again. Thinning takes what it takes. Without it only those of the
+        smallest are moved, once.
+    wish : mapping of str to float, optional
+        Limits, as :meth:`~meshsimp_pymoo.front.Front.best` takes them: with a number of triangles there is a solution
+        of that size, and those near to what is wished for are moved first.
 
     Returns
     -------
@@ -279,10 +299,15 @@ def tiled_front(
     # what is finer than asked for was needed on the way only
     slopes = work.of_about(what["most"], samples, level, slopes)
     samples, level = samples[level > slopes[0]], level[level > slopes[0]]
-    moved = work.move([samples[level > at] for at in slopes], until)
-    quality = work.measure(
-        [samples[level > at] if new is None else new for at, new in zip(slopes, moved, strict=True)], threads
-    )
+    if wish and "triangles" in wish:
+        nested = Nested(grid.rows_of_samples(samples), level, np.array(slopes), (None,) * len(slopes))
+        with suppress(ValueError):  # there is none that small
+            slopes = sorted({*slopes, slope_of(surface, nested, min(int(wish["triangles"]), what["most"]))})
+    moved = work.move(slopes, [samples[level > at] for at in slopes], until)
+    solutions = [samples[level > at] if new is None else new for at, new in zip(slopes, moved, strict=True)]
+    quality = work.measure(slopes, solutions, threads)
+    if until is not None:
+        work.move_large(solutions, moved, quality, _nearest_first(quality, wish or {}), until, threads)
     # a solution that is not better than a smaller one is none
     rows: list[int] = []
     for row in reversed(range(len(slopes))):
@@ -538,7 +563,7 @@ class _Phases:
             self.store.put("finish", **stored)
         return stored["removed"], stored["level"]
 
-    def move(self, solutions: list[IntArray], until: float | None) -> list[IntArray | None]:
+    def move(self, slopes: list[float], solutions: list[IntArray], until: float | None) -> list[IntArray | None]:
         """Move the vertices of the solutions that are small, but for the smallest there is, as far as the time goes."""
         small = [
             k
@@ -549,15 +574,15 @@ class _Phases:
         if not small:
             return moved
         coarse = CoarseGrid(self.grid, self.rules)
-        missing = [k for k in small if self.store.get(f"moved_{k:04d}") is None]
+        missing = [k for k in small if self.store.get(_name("moved", slopes[k])) is None]
         in_time = (k for k in missing if until is None or time.perf_counter() < until)
         tasks = (coarse.task(solutions[k], self.triangles_of(solutions[k])) for k in in_time)
         for place, rows in self.engine.each(_move, tasks, coarse.gaps):
-            self.store.put(f"moved_{missing[place]:04d}", samples=np.sort(coarse.samples[rows]))
+            self.store.put(_name("moved", slopes[missing[place]]), samples=np.sort(coarse.samples[rows]))
             self.progress(0.8, f"small solution {place + 1} of {len(missing)}")
         n_left = 0
         for k in small:
-            piece = self.store.get(f"moved_{k:04d}")
+            piece = self.store.get(_name("moved", slopes[k]))
             if piece is not None:
                 moved[k] = piece["samples"]
             elif until is None:
@@ -573,11 +598,69 @@ class _Phases:
             )
         return moved
 
-    def measure(self, solutions: list[IntArray], threads: int) -> list[Quality]:
+    def move_large(
+        self,
+        solutions: list[IntArray],
+        moved: list[IntArray | None],
+        quality: list[Quality],
+        order: list[int],
+        until: float,
+        threads: int,
+    ) -> None:
+        """Move the vertices of the solutions that are not small, in this order, again and again while there is time.
+
+        What is better replaces the entries of ``solutions``, ``moved`` and ``quality``.
+        """
+        order = [k for k in order if quality[k].triangles > SEARCHED]
+        seconds = {k: 0.0 for k in order}
+        for sweep in range(MOST_SWEEPS):
+            for k in order:
+                begun = time.perf_counter()
+                if begun + seconds[k] > until:
+                    continue
+                found = self.moved_by_tiles(solutions[k], SEEDS * sweep + k, until)
+                if found is None:
+                    continue
+                better = measure(self.grid, weld(self.grid, found, self.rules), n_threads=threads)
+                if better.error < quality[k].error and better.triangles <= quality[k].triangles:
+                    solutions[k], moved[k], quality[k] = found, found, better
+                seconds[k] = time.perf_counter() - begun
+                self.progress(1.0, f"solution of {quality[k].triangles:,} triangles moved")
+            if all(time.perf_counter() + took > until for took in seconds.values()):
+                break
+        n_moved = sum(took > 0.0 for took in seconds.values())
+        if n_moved < len(order):
+            warnings.warn(
+                f"{self.grid.name}: in the time given the vertices of {n_moved} of {len(order)} solutions of more than "
+                f"{SEARCHED} triangles were moved, which makes them better; give more time",
+                SearchWarning,
+                stacklevel=2,
+            )
+
+    def moved_by_tiles(self, kept: IntArray, seed: int, until: float) -> IntArray | None:
+        """Move the vertices of a solution, in tiles at all their places; None: there was not the time."""
+        stride = 1
+        while ENOUGH_SAMPLES * (2 * stride) ** 2 * len(kept) < self.grid.n_vertices:
+            stride *= 2
+        for pass_, shift in enumerate(SHIFTS):
+            boxes = self.boxes(shift, stride)
+            tasks = (
+                Moving(self.task(box, stride, np.inf, kept), 1 + (seed * len(SHIFTS) + pass_) * len(boxes) + k)
+                for k, box in enumerate(boxes)
+                if time.perf_counter() < until
+            )
+            found = [result for _, result in self.engine.each(_move_sites, tasks)]
+            if len(found) < len(boxes):
+                return None
+            gone, come = (np.concatenate(column) for column in zip(*found, strict=True))
+            kept = np.union1d(np.setdiff1d(kept, gone, assume_unique=True), come)
+        return kept
+
+    def measure(self, slopes: list[float], solutions: list[IntArray], threads: int) -> list[Quality]:
         """Measure solutions over all samples."""
         quality = []
-        for k, kept in enumerate(solutions):
-            name = f"quality_{k:04d}"
+        for k, (slope, kept) in enumerate(zip(slopes, solutions, strict=True)):
+            name = _name("quality", slope)
             stored = self.store.get(name)
             if stored is None:
                 q = measure(self.grid, weld(self.grid, kept, self.rules), n_threads=threads)
@@ -589,6 +672,11 @@ class _Phases:
         return quality
 
 
+def _name(what: str, slope: float) -> str:
+    """Return the name of a piece that belongs to the solution at a slope."""
+    return f"{what}_{float(slope).hex()}"
+
+
 def _start(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
     return start_tile(task) if task.gaps is None or task.gaps.there.all() else start_with_gaps(task)
 
@@ -597,8 +685,22 @@ def _thin(task: Tile, shared: None) -> tuple[IntArray, FloatArray]:
     return thin_tile(task) if task.gaps is None else thin_with_gaps(task)
 
 
+def _move_sites(task: Moving, shared: None) -> tuple[IntArray, IntArray]:
+    return move_sites(task)
+
+
 def _move(task: Coarse, shared: CoarseGaps | None) -> IntArray:
     return move(task, shared)
+
+
+def _nearest_first(quality: list[Quality], wish: Mapping[str, float]) -> list[int]:
+    """Return the rows of solutions, those near to the one that is wished for first; without a wish the smallest."""
+    by_size = sorted(range(len(quality)), key=lambda k: quality[k].triangles)
+    if not wish:
+        return by_size
+    within = [place for place, k in enumerate(by_size) if shortfall(asdict(quality[k]), wish) == 0.0]
+    wanted = (within[-1] if "triangles" in wish else within[0]) if within else len(by_size) - 1
+    return [by_size[place] for place in sorted(range(len(by_size)), key=lambda place: (abs(place - wanted), place))]
 
 
 def _bins(level: FloatArray) -> IntArray:

@@ -15,7 +15,6 @@ the last sample are sites in any case, so that the samples along it are covered;
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -25,12 +24,12 @@ from meshsimp_pymoo.plane.emission import is_in_faces
 from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.order import find_corners, vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
-from meshsimp_pymoo.surface.books import END
+from meshsimp_pymoo.surface.books import END, Live
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.tiles.thin import Elsewhere, Gaps, Tile, circle_of, is_within, thin_sites
+from meshsimp_pymoo.tiles.thin import Elsewhere, Gaps, Setting, Tile, circle_of, is_within, thin_sites
 
 # Blocks along one side of a grid, at most, and samples along one side of a block, at least.
 MOST_BLOCKS, LEAST_BLOCK = 256, 8
@@ -92,12 +91,25 @@ def start_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
 
 def thin_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
     """Do what :func:`~meshsimp_pymoo.tiles.thin.thin_tile` does, for a tile with ``gaps``."""
+    setting = setting_with_gaps(tile)
+    nothing = np.empty(0, np.int64), np.empty(0)
+    if setting is None:
+        return nothing
+    try:
+        removed, level = thin_sites(setting, tile.limit)
+    except ValueError:  # what the books say of sites that span no triangle, and of nothing else
+        return nothing
+    n_wanted = int(np.searchsorted(level, np.inf))
+    return setting.number[removed[:n_wanted]], level[:n_wanted]
+
+
+def setting_with_gaps(tile: Tile) -> Setting | None:
+    """Do what :func:`~meshsimp_pymoo.tiles.thin.setting_of` does; None: the tile has too few sites."""
     gaps = tile.gaps
     assert gaps is not None
     number, xy, z, weight, is_site, is_ours = _samples(tile)
-    nothing = np.empty(0, np.int64), np.empty(0)
     if is_site.sum() < 3:
-        return nothing
+        return None
     order = vector_order(xy, z)
     number, xy, z, weight = number[order], xy[order], z[order], weight[order]
     is_site, is_ours = is_site[order], is_ours[order]
@@ -117,25 +129,21 @@ def thin_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
     if rules.footprint == "hull" and is_shared.any():
         rules = replace(rules, outside="nearest")
     surface = HeightSurface(model, rules)
-    fixed = np.isin(number, tile.corners) | ~is_ours
+    on_side = np.zeros(len(number), bool)
     for k, side in enumerate(box):
         if is_shared[k]:
-            fixed |= xy[:, k // 2] == side
+            on_side |= xy[:, k // 2] == side
     box = np.where(is_shared, box, np.array([-np.inf, np.inf, -np.inf, np.inf]))
 
-    def fix(ground: Any, live: Any) -> BoolArray:
-        _fix_beside_gaps(
-            ground.xy, live.mesh, int(live.tally[END]), ~is_ours, box, tile.domain, gaps.footprint, *gaps.elsewhere,
-            fixed,
+    def judge(live: Live) -> tuple[BoolArray, BoolArray]:
+        stays, is_foreign = np.isin(number, tile.corners) | ~is_ours | on_side, np.zeros(len(live.kind), bool)
+        _find_beside_gaps(
+            surface.ground().xy, live.mesh, int(live.tally[END]), ~is_ours, box, tile.domain, gaps.footprint,
+            *gaps.elsewhere, stays, is_foreign,
         )  # fmt: skip
-        return fixed
+        return stays, is_foreign
 
-    try:
-        removed, level = thin_sites(surface, is_site, fix, tile.limit)
-    except ValueError:  # what the books say of sites that span no triangle, and of nothing else
-        return nothing
-    n_wanted = int(np.searchsorted(level, np.inf))
-    return number[removed[:n_wanted]], level[:n_wanted]
+    return Setting(surface, number, is_site, judge)
 
 
 def _sides(tile: Tile) -> tuple[FloatArray, BoolArray]:
@@ -222,7 +230,7 @@ def _holds_samples(
 
 
 @entry
-def _fix_beside_gaps(
+def _find_beside_gaps(
     xy: np.ndarray,
     mesh: np.ndarray,
     end: int,
@@ -233,9 +241,10 @@ def _fix_beside_gaps(
     block_x: np.ndarray,
     block_y: np.ndarray,
     before: np.ndarray,
-    fixed: np.ndarray,
+    stays: np.ndarray,
+    is_foreign: np.ndarray,
 ) -> None:
-    """Fix the corners of triangles on the original faces that need not be in the whole; see `thin._fix_foreign`."""
+    """Mark triangles on the original faces that need not be in the whole; see `thin._find_foreign`."""
     for t in range(0, end, RECORD):
         a, b, c = mesh[t], mesh[t + 1], mesh[t + 2]
         if (a | b | c) > LAST_INDEX or not is_in_faces(xy, footprint, xy, a, b, c):
@@ -245,6 +254,7 @@ def _fix_beside_gaps(
             sx, sy, rr = circle_of(xy, a, b, c)
             known = is_within(sx, sy, rr, box, domain) or not _holds_samples(sx, sy, rr, box, block_x, block_y, before)
         if not known:
-            fixed[a] = True
-            fixed[b] = True
-            fixed[c] = True
+            is_foreign[t // RECORD] = True
+            stays[a] = True
+            stays[b] = True
+            stays[c] = True

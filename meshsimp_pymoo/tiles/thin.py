@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.greedy import thin
 from meshsimp_pymoo.search.raster import raster_insertion
-from meshsimp_pymoo.surface.books import END
+from meshsimp_pymoo.surface.books import END, Live
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
@@ -168,7 +168,8 @@ def start_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
         is_site[:] = False
         is_site[rank[raster_insertion(tile.x, tile.y, tile.heights, first, tile.inserted)]] = True
     surface = _surface(tile, number[order], xy[order], z[order], None)
-    removed, level = thin_sites(surface, is_site, lambda ground, live: on_border.ravel()[order], np.inf)
+    setting = Setting(surface, number[order], is_site, lambda live: (on_border.ravel()[order], np.empty(0, bool)))
+    removed, level = thin_sites(setting, np.inf)
     samples = np.concatenate([number[border], number[order[removed]]])
     return samples, np.concatenate([np.full(len(border), np.inf), level])
 
@@ -189,6 +190,35 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
         The slope at which each goes: error for each triangle along the lower convex hull of the tile's own front,
         ascending, at most ``tile.limit`` [model units].
     """
+    setting = setting_of(tile)
+    removed, level = thin_sites(setting, tile.limit)
+    return setting.number[removed], level
+
+
+class Setting(NamedTuple):
+    """A tile as thinning and moving see it.
+
+    Attributes
+    ----------
+    surface : HeightSurface
+        Its n samples that count and sites, in vector order.
+    number : (n,) int array
+        Their numbers.
+    is_site : (n,) bool array
+        Which are sites.
+    judge : callable
+        Given the books of the sites, returns which of them (n,) stay, and which triangles need not be triangles of the
+        whole, a flag for each record.
+    """
+
+    surface: HeightSurface
+    number: IntArray
+    is_site: BoolArray
+    judge: Callable[[Live], tuple[BoolArray, BoolArray]]
+
+
+def setting_of(tile: Tile) -> Setting:
+    """Return a tile as its sites can be changed: those at triangles that need not be triangles of the whole stay."""
     number, xy, z, weight, is_site, is_ours = _samples(tile)
     order = vector_order(xy, z)
     number, xy, z, is_site, is_ours = number[order], xy[order], z[order], is_site[order], is_ours[order]
@@ -197,22 +227,20 @@ def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     box = _box(tile)
     open_sides = np.where(box == tile.domain, np.array([-np.inf, np.inf, -np.inf, np.inf]), box)
 
-    def fix(ground: Any, live: Any) -> BoolArray:
-        fixed = np.isin(number, tile.corners) | ~is_ours
-        _fix_foreign(ground.xy, live.mesh, int(live.tally[END]), ~is_ours, open_sides, tile.domain, fixed)
-        return fixed
+    def judge(live: Live) -> tuple[BoolArray, BoolArray]:
+        stays, is_foreign = np.isin(number, tile.corners) | ~is_ours, np.zeros(len(live.kind), bool)
+        xy, end = surface.ground().xy, int(live.tally[END])
+        _find_foreign(xy, live.mesh, end, ~is_ours, open_sides, tile.domain, stays, is_foreign)
+        return stays, is_foreign
 
-    removed, level = thin_sites(surface, is_site, fix, tile.limit)
-    return number[removed], level
+    return Setting(surface, number, is_site, judge)
 
 
-def thin_sites(
-    surface: HeightSurface, is_site: BoolArray, fix: Callable[[Any, Any], BoolArray], limit: float
-) -> tuple[IntArray, FloatArray]:
-    """Thin sites to a slope, but for those that ``fix`` says of a ground and its books; return what goes and levels."""
-    ground = surface.ground()
-    with surface.books(is_site) as live:
-        fixed = fix(ground, live)
+def thin_sites(setting: Setting, limit: float) -> tuple[IntArray, FloatArray]:
+    """Thin the sites that may go to a slope; return which go, in their order, and their levels."""
+    ground, is_site = setting.surface.ground(), setting.is_site
+    with setting.surface.books(is_site) as live:
+        fixed, _ = setting.judge(live)
         n = int((is_site & ~fixed).sum())
         removed, error, triangles = np.empty(n, np.int32), np.empty(n + 1), np.empty(n + 1, np.int32)
         stop = np.zeros(1, np.bool_)
@@ -307,7 +335,9 @@ def _samples(
     to change, nor is anything at a triangle with them.
     """
     grid, xy, z = _window(tile)
-    assert tile.sites is not None and tile.site_xy is not None and tile.site_z is not None
+    assert tile.sites is not None
+    assert tile.site_xy is not None
+    assert tile.site_z is not None
     kept = np.isin(grid, tile.sites, assume_unique=True)
     extra = ~np.isin(tile.sites, grid, assume_unique=True)
     n_extra = int(extra.sum())
@@ -375,16 +405,17 @@ def is_within(sx: float, sy: float, rr: float, box: np.ndarray, domain: np.ndarr
 
 
 @entry
-def _fix_foreign(
+def _find_foreign(
     xy: np.ndarray,
     mesh: np.ndarray,
     end: int,
     foreign: np.ndarray,
     box: np.ndarray,
     domain: np.ndarray,
-    fixed: np.ndarray,
+    stays: np.ndarray,
+    is_foreign: np.ndarray,
 ) -> None:
-    """Fix the corners of all triangles that need not be triangles of the whole.
+    """Mark all triangles that need not be triangles of the whole, and their corners: these stay.
 
     ``box`` is what the tile knows of: least and largest x, least and largest y, infinite where the whole ends.
     """
@@ -398,6 +429,7 @@ def _fix_foreign(
             sx, sy, rr = circle_of(xy, a, b, c)
             known = is_within(sx, sy, rr, box, domain)
         if not known:
-            fixed[a] = True
-            fixed[b] = True
-            fixed[c] = True
+            is_foreign[t // RECORD] = True
+            stays[a] = True
+            stays[b] = True
+            stays[c] = True
