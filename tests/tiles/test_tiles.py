@@ -346,13 +346,21 @@ def test_vertices_are_moved_only_as_far_as_the_time_goes(front):
     store = InMemory()
     with pytest.warns(SearchWarning) as said:
         late = tiled_front(GRID, tile=64, until=0.0, store=store)
-    numbers = [piece["numbers"] for name, piece in store.pieces.items() if name.startswith("quality")]
-    small = sum(2 < quality_of(zip(MEASURES, row, strict=True)).triangles <= SEARCHED for row in numbers)
-    assert len(said) == 1
-    assert f"before the vertices of {small} of {small} small solutions were moved" in str(said[0].message)
-    store.put(f"moved_{len(numbers) - 2:04d}", samples=GRID.corners)
-    with pytest.warns(SearchWarning, match=f" {small - 1} of {small} small solutions "):
+    sizes = {
+        name.removeprefix("quality_"): quality_of(zip(MEASURES, piece["numbers"], strict=True)).triangles
+        for name, piece in store.pieces.items()
+        if name.startswith("quality")
+    }
+    small = [name for name, size in sizes.items() if 2 < size <= SEARCHED]
+    n_large = len(sizes) - len(small) - 1
+    assert [str(one.message).partition(": ")[2].partition(", which")[0] for one in said] == [
+        f"the time was up before the vertices of {len(small)} of {len(small)} small solutions were moved",
+        f"in the time given the vertices of 0 of {n_large} solutions of more than 300 triangles were moved",
+    ]
+    store.put(f"moved_{small[0]}", samples=GRID.corners)
+    with pytest.warns(SearchWarning) as said:
         tiled_front(GRID, tile=64, until=0.0, store=store)
+    assert f" {len(small) - 1} of {len(small)} small solutions " in str(said[0].message)
     assert all(moved is None for moved in late._kept.moved)
     assert any(moved is not None for moved in front._kept.moved)
     assert late[0].triangles == front[0].triangles == 2
