@@ -60,10 +60,10 @@ FAR_TRIES = 4
 SIZE_TRIES = 12
 # Rounds of changing the size that find no vertex before it is given up.
 FIT_FAILURES = 20
-# From so many vertices on the moves look at a window of so many, which the processor's cache holds, and at no fewer than
-# so many sites: all over the model each move waits for the memory, 1.4 to 2.5 times as long. It goes on by half of
-# itself, and so often over all of the vector, and more often where a visit is longer than so many moves, that every
-# place is seen at every temperature: with 4 passes and with 10 meshes are as good as without a window.
+# From so many vertices on the moves look at a window of so many, which the processor's cache holds, and at no fewer
+# sites than so many: all over the model each move waits for the memory and takes 1.2 to 1.9 times as long. It goes on
+# by half of itself, so often over all of the vector, and more often where a visit is longer than so many moves, that
+# every place is seen at every temperature: with 4 and with 10 passes meshes are as good as without a window.
 LARGE = 50_000
 WINDOW, LEAST_WINDOW = 4_000, 8
 PASSES, VISIT = 8, 4_000

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,20 +56,20 @@ from meshsimp_pymoo.surface.rules import USUAL_RATIO
 from meshsimp_pymoo.surface.surface import Surface, freedom_of, movable_ground
 from meshsimp_pymoo.workers import on_threads, threads_for
 
-# Rungs that get a child in the same generation; and generations that pass so many of the largest rungs, which have most
-# of the moves, before the others have their turn. They are much alike: where one of them had all smaller rungs beside
-# it, eight cores would wait for it half of the time.
+# Rungs that get a child in the same generation; and the generations that pass so many of the largest rungs each, which
+# have most of the moves, before the others have their turn. They are much alike: where one of them had but smaller ones
+# beside it eight cores waited for it. Two generations would share better, and hand down less.
 CHAINS = 16
 TOP_GENERATIONS = 3
-# Above this share of the vertices a rung gets no more moves than there, however many it keeps; of large models, for
-# which there is little time, the fewer the more it keeps, and with a deadline none unless there is one for each of its
-# vertices: building its mesh takes longer.
+# Above this share of the vertices a rung gets no more moves than there, however many it keeps.
 FULL_SHARE = 0.25
-# Vertices of the model for each kept one from which on looking at them takes most of a move's time. A rung of a large
-# model has the fewer moves for each kept vertex the more there are, by the root of what they take.
-CROWD = 15.0
+# Of large models, for which there is little time, it gets the fewer the more it keeps, by the square; with a deadline
+# none unless there is one for each of its vertices, as building its mesh takes longer. Smaller rungs get the fewer the
+# more their moves take, by the root. The first of a chain, to which nothing was handed down, gets so much more.
 BEGINNING = 2.0
-# What building a rung's mesh, thinning and measuring it take about, in moves: for each vertex, and each kept one.
+# Vertices of the model for each kept one from which on looking at them takes most of a move's time; and what building a
+# rung's mesh, thinning and measuring it take about, in moves, for each vertex and each kept one.
+CROWD = 15.0
 BUILDING = (0.35, 3.0)
 # Temperatures, in units of the error per kept vertex, and the share left in the end: where a chain begins, and below.
 FRESH = (0.3, 0.03)
@@ -87,15 +87,15 @@ SECONDS_A_MOVE = 7.5e-7
 ONE_SWEEP = 150.0
 # What measuring a subset takes for each vertex of the model, about [s]; and the share of the time that measuring the
 # first population may take, which has so many individuals all the same, and the ladder as many rungs: in a sweep each
-# takes some five times as long to be built, thinned and measured.
+# takes some five times as long to be built, thinned and measured. The second share is where no sweep follows.
 SECONDS_A_VERTEX = 8e-8
-FIRST_MEASURED = 0.04
+FIRST_MEASURED, ONLY_MEASURED = 0.04, 0.15
 FEWEST = 16
 # Share of the time, and at least so many seconds a million vertices, kept for filling the gaps between the rungs; but
-# never more than the second share.
+# never more than the second share, or the third with free meshes.
 LAST_SHARE = 0.03
 FILL_SECONDS = 40.0
-MOST_SHARE = 0.25
+MOST_SHARE, MOST_FREE_SHARE = 0.25, 0.3
 # With free meshes as much again of the time, and seconds a million vertices, for measuring what they are to be better
 # than; large models have nothing to be filled then but what their thinning has.
 FREE_SECONDS = 25.0
@@ -149,6 +149,30 @@ def _best_rows(problem: Any, pop: Population, rungs: NDArray[Any]) -> NDArray[np
         if len(fitting):
             rows[k] = order[fitting[0]]
     return rows
+
+
+class Loads(NamedTuple):
+    """What each rung of a ladder is to have, and what that takes.
+
+    Attributes
+    ----------
+    n_kept : (R,) int array
+        Vertices that it keeps and that may move.
+    work : (R,) float array
+        Its share of the moves: of a small one as many as it keeps vertices.
+    effort : (R,) float array
+        What one of them takes, in units of a move on a mesh that keeps most vertices.
+    building : (R,) float array
+        What all but the moves takes, in that unit.
+    is_full : (R,) bool array
+        Whether it keeps more than `FULL_SHARE`.
+    """
+
+    n_kept: NDArray[np.int64]
+    work: NDArray[np.float64]
+    effort: NDArray[np.float64]
+    building: NDArray[np.float64]
+    is_full: NDArray[np.bool_]
 
 
 class DownTheLadder(Mating):
@@ -217,20 +241,8 @@ class DownTheLadder(Mating):
         fresh = is_first or not self.inherit
         temperature, cooling = FRESH if fresh else AGAIN
         temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
-        work, kept = self._work(problem, pop, rows)
-        if problem.n_var >= LARGE_MOVES and self.inherit:
-            work[np.concatenate([rungs for rungs, is_first in sweep if is_first])] *= BEGINNING
-        effort, building = _effort(problem, kept)
-        moves = self._moves(
-            problem,
-            algorithm,
-            work,
-            effort,
-            building,
-            kept,
-            turn,
-            np.concatenate([turn for turn, _ in sweep[self.step :]]),
-        )
+        loads = self._loads(problem, pop, rows, np.concatenate([rungs for rungs, is_first in sweep if is_first]))
+        moves = self._moves(problem, algorithm, loads, turn, np.concatenate([rungs for rungs, _ in sweep[self.step :]]))
         if problem.n_var >= LARGE_MOVES and time_limit(algorithm) is not None:
             turn, moves = turn[moves > 0], moves[moves > 0]
         parents = rows[turn if fresh else turn + 1]
@@ -248,61 +260,55 @@ class DownTheLadder(Mating):
             shares=self.shares,
         )
         self.moves_done += int(moves.sum())
-        self.effort += float((moves * effort[turn] + building[turn]).sum())
+        self.effort += float((moves * loads.effort[turn] + loads.building[turn]).sum())
         self.step += 1
         if self.step >= len(sweep):
             self.step = 0
             self.sweep += 1
         return self.eliminate_duplicates.do(Population.new(X=children), pop)
 
-    @staticmethod
-    def _work(problem: Any, pop: Population, rows: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return each rung's share of the moves, of a small one as many as it keeps vertices, and how many it keeps."""
+    def _loads(self, problem: Any, pop: Population, rows: NDArray[np.int64], first: NDArray[np.int64]) -> Loads:
+        """Return what each rung is to have; chains begin with the ``first`` ones."""
         movable = ~problem.pinned
         n_kept = np.array([np.count_nonzero(individual.X & movable) for individual in pop])[np.maximum(rows, 0)]
         n_kept, full = np.maximum(n_kept, 1), FULL_SHARE * problem.n_var
-        work = np.minimum(n_kept, full)
+        work, effort = np.minimum(n_kept, full), 1.0 + problem.n_var / (CROWD * n_kept)
         if problem.n_var >= LARGE_MOVES:
-            work *= (full / np.maximum(n_kept, full)) ** 2 / np.sqrt(_effort(problem, n_kept)[0])
-        return work, n_kept
+            work *= (full / np.maximum(n_kept, full)) ** 2 / np.sqrt(effort)
+            work[first] *= BEGINNING if self.inherit else 1.0
+        return Loads(n_kept, work, effort, BUILDING[0] * problem.n_var + BUILDING[1] * n_kept, n_kept > full)
 
     def _moves(
-        self,
-        problem: Any,
-        algorithm: Any,
-        work: NDArray[np.float64],
-        effort: NDArray[np.float64],
-        building: NDArray[np.float64],
-        kept: NDArray[np.int64],
-        turn: NDArray[np.int64],
-        still: NDArray[np.int64],
+        self, problem: Any, algorithm: Any, loads: Loads, turn: NDArray[np.int64], still: NDArray[np.int64]
     ) -> NDArray[np.int64]:
-        """Return the moves of the rungs whose turn it is, given of all rungs the work and what that takes.
-
-        ``still`` are those that are left in a sweep.
-        """
+        """Return the moves of the rungs whose turn it is; ``still`` are those that are left in a sweep."""
         within = part_of(getattr(algorithm, "termination", None), Moves)
         share = _subsets_share(algorithm)
         deadline = time_limit(algorithm, share)
         n_within = None if within is None else round(share * within.n_max_moves)
+        is_large, work, effort = problem.n_var >= LARGE_MOVES, loads.work, loads.work * loads.effort
         if deadline is not None and not self.effort:
             self.begun = time.time() - algorithm.start_time
         spent = 0.0 if deadline is None else time.time() - algorithm.start_time - self.begun
         a_unit = spent / self.effort if self.effort else SECONDS_A_MOVE / threads_for(len(turn))
-        effort = work * effort
-        if self.sweep == self.step == 0 and problem.n_var >= LARGE_MOVES:
-            pace = np.inf if deadline is None else (deadline[1] / a_unit - building.sum()) / effort.sum()
-            if min(pace, np.inf if n_within is None else n_within / work.sum()) < ONE_SWEEP:
+        if is_large and self.sweep == self.step == 0:
+            pace = np.inf if n_within is None else n_within / work.sum()
+            if deadline is not None:
+                pace = min(pace, (deadline[1] / a_unit - loads.building.sum()) / effort.sum())
+            if pace < ONE_SWEEP:
                 self.first_share = 1.0
-        if n_within is None or deadline is not None:
-            pays = np.ones(len(work), np.bool_)
-            for _ in range(1 + (deadline is not None and problem.n_var >= LARGE_MOVES)):
+        if deadline is not None or n_within is None:
+            pace = self._pace(deadline, effort[still].sum() * a_unit, loads.building[still].sum() * a_unit, work.sum())
+            if is_large and deadline is not None:  # what is saved where it does not pay is for the others
+                pays = ~loads.is_full | (pace * work >= loads.n_kept)
                 left = still[pays[still]]
-                pace = self._pace(deadline, effort[left].sum() * a_unit, building[left].sum() * a_unit, work.sum())
-                pays = (pace * work >= kept) | (kept <= FULL_SHARE * problem.n_var)
-            moves = np.where(pays, np.ceil(pace * work), 0)[turn]
+                pace = self._pace(
+                    deadline, effort[left].sum() * a_unit, loads.building[left].sum() * a_unit, work.sum()
+                )
+                work = np.where(~loads.is_full | (pace * work >= loads.n_kept), work, 0.0)
+            moves = np.ceil(pace * work[turn])
         if n_within is not None:
-            planned = self._share_of(n_within, work[turn], work[still].sum())
+            planned = self._share_of(n_within, loads.work[turn], loads.work[still].sum())
             moves = planned if deadline is None else np.minimum(moves, planned)
         return moves.astype(np.int64)
 
@@ -326,14 +332,6 @@ class DownTheLadder(Mating):
         of_sweep = round(self.first_share * n_moves) if self.sweep == 0 else n_moves
         whole = min(round((of_sweep - self.moves_done) * (work.sum() / left)), int(SLOWEST * work.sum()))
         return np.diff(np.round(np.cumsum(work) / work.sum() * whole), prepend=0.0)
-
-
-def _effort(problem: Any, n_kept: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return about how long a move takes on meshes that keep so many vertices, and all but the moves of a rung.
-
-    In units of a move on a mesh that keeps most vertices.
-    """
-    return 1.0 + problem.n_var / (CROWD * n_kept), BUILDING[0] * problem.n_var + BUILDING[1] * n_kept
 
 
 def turns(n_rungs: int, n_chains: int = CHAINS) -> list[tuple[NDArray[np.int64], bool]]:
@@ -368,7 +366,7 @@ def time_limit(algorithm: Any, share: float = 1.0) -> tuple[float, float, float]
     last = max(LAST_SHARE * whole, FILL_SECONDS * n_var / 1e6 if n_var <= LARGE or not is_free else 0.0)
     if is_free:
         last += LAST_SHARE * whole + FREE_SECONDS * n_var / 1e6
-    last = min(last, MOST_SHARE * whole)
+    last = min(last, (MOST_FREE_SHARE if is_free else MOST_SHARE) * whole)
     return share * whole, share * (whole - last) - (time.time() - algorithm.start_time), last
 
 
@@ -421,7 +419,8 @@ class MemeticSearch(GeneticAlgorithm):
     def _n_rungs(self) -> int:
         """How many rungs there are, and individuals in the beginning: with a deadline no more than fit."""
         seconds, n = seconds_given(self), self.pop_size
-        return n if seconds is None else min(n, max(measurable(self.problem, FIRST_MEASURED * seconds), FEWEST))
+        share = FIRST_MEASURED if _subsets_share(self) > 0.0 else ONLY_MEASURED
+        return n if seconds is None else min(n, max(measurable(self.problem, share * seconds), FEWEST))
 
     def _initialize_infill(self) -> Population:
         return self.initialization.do(self.problem, self._n_rungs, algorithm=self, random_state=self.random_state)

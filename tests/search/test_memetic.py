@@ -198,6 +198,56 @@ def test_a_budget_in_moves_makes_a_quick_sweep_and_a_slow_one(monkeypatch):
     assert algorithm.mating.sweep == 2
 
 
+def test_a_large_model_has_no_quick_sweep_where_there_are_few_moves(monkeypatch):
+    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    asked = []
+    monkeypatch.setattr(
+        module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(int(moves.sum())), X.copy())[1]
+    )
+    for most, n_generations in ((10_000, 3), (1_000_000, 6)):
+        asked.clear()
+        minimize(MeshProblem("face:200"), memetic(40), Moves(most), seed=1)
+        assert len(asked) == n_generations
+        assert sum(asked) == most
+
+
+def test_with_a_deadline_rungs_of_a_large_model_that_would_hardly_be_moved_are_left_as_they_are(monkeypatch):
+    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    asked = []
+    monkeypatch.setattr(module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(moves), X.copy())[1])
+    problem = MeshProblem("face:200")
+    for seconds in (1e-9, 1e3):
+        monkeypatch.setattr(module, "time_limit", lambda *_, left=seconds: (left, left, 0.0))
+        algorithm = memetic(16)
+        algorithm.setup(problem, termination=("n_gen", 2), seed=1)
+        algorithm.next()
+        algorithm.next()
+    n_kept = [np.count_nonzero(one.X & ~problem.pinned) for one in algorithm.pop]
+    assert max(n_kept) > module.FULL_SHARE * problem.n_var
+    assert len(asked[0]) < len(asked[1]) == len(algorithm.survival.rungs)
+    assert (asked[0] <= module.BEGINNING * module.FULL_SHARE * problem.n_var).all()
+
+
+@pytest.mark.parametrize("n_rungs", [1, 15, 16, 40, 48, 49, 100, 333])
+def test_each_rung_has_one_turn_a_sweep_after_the_one_above_in_its_chain(n_rungs):
+    sweep = module.turns(n_rungs)
+    assert sorted(np.concatenate([rungs for rungs, _ in sweep]).tolist()) == list(range(n_rungs))
+    assert len(sweep) == -(-n_rungs // module.CHAINS)
+    before = set()
+    for rungs, is_first in sweep:
+        assert len(rungs) <= module.CHAINS
+        assert (np.diff(rungs) < 0).all()  # the longest task first
+        assert is_first or before.issuperset((rungs + 1).tolist())
+        before |= set(rungs.tolist())
+
+
+def test_a_generation_of_the_largest_rungs_has_many_that_are_alike():
+    """If the moves grow with the rungs' sizes, up to a quarter of all, no core waits long for the largest one."""
+    work = np.minimum(np.geomspace(2, 138_000, 100), 138_000 / 4)
+    for rungs, _ in module.turns(100)[: module.TOP_GENERATIONS]:
+        assert work[rungs].sum() > 5 * work[rungs].max()
+
+
 @pytest.mark.parametrize(
     "termination", [Moves(20_000), TerminationCollection(MaximumGenerationTermination(50), Moves(20_000))]
 )
