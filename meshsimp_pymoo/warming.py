@@ -174,6 +174,17 @@ def _tiles() -> None:
     tiled_front(open_grid(np.add.outer(side, side**2 % 7)), tile=LEAST_TILE)
 
 
+def _gaps() -> None:
+    import numpy as np
+
+    from meshsimp_pymoo.opening import open_grid
+    from meshsimp_pymoo.tiles.front import LEAST_TILE, tiled_front
+
+    heights = np.add.outer(np.arange(2.0 * LEAST_TILE), np.arange(6.0) ** 2 % 7)
+    heights[2:-2, 2:4] = np.nan
+    tiled_front(open_grid(heights), tile=LEAST_TILE)
+
+
 def _free() -> None:
     from meshsimp_pymoo.search.free import FreeLadder
 
@@ -258,6 +269,15 @@ PARTS = (
             "surface.weld:_measure_rows", "surface.weld:_measure_cells",
         ),
         _tiles, 2.5, False,
+    ),
+    Part(
+        "gaps in grids",
+        (
+            "surface.gaps:_emit", "surface.gaps:_outline", "surface.gaps:_find_starts",
+            "surface.gaps:_measure_rows_with_gaps", "surface.gaps:_measure_cells_with_gaps",
+            "tiles.gaps:_fix_beside_gaps",
+        ),
+        _gaps, 5.8, False,
     ),
     Part("scores", ("surface.score:_cover", "surface.score:_measure_outside"), _scores, 1.5, False),
     Part(

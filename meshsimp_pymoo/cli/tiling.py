@@ -71,7 +71,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
             grid = open_grid(request.model, request.options)
             has_gaps = grid.lattice is not None  # all samples are read once
         read_seconds = shown.seconds["reading"] - compiled.seconds
-        compiled.finish()
+        compiled.finish((*SEARCH, "tiles", "gaps in grids") if has_gaps else (*SEARCH, "tiles"))
     if request.wish.triangles == 1 and not has_gaps:
         raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
     wish = request.wish.among(lambda: len(grid.faces))
