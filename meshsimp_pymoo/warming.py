@@ -275,7 +275,7 @@ PARTS = (
         (
             "surface.gaps:_emit", "surface.gaps:_outline", "surface.gaps:_find_starts",
             "surface.gaps:_measure_rows_with_gaps", "surface.gaps:_measure_cells_with_gaps",
-            "tiles.gaps:_fix_beside_gaps",
+            "tiles.gaps:_find_beside_gaps",
         ),
         _gaps, 5.8, False,
     ),

@@ -24,6 +24,7 @@ from meshsimp_pymoo.plane.emission import is_in_faces
 from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.order import find_corners, vector_order
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
+from meshsimp_pymoo.search.raster import raster_insertion
 from meshsimp_pymoo.surface.books import END, Live
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -33,6 +34,8 @@ from meshsimp_pymoo.tiles.thin import Elsewhere, Gaps, Setting, Tile, circle_of,
 
 # Blocks along one side of a grid, at most, and samples along one side of a block, at least.
 MOST_BLOCKS, LEAST_BLOCK = 256, 8
+# Of the samples to begin with, the share that may lie along sides and gaps; else all are thinned.
+BESIDE = 0.6
 
 
 def blocks_of(grid: HeightGrid) -> Elsewhere | None:
@@ -75,30 +78,68 @@ def gaps_in(
 
 
 def start_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
-    """Thin a tile that has all its samples, to the end.
+    """Thin a tile to the end: from all its samples, or from those that insertion finds and all along sides and gaps.
 
     Returns
     -------
     samples : (m,) int array
-        Numbers of its samples.
+        Numbers of the samples that are worth a look; the others were never inserted.
     level : (m,) float array
         The slope at which each goes, as :func:`thin_with_gaps` says; infinite: it does not.
     """
-    removed, level = thin_with_gaps(tile)
-    rest = np.setdiff1d(_samples(tile)[0], removed, assume_unique=True)
+    setting = setting_with_gaps(tile)
+    if setting is None:
+        number = _samples(tile)[0]
+        return number, np.full(len(number), np.inf)
+    sparse = _inserted(tile, setting)
+    setting = setting if sparse is None else sparse
+    removed, level = _thinned(setting, np.inf)
+    candidates = setting.number[setting.is_site]
+    rest = np.setdiff1d(candidates, removed, assume_unique=True)
     return np.concatenate([rest, removed]), np.concatenate([np.full(len(rest), np.inf), level])
+
+
+def _inserted(tile: Tile, setting: Setting) -> Setting | None:
+    """Return a tile with the samples that insertion finds for sites; None: nearly all lie along sides and gaps.
+
+    It begins with those, so that the same is covered; along a side that has all its samples no edge crosses it, as
+    :func:`~meshsimp_pymoo.tiles.thin.start_tile` says, and what lies at a gap's end there is nearly so.
+    """
+    assert tile.gaps is not None
+    there = tile.gaps.there
+    padded = np.pad(there, 1)
+    inner = there.copy()
+    for down, right in np.ndindex(3, 3):
+        inner &= padded[down : down + there.shape[0], right : right + there.shape[1]]
+    row, column = np.divmod(setting.number, tile.n_columns)
+    place = np.searchsorted(tile.rows, row) * there.shape[1] + np.searchsorted(tile.columns, column)
+    first = place[~inner.ravel()[place]]  # in vector order
+    most = int(tile.inserted / there.size * there.sum())
+    if len(first) > BESIDE * most:
+        return None
+    try:
+        found = raster_insertion(tile.x, tile.y, np.where(there, tile.heights, np.nan), first, most)
+    except ValueError:  # samples on one line
+        return None
+    is_site = np.zeros(there.size, bool)
+    is_site[found] = True
+    stays = _staying(tile, setting.number, setting.surface.places)
+    nothing = np.empty(0, bool)
+    return setting._replace(is_site=is_site[place], judge=lambda live: (stays, nothing))
 
 
 def thin_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
     """Do what :func:`~meshsimp_pymoo.tiles.thin.thin_tile` does, for a tile with ``gaps``."""
     setting = setting_with_gaps(tile)
-    nothing = np.empty(0, np.int64), np.empty(0)
-    if setting is None:
-        return nothing
+    return (np.empty(0, np.int64), np.empty(0)) if setting is None else _thinned(setting, tile.limit)
+
+
+def _thinned(setting: Setting, limit: float) -> tuple[IntArray, FloatArray]:
+    """Thin a tile's sites to a slope; return the numbers of those that go, in their order, and their levels."""
     try:
-        removed, level = thin_sites(setting, tile.limit)
+        removed, level = thin_sites(setting, limit)
     except ValueError:  # what the books say of sites that span no triangle, and of nothing else
-        return nothing
+        return np.empty(0, np.int64), np.empty(0)
     n_wanted = int(np.searchsorted(level, np.inf))
     return setting.number[removed[:n_wanted]], level[:n_wanted]
 
@@ -129,14 +170,11 @@ def setting_with_gaps(tile: Tile) -> Setting | None:
     if rules.footprint == "hull" and is_shared.any():
         rules = replace(rules, outside="nearest")
     surface = HeightSurface(model, rules)
-    on_side = np.zeros(len(number), bool)
-    for k, side in enumerate(box):
-        if is_shared[k]:
-            on_side |= xy[:, k // 2] == side
+    stay = _staying(tile, number, xy) | ~is_ours
     box = np.where(is_shared, box, np.array([-np.inf, np.inf, -np.inf, np.inf]))
 
     def judge(live: Live) -> tuple[BoolArray, BoolArray]:
-        stays, is_foreign = np.isin(number, tile.corners) | ~is_ours | on_side, np.zeros(len(live.kind), bool)
+        stays, is_foreign = stay.copy(), np.zeros(len(live.kind), bool)
         _find_beside_gaps(
             surface.ground().xy, live.mesh, int(live.tally[END]), ~is_ours, box, tile.domain, gaps.footprint,
             *gaps.elsewhere, stays, is_foreign,
@@ -144,6 +182,15 @@ def setting_with_gaps(tile: Tile) -> Setting | None:
         return stays, is_foreign
 
     return Setting(surface, number, is_site, judge)
+
+
+def _staying(tile: Tile, number: IntArray, xy: FloatArray) -> BoolArray:
+    """Return which samples stay whatever the mesh is: the corners of the whole, and those on sides shared by tiles."""
+    stays = np.isin(number, tile.corners)
+    for k, (side, is_shared) in enumerate(zip(*_sides(tile), strict=True)):
+        if is_shared:
+            stays |= xy[:, k // 2] == side
+    return stays
 
 
 def _sides(tile: Tile) -> tuple[FloatArray, BoolArray]:
