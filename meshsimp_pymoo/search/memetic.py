@@ -63,7 +63,7 @@ CHAINS = 16
 TOP_GENERATIONS = 3
 # Above this share of the vertices a rung gets no more moves than there, however many it keeps.
 FULL_SHARE = 0.25
-# Of large models, for which there is little time, it gets the fewer the more it keeps, by the square; with a deadline
+# Of large models, for which there is little time, it gets the fewer the more it keeps; with a deadline
 # none unless there is one for each of its vertices, as building its mesh takes longer. Smaller rungs get the fewer the
 # more their moves take, by the root. The first of a chain, to which nothing was handed down, gets so much more.
 BEGINNING = 2.0
@@ -274,7 +274,7 @@ class DownTheLadder(Mating):
         n_kept, full = np.maximum(n_kept, 1), FULL_SHARE * problem.n_var
         work, effort = np.minimum(n_kept, full), 1.0 + problem.n_var / (CROWD * n_kept)
         if problem.n_var >= LARGE_MOVES:
-            work *= (full / np.maximum(n_kept, full)) ** 2 / np.sqrt(effort)
+            work *= full / np.maximum(n_kept, full) / np.sqrt(effort)
             work[first] *= BEGINNING if self.inherit else 1.0
         return Loads(n_kept, work, effort, BUILDING[0] * problem.n_var + BUILDING[1] * n_kept, n_kept > full)
 
