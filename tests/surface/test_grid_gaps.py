@@ -160,9 +160,14 @@ def test_islands_of_a_model_with_an_empty_row_between_them_do_not_grow_together(
 
 def test_a_model_that_lacks_a_face_of_its_cells_is_no_grid():
     source = grid_source(HILLS[:5, :6])
-    for faces in (np.delete(source.faces, 7, axis=0), np.r_[source.faces[:-1], source.faces[:1]]):
+    model = build_model(source, up="z")
+    row_of = np.argsort(model.source_index)
+    assert open_grid(dataclasses.replace(model, faces=row_of[source.faces].astype(np.int32))).lattice is None
+    twice = source.faces.copy()
+    twice[1] = 0, 6, 1  # north-west, south-west, north-east, beside that without the north-east corner
+    for faces in (np.delete(source.faces, 7, axis=0), np.r_[source.faces[:-1], source.faces[:1]], twice):
         with pytest.raises(NoHeightGrid, match=r"\d+ faces are not those of a height grid of 5 rows and 6"):
-            open_grid(dataclasses.replace(build_model(source, up="z"), faces=faces.astype(np.int32)))
+            open_grid(dataclasses.replace(model, faces=row_of[faces].astype(np.int32)))
     model = build_model(grid_source(KINDS["a void"]), up="z")
     with pytest.raises(ModelError, match="has weights"):
         open_grid(model.with_weights(np.full(X.size, 2.0)))

@@ -225,6 +225,16 @@ def test_what_cannot_be_cut_into_tiles_is_refused_in_one_line(tmp_path, capsys, 
     assert not out.exists()
 
 
+def test_a_raster_with_a_hole_is_the_grid_that_it_is_in_one_piece(tmp_path):
+    file = write(tmp_path / "dem.tif", with_hole(HEIGHTS), nodata=-9999)
+    for window in (None, WINDOW):
+        grid, model = open_grid(file, window=window), open_model(file, Options(window=window))
+        row_of = np.argsort(model.source_index)
+        assert grid.n_vertices == grid.shape[0] * grid.shape[1] - 1
+        np.testing.assert_array_equal(np.asarray(grid.file_points), model.file_points[row_of])
+        np.testing.assert_array_equal(np.asarray(grid.source_index), model.source_index[row_of])
+
+
 def test_a_part_of_a_raster_without_the_hole_is_thinned(tmp_path, capsys):
     file = write(tmp_path / "dem.tif", with_hole(HEIGHTS), nodata=-9999)
     call = [
