@@ -17,7 +17,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,6 +60,8 @@ class NestedFront:
         Triangles of subset k.
     n_vertices : int
         N of the model.
+    count : (M + 1,) int array, optional
+        Of a front that has not all sizes: how many of the further vertices each subset has.
     """
 
     base: np.ndarray
@@ -67,6 +69,7 @@ class NestedFront:
     error: np.ndarray
     triangles: np.ndarray
     n_vertices: int
+    count: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return (
@@ -88,8 +91,17 @@ class NestedFront:
             raise ValueError(f"there is no subset {k}; the front has the subsets 0 to {len(self) - 1}")
         kept = np.zeros(self.n_vertices, bool)
         kept[self.base] = True
-        kept[self.order[:k]] = True
+        kept[self.order[: k if self.count is None else self.count[k]]] = True
         return kept
+
+    def part(self, first: int, end: int) -> NestedFront:
+        """Return the front of some of the subsets: of all sizes it can be the smallest ones alone."""
+        error, triangles = self.error[first:end], self.triangles[first:end]
+        if self.count is not None:
+            return replace(self, error=error, triangles=triangles, count=self.count[first:end])
+        if first:
+            raise ValueError(f"the subsets from {first} on are no front of their own; take them from 0 on")
+        return replace(self, order=self.order[: end - 1], error=error, triangles=triangles)
 
 
 def thinning(

@@ -13,6 +13,8 @@ References
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
@@ -20,6 +22,52 @@ from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE, insert, triangulate
 from meshsimp_pymoo.search.heap import sift_down, sift_up
+from meshsimp_pymoo.surface.surface import Surface
+
+# Rows times columns, at most, for each vertex of a raster: its gaps are that many and one less.
+MOST_CROSSINGS = 2
+
+
+class Raster(NamedTuple):
+    """Vertices at crossings of rows and columns.
+
+    Attributes
+    ----------
+    x, y : (w,), (h,) float arrays
+        Where the columns and rows are in the unit square: x ascending, y descending.
+    heights : (h, w) float array
+        Their heights [model units]; NaN where there is no vertex.
+    vertex : (h * w,) int array
+        The vertex at each crossing, -1: none.
+    crossing : (N,) int array
+        The crossing of each vertex, ``row * w + column``.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    heights: FloatArray
+    vertex: IntArray
+    crossing: IntArray
+
+
+def raster_of(surface: Surface) -> Raster | None:
+    """Return the vertices of a height surface as a raster; None: they are none."""
+    places = np.asarray(surface.places)
+    if surface.view.is_closed:
+        return None
+    x, column = np.unique(places[:, 0], return_inverse=True)
+    y, row = np.unique(places[:, 1], return_inverse=True)
+    n = surface.n_vertices
+    if len(x) * len(y) > MOST_CROSSINGS * n or min(len(x), len(y)) < 2:
+        return None
+    crossing = (len(y) - 1 - row) * len(x) + column
+    vertex = np.full(len(x) * len(y), -1, np.int64)
+    vertex[crossing] = np.arange(n)
+    if np.count_nonzero(vertex >= 0) < n:  # several at one place
+        return None
+    heights = np.full(len(vertex), np.nan)
+    heights[crossing] = np.asarray(surface.points)[:, 2]
+    return Raster(x, y[::-1].copy(), heights.reshape(len(y), len(x)), vertex, crossing)
 
 
 def raster_insertion(x: FloatArray, y: FloatArray, heights: FloatArray, first: IntArray, most: int) -> IntArray:

@@ -11,6 +11,7 @@ from samples import surface
 from meshsimp_pymoo import MeshProblem, RandomSubset, memetic
 from meshsimp_pymoo.errors import SearchWarning
 from meshsimp_pymoo.formats.source.heights import grid_source
+from meshsimp_pymoo.formats.source.points import cloud_source
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.search import starting
 from meshsimp_pymoo.search.budgets import seconds_given
@@ -21,6 +22,16 @@ from meshsimp_pymoo.search.starting import Start, at_hand, begun, thinned
 def rough(side, seed=1):
     """Return the surface of random heights on a full grid: thinning it is real work."""
     return surface(open_model(grid_source(np.random.default_rng(seed).random((side, side)))))
+
+
+def scattered(side, seed=1):
+    """Return the surface of as many random heights anywhere."""
+    x, y, z = np.random.default_rng(seed).random((3, side * side))
+    corners = [[0, 0, 0.5], [1, 0, 0.5], [1, 1, 0.5], [0, 1, 0.5]]
+    return surface(open_model(cloud_source(np.vstack([corners, np.column_stack([x, y, z])[4:]]))))
+
+
+each_kind = pytest.mark.parametrize("make", [rough, scattered])
 
 
 def nested(base, order, triangles, n=9):
@@ -63,8 +74,9 @@ def test_without_a_limit_it_is_the_thinning_once_for_a_surface(monkeypatch):
     assert thinned(model, 1e-9) is start
 
 
-def test_where_thinning_takes_too_long_what_insertion_finds_is_thinned(monkeypatch):
-    model = rough(60)
+@each_kind
+def test_where_thinning_takes_too_long_what_insertion_finds_is_thinned(monkeypatch, make):
+    model = make(60)
     monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
     with pytest.warns(SearchWarning, match=r"0.6 s are too short to thin all 3,600 vertices; .* from meshes of \d"):
         start = thinned(model, 0.6)
@@ -85,6 +97,57 @@ def test_where_thinning_takes_too_long_what_insertion_finds_is_thinned(monkeypat
     assert again.error.tobytes() == thinning(model).error.tobytes()
 
 
+def test_a_grid_is_scanned_and_has_larger_meshes_too(monkeypatch):
+    model = surface(open_model("jacksboro:4"))
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
+    monkeypatch.setattr(starting, "greedy_insertion", None)
+    with pytest.warns(SearchWarning, match=r"from meshes of 2 to 5,\d\d\d, 5,\d\d\d to 1\d,\d\d\d triangles"):
+        start = thinned(model, 60.0)
+    assert len(start.parts) == 2
+    same_meshes(model, start, np.unique(np.linspace(0, len(start) - 1, 30).astype(int)))
+    assert start.error[-1] < 1e-6 * start.error[0]
+    whole = thinning(model)
+    for share in (0.01, 0.02, 0.05, 0.1):
+        most = 2 * share * model.n_vertices
+        best = [front.error[front.triangles <= most].min() for front in (whole, start)]
+        assert best[1] < 1.06 * best[0]
+
+
+def test_a_grid_with_gaps_is_scanned_with_its_outline(monkeypatch):
+    heights = np.random.default_rng(1).random((40, 50)).cumsum(axis=0)
+    heights[10:20, 15:30] = np.nan
+    heights[:8, :9] = np.nan
+    model = surface(open_model(grid_source(heights)))
+    monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
+    monkeypatch.setattr(starting, "greedy_insertion", None)
+    with pytest.warns(SearchWarning, match="too short"):
+        start = thinned(model, 60.0)
+    same_meshes(model, start, np.unique(np.linspace(0, len(start) - 1, 30).astype(int)))
+    assert start.triangles[-1] == len(model.faces)
+    order = starting._inserted_by_scanning(model)
+    assert np.isin(model.border, order[: len(model.border) + int(model.pinned.sum())]).all()
+
+
+def test_what_is_no_grid_or_does_not_count_the_sum_is_not_scanned():
+    assert starting._inserted_by_scanning(scattered(9)) is None
+    assert starting._inserted_by_scanning(rough(9).measuring("max_error")) is None
+    assert starting._inserted_by_scanning(rough(9).measuring("rms_error")) is not None
+
+
+def test_some_subsets_of_an_order_are_a_front_of_some_sizes():
+    model = rough(12)
+    order = starting._inserted_by_scanning(model)
+    front = starting._some(model, order, 10, 100)
+    assert front.count[0] == 10
+    assert front.count[-1] == 100
+    assert front.kept(0).sum() == 10
+    part = front.part(3, 7)
+    assert len(part) == 4
+    np.testing.assert_array_equal(part.kept(1), front.kept(4))
+    with pytest.raises(ValueError, match="the subsets from 3 on are no front of their own; take them from 0 on"):
+        thinning(model).part(3, 7)
+
+
 def test_insertion_thinned_back_is_near_thinning():
     model = surface(open_model("jacksboro:8"))
     whole = thinning(model)
@@ -96,8 +159,9 @@ def test_insertion_thinned_back_is_near_thinning():
         assert best[1] < 1.06 * best[0]
 
 
-def test_the_clock_ends_thinning_and_the_small_meshes_come_from_insertion(monkeypatch):
-    model = rough(70)
+@each_kind
+def test_the_clock_ends_thinning_and_the_small_meshes_come_from_insertion(monkeypatch, make):
+    model = make(70)
     monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 0.0)  # thought to be in time
     real = starting.thinning
 
@@ -118,7 +182,7 @@ def test_the_clock_ends_thinning_and_the_small_meshes_come_from_insertion(monkey
 
 
 def test_pinned_vertices_that_span_nothing_leave_thinning_alone(monkeypatch, recwarn):
-    model, other = rough(20), rough(20)
+    model, other = rough(20), scattered(20)
     model.pinned[:] = False
     assert [can_insert(model), can_insert(other)] == [False, True]
     monkeypatch.setattr(starting, "SECONDS_A_REMOVAL", 1.0)
@@ -136,15 +200,17 @@ def test_pinned_vertices_that_span_nothing_leave_thinning_alone(monkeypatch, rec
         thinned(other, 20.0)
 
 
-def test_ctrl_c_before_the_first_removal_is_not_lost():
-    start = starting._begin(rough(20), np.ones(2, bool), np.inf)
+@each_kind
+def test_ctrl_c_before_the_first_removal_is_not_lost(make):
+    start = starting._begin(make(20), np.ones(2, bool), np.inf)
     assert not start.is_whole
     assert len(start.parts[-1]) == 1  # all vertices, and what insertion finds
     assert start.triangles[0] == 2
 
 
-def test_what_ctrl_c_has_left_is_for_no_later_search(monkeypatch):
-    model = rough(20)
+@each_kind
+def test_what_ctrl_c_has_left_is_for_no_later_search(monkeypatch, make):
+    model = make(20)
     real = starting.thinning
 
     def interrupted(surface, *, stop, kept=None):
