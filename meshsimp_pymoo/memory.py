@@ -82,13 +82,12 @@ def check_one_piece(n_vertices: int, name: str, way_out: str) -> None:
     ModelError
         With both sizes and the number of vertices that fit.
     """
-    if not fits_in_one_piece(n_vertices):
-        free = min(free_memory())
-        most = max(free - PROCESS_BYTES, 0.0) / VERTEX_BYTES
+    needed, free = VERTEX_BYTES * n_vertices, min(free_memory())
+    if needed > free:
+        most = float(f"{free / VERTEX_BYTES:.2g}")
         raise ModelError(
-            f"{name}: to search {n_vertices:,} vertices in one piece needs about "
-            f"{spelled(PROCESS_BYTES + VERTEX_BYTES * n_vertices)}, and {spelled(free)} are free, enough for some "
-            f"{float(f'{most:.2g}'):,.0f}; {way_out}"
+            f"{name}: a search of {n_vertices:,} vertices in one piece does not fit into memory: it takes about "
+            f"{spelled(needed)}, and {spelled(free)} are free, enough for some {most:,.0f}; {way_out}"
         )
 
 

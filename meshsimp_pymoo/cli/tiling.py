@@ -183,7 +183,7 @@ def _refuse_unknown(request: Request) -> None:
         for item in fields(part):
             if item.name not in KNOWN[type(part)] and getattr(part, item.name) != item.default:
                 raise UsageError(
-                    f"--{item.name.replace('_', '-')} does not go with tiles, which are thinned and not searched; "
+                    f"--{item.name.replace('_', '-')} does not go with tiles, which do not know it; "
                     "leave it out, or do without tiles (--tile none)"
                 )
 

@@ -343,7 +343,7 @@ def turns(n_rungs: int, n_chains: int = CHAINS) -> list[tuple[NDArray[np.int64],
     Examples
     --------
     >>> [(rungs.tolist(), is_first) for rungs, is_first in turns(9, 2)]
-    [([8, 6], True), ([7, 5], False), ([4, 1], True), ([3, 0], False), ([2], False)]
+    [([8, 5], True), ([7, 4], False), ([6, 3], False), ([2, 0], True), ([1], False)]
     """
     order = np.arange(n_rungs)[::-1]
     found = []

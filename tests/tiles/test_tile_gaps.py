@@ -104,7 +104,7 @@ def test_the_rules_of_the_front_are_those_asked_for(footprint):
     front = tiled_front(open_grid(z), tile=64, rules=rules)
     whole = HeightSurface(build_model(grid_source(z), up="z"), rules)
     row_of = np.argsort(whole.model.source_index)
-    for row in (3, len(front) // 2, len(front) - 1):
+    for row in {len(front) // 2, len(front) - 1}:  # what nothing covers costs nothing, so there may be few
         kept = np.zeros(whole.n_vertices, bool)
         kept[row_of] = front.kept[row]
         assert asdict(front.quality[row]) == pytest.approx(asdict(whole.simplify(kept).quality), rel=1e-9, nan_ok=True)
