@@ -944,7 +944,7 @@ def test_interrupted_between_the_search_and_freeing_nothing_is_freed(tmp_path, m
     [
         (("--free-height", "0.2"), "--free-height does not go with Delaunay meshes: it is of free ones; leave it out"),
         (("--no-centroids",), "--no-centroids does not go with Delaunay meshes: it is of free ones"),
-        (("--free", "--tile", "64"), "--free does not go with tiles, which are thinned and not searched; leave it out"),
+        (("--free", "--tile", "64"), "--free does not go with tiles, which do not know it; leave it out"),
         (("--free", "--free-height", "0.7"), "'0.7' is larger than 0.5"),
         (("--free", "--free-height", "-1"), "'-1' is below 0"),
         (("--free", "--moves", "100", *PAPERS), "--moves is for --algorithm memetic"),
