@@ -141,7 +141,7 @@ def _beside(tile: Tile, number: IntArray) -> Csr:
     counts = (tile.rows[np.minimum(i, h - 1)] == row) & (tile.columns[np.minimum(j, w - 1)] == column)
     at = np.full((h, w), -1, np.int64)
     at[i[counts], j[counts]] = np.flatnonzero(counts)
-    beside = np.empty((len(number), len(STEPS)), np.int64)
+    beside = np.empty((len(number), len(STEPS)), np.int32)  # as the neighbours of models are
     own = np.arange(len(number))
     for k, (down, right) in enumerate(STEPS):
         # one between rows is south of row i - 1 and north of row i
