@@ -298,14 +298,20 @@ class DownTheLadder(Mating):
             if pace < ONE_SWEEP:
                 self.first_share = 1.0
         if deadline is not None or n_within is None:
-            pace = self._pace(deadline, effort[still].sum() * a_unit, loads.building[still].sum() * a_unit, work.sum())
-            if is_large and deadline is not None:  # what is saved where it does not pay is for the others
-                pays = ~loads.is_full | (pace * work >= loads.n_kept)
-                left = still[pays[still]]
-                pace = self._pace(
-                    deadline, effort[left].sum() * a_unit, loads.building[left].sum() * a_unit, work.sum()
-                )
-                work = np.where(~loads.is_full | (pace * work >= loads.n_kept), work, 0.0)
+
+            def paced(rungs: NDArray[np.int64]) -> float:
+                one, rest = effort[rungs].sum() * a_unit, loads.building[rungs].sum() * a_unit
+                return self._pace(deadline, one, rest, work.sum())
+
+            def paying(pace: float) -> NDArray[np.bool_]:
+                return ~loads.is_full | (pace * work >= loads.n_kept)
+
+            pace = paced(still)
+            if is_large and deadline is not None:
+                left = still[paying(pace)[still]]
+                if len(left):  # what is saved where it does not pay is for the others, if there are any
+                    pace = paced(left)
+                    work = np.where(paying(pace), work, 0.0)
             moves = np.ceil(pace * work[turn])
         if n_within is not None:
             planned = self._share_of(n_within, loads.work[turn], loads.work[still].sum())

@@ -228,6 +228,39 @@ def test_with_a_deadline_rungs_of_a_large_model_that_would_hardly_be_moved_are_l
     assert (asked[0] <= module.BEGINNING * module.FULL_SHARE * problem.n_var).all()
 
 
+def test_where_all_rungs_of_a_large_model_would_hardly_be_moved_all_are_moved_a_little(monkeypatch):
+    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    monkeypatch.setattr(module, "time_limit", lambda *_: (1e-9, 1e-9, 0.0))
+    asked = []
+    monkeypatch.setattr(module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(moves), X.copy())[1])
+    problem = MeshProblem("face:200")
+    algorithm = memetic(16, triangles=(300, 380))
+    algorithm.setup(problem, termination=("n_gen", 2), seed=1)
+    algorithm.next()
+    algorithm.next()
+    n_kept = [np.count_nonzero(one.X & ~problem.pinned) for one in algorithm.pop]
+    assert min(n_kept) > module.FULL_SHARE * problem.n_var
+    assert len(asked[0]) == len(algorithm.survival.rungs)
+    assert (asked[0] > 0).all()
+
+
+def test_a_generation_of_which_no_rung_is_moved_has_no_children(monkeypatch):
+    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    monkeypatch.setattr(module, "time_limit", lambda *_: (1e-9, 1e-9, 0.0))
+    problem = MeshProblem("face:200")
+    algorithm = memetic(4, triangles=(40, 380))
+    algorithm.mating.n_chains = 1
+    algorithm.setup(problem, termination=("n_gen", 9), seed=1)
+    algorithm.next()
+    before = algorithm.pop.get("X")
+    algorithm.next()
+    assert algorithm.mating.moves_done == 0
+    np.testing.assert_array_equal(algorithm.pop.get("X"), before)
+    algorithm.next()
+    algorithm.next()
+    assert algorithm.mating.moves_done > 0
+
+
 @pytest.mark.parametrize("n_rungs", [1, 15, 16, 40, 48, 49, 100, 333])
 def test_each_rung_has_one_turn_a_sweep_after_the_one_above_in_its_chain(n_rungs):
     sweep = module.turns(n_rungs)
