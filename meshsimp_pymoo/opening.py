@@ -366,7 +366,7 @@ def _fills_cells(row: IntArray, column: IntArray, faces: IntArray, n_columns: in
     there[row, column] = True
     i, j = row[faces], column[faces]
     top, left = i.min(axis=1), j.min(axis=1)
-    if (np.ptp(i, axis=1) != 1).any() or (np.ptp(j, axis=1) != 1).any() or not there.any(axis=None):
+    if (np.ptp(i, axis=1) != 1).any() or (np.ptp(j, axis=1) != 1).any():
         return False
     wanted = cells(there)
     missing = 6 - (2 * (i - top[:, None]) + j - left[:, None]).sum(axis=1)  # 0 to 3: which corner of its cell

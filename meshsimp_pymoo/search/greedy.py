@@ -54,14 +54,15 @@ class NestedFront:
         Vertices in every subset, ascending.
     order : (M,) int array
         The further vertices; subset k has the base and the first k of them.
-    error : (M + 1,) float array
-        Error of subset k, in the measure that was asked for [model units].
-    triangles : (M + 1,) int array
+    error : (S,) float array
+        Error of subset k, in the measure that was asked for [model units]; S is M + 1 where there are all sizes.
+    triangles : (S,) int array
         Triangles of subset k.
     n_vertices : int
         N of the model.
-    count : (M + 1,) int array, optional
-        Of a front that has not all sizes: how many of the further vertices each subset has.
+    count : (S,) int array, optional
+        Of a front that has not all sizes: subset k has the base and the first ``count[k]`` of ``order``, among which
+        vertices of the base may be.
     """
 
     base: np.ndarray
@@ -82,7 +83,7 @@ class NestedFront:
 
     @property
     def F(self) -> np.ndarray:
-        """Error and triangles of every subset, (M + 1, 2), as pymoo writes objectives."""
+        """Error and triangles of every subset, (S, 2), as pymoo writes objectives."""
         return np.column_stack([self.error, self.triangles])
 
     def kept(self, k: int) -> np.ndarray:

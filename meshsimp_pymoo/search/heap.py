@@ -1,4 +1,8 @@
-"""A heap of things that have two keys and a number each, the least first."""
+"""A heap of things that have two keys and a number each, the least first.
+
+``heap`` (n,) has the numbers of the things in it, in the order of a heap; ``at[v]`` is the place of thing v in it, and
+``key[2 * v]`` and ``key[2 * v + 1]`` are its keys. What is not in the heap has -1 in ``at``: that is the caller's.
+"""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE, ins
 from meshsimp_pymoo.search.heap import sift_down, sift_up
 from meshsimp_pymoo.surface.surface import Surface
 
-# Rows times columns, at most, for each vertex of a raster: its gaps are that many and one less.
+# Rows times columns, at most, for each vertex of a raster: so it has at most one gap for each.
 MOST_CROSSINGS = 2
 
 

@@ -215,7 +215,7 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
 def _inserted_by_scanning(surface: Surface) -> IntArray | None:
     """Return the vertices of a grid of heights in the order in which insertion finds them; None: it is no grid.
 
-    Nor is it taken where the sum of the deviations is not what counts: other vertices would be found.
+    Nor is it taken where the maximum counts, or weights: it looks at the sum over all vertices alike.
     """
     if not OBJECTIVES[surface.rules.measure].is_sum or surface.rules.weights is not None:
         return None
@@ -232,7 +232,7 @@ def _inserted_by_scanning(surface: Surface) -> IntArray | None:
 
 
 def _some(surface: Surface, order: IntArray, low: int, high: int) -> NestedFront:
-    """Return some of the meshes of vertices in an order, of ``low`` to ``high`` of them beside the pinned ones."""
+    """Return some of the meshes of vertices in an order: of the first ``low`` to ``high``, and the pinned ones."""
     n, base = surface.n_vertices, np.flatnonzero(surface.pinned)
     count = np.unique(np.geomspace(max(low, 1), max(high, 1), MEASURED).astype(int))
     rows = np.zeros((len(count), n), bool)

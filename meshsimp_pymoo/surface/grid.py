@@ -33,14 +33,14 @@ BAND_SAMPLES = 2_000_000
 @brief
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Where the centroids of a grid's triangles are, two a cell, south-west and north-east of its diagonal.
+    """Where the centroids of a grid's triangles can be: at either third of a cell's width and height.
 
     Attributes
     ----------
     x : (2, C - 1) float array
-        Of the lower and the upper triangle of the cells of each column, in the unit square.
+        A third and two thirds from the west of the cells of each column, in the unit square.
     y : (R - 1, 2) float array
-        The same for each row.
+        A third and two thirds from the south of those of each row.
     width : (C - 1,) float array
         Of the columns, as a share of all.
     height : (R - 1,) float array
@@ -136,12 +136,12 @@ class HeightGrid:
 
     @property
     def n_vertices(self) -> int:
-        """Number N of samples that belong to a face: all of a grid without gaps."""
+        """Number N of samples that belong to a face, all of a grid without gaps: to know it all are read once."""
         return self.shape[0] * self.shape[1] if self.lattice is None else self.lattice.count
 
     @property
     def lattice(self) -> Lattice | None:
-        """Which samples belong to a face; None: all."""
+        """Which samples belong to a face, None: all; to know it all are read once."""
         return self._scanned.lattice
 
     def numbers(self, vertices: IntArray) -> IntArray:
@@ -223,7 +223,7 @@ class HeightGrid:
 
     @property
     def faces(self) -> Any:
-        """The triangles (T, 3), two a cell, cut as :func:`grid_source` does; or those of the model."""
+        """The triangles (T, 3), two a cell, or one beside a gap, cut as :func:`grid_source` does; or the model's."""
         if self.model is not None:
             return np.argsort(self.row_of)[self.model.faces]  # type: ignore[arg-type]
         if self.lattice is not None:

@@ -64,7 +64,7 @@ class WeldedMesh:
     z: FloatArray
     records: npt.NDArray[np.uint32]
     emitted: BoolArray
-    nearest: bool = True
+    nearest: bool
 
     @property
     def faces(self) -> IntArray:
@@ -136,9 +136,18 @@ def measured(
 def tabulated(
     grid: HeightGrid, mesh: WeldedMesh, at: IntArray, *, between: bool, n_threads: int = 1
 ) -> tuple[FloatArray, FloatArray, BoolArray, float]:
-    """Return the numbers (6,) of a mesh over all samples, and its mean between them, if wanted.
+    """Add up the error of a mesh over all samples.
 
-    Between these two: its deviation at the samples ``at``, ascending, and whether it covers them.
+    Returns
+    -------
+    row : (6,) float array
+        Its numbers; see :mod:`~meshsimp_pymoo.surface.measures`.
+    deviation : (n,) float array
+        At the samples ``at``, ascending [file units].
+    covered : (n,) bool array
+        Whether it covers these.
+    surface_error : float
+        Its mean between the samples, if wanted, else NaN [file units].
 
     The sums are taken row by row and then over the rows, so they do not depend on the number of threads.
     """

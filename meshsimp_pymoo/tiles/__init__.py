@@ -2,6 +2,8 @@
 
 ======  ==================================================================================
 thin    a tile's own front, with all beyond the tile fixed
+gaps    the same of a grid with gaps
+moving  the vertices of a larger solution moved, tile by tile
 front   the phases: tiles merged by marginal analysis, then cut elsewhere, until one tile
         holds everything; the smallest solutions moved (:mod:`meshsimp_pymoo.search.coarse`)
 memory  what the tiles need, and what there is

@@ -1,19 +1,21 @@
 """The front of a height grid that is cut into tiles.
 
-In the first phase each tile is thinned to the end, with all beyond it fixed: its own nested front. As both objectives
-add up over the tiles, the best of all is put together by marginal analysis [1]_: that step comes first, whose error for
-each triangle saved is least. Along the lower convex hull of a tile's front these slopes ascend, so the state of the
-whole at a slope s is each tile's hull cut at s. What is lost is what lies off the hulls: where a tile's front bulges,
-its steps are done together or not at all. Then the front has one point fewer; those that it has are as good.
+In the first phase each tile is thinned to the end, with all beyond it fixed: its own nested front. It begins with the
+samples that insertion finds where these are much fewer than all. As both objectives add up over the tiles, the best of
+all is put together by marginal analysis [1]_: that step comes first, whose error for each triangle saved is least.
+Along the lower convex hull of a tile's front these slopes ascend, so the state of the whole at a slope s is each tile's
+hull cut at s. What is lost is what lies off the hulls: where a tile's front bulges, its steps are done together or not
+at all. Then the front has one point fewer; those that it has are as good.
 
 The vertices along the tiles' edges were fixed, too many of them. So the same is done again with the tiles shifted by a
 third of their side, and by two thirds: whatever lay along an edge lies inside a tile in one of three phases. From then
-on each phase thins to a somewhat larger slope, cut otherwise than the one before. Every phase ends with one row of the
-front, a subset of the row before. When few vertices are left, tiles grow: every second row and column of samples then
-stands for the others, and so on, until one tile holds the whole; it is thinned to the end. Tiles grow as well where
-many phases came to nothing: so there are only so many of them, whatever the vertices are held by. The vertices of the
-smallest solutions are moved then, each solution's for itself (see `meshsimp_pymoo.search.coarse`): these alone are no
-subsets of the ones before.
+on each phase thins to a somewhat larger slope, cut otherwise than the one before. What goes in a phase makes rows of
+the front, each a subset of the row before. When few vertices are left, tiles grow: every second row and column of
+samples then stands for the others, and so on, until one tile holds the whole; it is thinned to the end. Tiles grow as
+well where many phases came to nothing: so there are only so many of them, whatever the vertices are held by. The
+vertices of the smallest solutions are moved then, each solution's for itself (see `meshsimp_pymoo.search.coarse`), and
+if there is time those of larger ones (see `meshsimp_pymoo.tiles.moving`): these alone are no subsets of the ones
+before.
 
 The errors of the front are measured afterwards, for each row over all samples. Where a grid has gaps the triangles are
 counted that are emitted, and tiles without samples are left out; see `meshsimp_pymoo.tiles.gaps`.
@@ -224,7 +226,7 @@ def tiled_front(
     until: float | None = None,
     wish: Mapping[str, float] | None = None,
 ) -> Front:
-    """Thin a height grid tile by tile to a whole front, nested but for its smallest solutions.
+    """Thin a height grid tile by tile to a whole front, nested but for solutions whose vertices are moved.
 
     Parameters
     ----------
@@ -261,7 +263,7 @@ def tiled_front(
     Warns
     -----
     SearchWarning
-        If there was not the time to move the vertices of all small solutions.
+        If there was not the time to move the vertices of all small solutions, or of all larger ones.
     """
     what = identity(grid, tile=tile, most=most, rules=rules)
     surface = GridSurface(grid, rules)

@@ -22,7 +22,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.emission import is_in_faces
 from meshsimp_pymoo.plane.footprint import Footprint
-from meshsimp_pymoo.plane.order import find_corners, vector_order
+from meshsimp_pymoo.plane.order import find_corners
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD
 from meshsimp_pymoo.search.raster import raster_insertion
 from meshsimp_pymoo.surface.books import END, Live
@@ -30,7 +30,18 @@ from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.tiles.thin import Elsewhere, Gaps, Setting, Tile, circle_of, is_within, thin_sites
+from meshsimp_pymoo.tiles.thin import (
+    Elsewhere,
+    Gaps,
+    Samples,
+    Setting,
+    Tile,
+    box_of,
+    circle_of,
+    is_within,
+    thin_sites,
+    with_sites,
+)
 
 # Blocks along one side of a grid, at most, and samples along one side of a block, at least.
 MOST_BLOCKS, LEAST_BLOCK = 256, 8
@@ -89,7 +100,7 @@ def start_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
     """
     setting = setting_with_gaps(tile)
     if setting is None:
-        number = _samples(tile)[0]
+        number = _samples(tile).number
         return number, np.full(len(number), np.inf)
     sparse = _inserted(tile, setting)
     setting = setting if sparse is None else sparse
@@ -108,12 +119,12 @@ def _inserted(tile: Tile, setting: Setting) -> Setting | None:
     assert tile.gaps is not None
     there = tile.gaps.there
     padded = np.pad(there, 1)
-    inner = there.copy()
+    is_inside = there.copy()
     for down, right in np.ndindex(3, 3):
-        inner &= padded[down : down + there.shape[0], right : right + there.shape[1]]
+        is_inside &= padded[down : down + there.shape[0], right : right + there.shape[1]]
     row, column = np.divmod(setting.number, tile.n_columns)
     place = np.searchsorted(tile.rows, row) * there.shape[1] + np.searchsorted(tile.columns, column)
-    first = place[~inner.ravel()[place]]  # in vector order
+    first = place[~is_inside.ravel()[place]]  # in vector order
     most = int(tile.inserted / there.size * there.sum())
     if len(first) > BESIDE * most:
         return None
@@ -148,12 +159,10 @@ def setting_with_gaps(tile: Tile) -> Setting | None:
     """Do what :func:`~meshsimp_pymoo.tiles.thin.setting_of` does; None: the tile has too few sites."""
     gaps = tile.gaps
     assert gaps is not None
-    number, xy, z, weight, is_site, is_ours = _samples(tile)
-    if is_site.sum() < 3:
+    samples = _samples(tile)
+    if samples.is_site.sum() < 3:
         return None
-    order = vector_order(xy, z)
-    number, xy, z, weight = number[order], xy[order], z[order], weight[order]
-    is_site, is_ours = is_site[order], is_ours[order]
+    number, xy, z, weight, is_site, is_ours = samples.in_vector_order()
     model = placed_model(
         tile.name,
         np.column_stack([xy * tile.unit, z]),
@@ -195,41 +204,26 @@ def _staying(tile: Tile, number: IntArray, xy: FloatArray) -> BoolArray:
 
 def _sides(tile: Tile) -> tuple[FloatArray, BoolArray]:
     """Return least and largest x, least and largest y of a tile, and which of these sides are another's too."""
-    box = np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
-    inward = np.array([1.0, -1.0, 1.0, -1.0])
+    box, inward = box_of(tile), np.array([1.0, -1.0, 1.0, -1.0])
     return box, (box - tile.domain) * inward > 0.0
 
 
-def _samples(tile: Tile) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, BoolArray, BoolArray]:
-    """Put a tile's samples together: number, place, height, weight, whether a site, whether it is ours to change."""
+def _samples(tile: Tile) -> Samples:
+    """Return a tile's samples and sites; the first and the last on a shared side are sites in any case."""
     gaps = tile.gaps
     assert gaps is not None
     row, column = np.nonzero(gaps.there)
     number = tile.rows[row] * tile.n_columns + tile.columns[column]
     xy, z = np.column_stack([tile.x[column], tile.y[row]]), tile.heights[row, column]
-    weight = np.full(len(z), gaps.weight)
-    if tile.sites is None or tile.site_xy is None or tile.site_z is None:
-        everywhere = np.ones(len(z), bool)
-        return number, xy, z, weight, everywhere, everywhere.copy()
-    kept = np.isin(number, tile.sites, assume_unique=True)
-    extra = ~np.isin(tile.sites, number, assume_unique=True)
-    n_extra = int(extra.sum())
-    is_ours, is_site = np.ones(len(z) + n_extra, bool), np.concatenate([kept, np.ones(n_extra, bool)])
-    box, is_shared = _sides(tile)
-    for k, side in enumerate(box):
+    found = with_sites(tile, number, xy, z, gaps.weight)
+    kept = found.is_site.copy()
+    for k, (side, is_shared) in enumerate(zip(*_sides(tile), strict=True)):
         on_side = np.flatnonzero(xy[:, k // 2] == side)
-        if is_shared[k] and len(on_side):
+        if is_shared and len(on_side):
             ends = on_side[[0, -1]]
-            is_ours[ends] = kept[ends]
-            is_site[ends] = True
-    return (
-        np.concatenate([number, tile.sites[extra]]),
-        np.concatenate([xy, tile.site_xy[extra]]),
-        np.concatenate([z, tile.site_z[extra]]),
-        np.concatenate([weight, np.zeros(n_extra)]),
-        is_site,
-        is_ours,
-    )
+            found.is_ours[ends] = kept[ends]
+            found.is_site[ends] = True
+    return found
 
 
 @inner

@@ -35,6 +35,9 @@ from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
 from meshsimp_pymoo.surface.rules import Rules
 
+# Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
+FORESIGHT = 3.0
+
 
 class Elsewhere(NamedTuple):
     """In which blocks of rows and columns of a grid with gaps there are samples.
@@ -50,10 +53,6 @@ class Elsewhere(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     before: np.ndarray
-
-
-# Thinning goes on beyond the wanted slope, by this factor, to see whether a cheaper way follows a dear step.
-FORESIGHT = 3.0
 
 
 @brief
@@ -103,7 +102,7 @@ class Tile:
         Their coordinates and heights.
     n_columns : int
         Columns of the whole grid: sample ``row * n_columns + column``.
-    corners : (4,) int array
+    corners : (C,) int array
         The whole grid's corner samples, which always stay.
     domain : (4,) float array
         The whole grid in the unit square: least and largest x, least and largest y.
@@ -219,12 +218,10 @@ class Setting(NamedTuple):
 
 def setting_of(tile: Tile) -> Setting:
     """Return a tile as its sites can be changed: those at triangles that need not be triangles of the whole stay."""
-    number, xy, z, weight, is_site, is_ours = _samples(tile)
-    order = vector_order(xy, z)
-    number, xy, z, is_site, is_ours = number[order], xy[order], z[order], is_site[order], is_ours[order]
-    surface = _surface(tile, number, xy, z, None if weight is None else weight[order])
+    number, xy, z, weight, is_site, is_ours = _samples(tile).in_vector_order()
+    surface = _surface(tile, number, xy, z, None if tile.stride == 1 else weight)
     # beyond the whole grid there is nothing that a circle could hold
-    box = _box(tile)
+    box = box_of(tile)
     open_sides = np.where(box == tile.domain, np.array([-np.inf, np.inf, -np.inf, np.inf]), box)
 
     def judge(live: Live) -> tuple[BoolArray, BoolArray]:
@@ -326,47 +323,73 @@ def _window(tile: Tile) -> tuple[IntArray, FloatArray, FloatArray]:
     return number, xy, tile.heights.ravel()
 
 
-def _samples(
-    tile: Tile,
-) -> tuple[IntArray, FloatArray, FloatArray, FloatArray | None, BoolArray, BoolArray]:
-    """Put a tile's samples together: number, place, height, weight (None: 1), whether a site, whether really kept.
+class Samples(NamedTuple):
+    """The samples of a tile that count, and the sites between them.
 
-    The corners of the tile are sites in any case, so that all samples are covered; those that are not kept are not ours
-    to change, nor is anything at a triangle with them.
+    Attributes
+    ----------
+    number : (n,) int array
+        Their numbers.
+    xy, z : (n, 2), (n,) float arrays
+        Where they are in the unit square, and their heights [model units].
+    weight : (n,) float array
+        How many samples of the grid each stands for; a site between those that count for none.
+    is_site : (n,) bool array
+        Which are sites.
+    is_ours : (n,) bool array
+        All but the sites that are not kept: those are not ours to change, nor is anything at a triangle with them.
     """
-    grid, xy, z = _window(tile)
-    assert tile.sites is not None
-    assert tile.site_xy is not None
-    assert tile.site_z is not None
-    kept = np.isin(grid, tile.sites, assume_unique=True)
-    extra = ~np.isin(tile.sites, grid, assume_unique=True)
-    n_extra = int(extra.sum())
-    is_ours = np.ones(len(z) + n_extra, bool)
-    is_site = np.concatenate([kept, np.ones(n_extra, bool)])
+
+    number: IntArray
+    xy: FloatArray
+    z: FloatArray
+    weight: FloatArray
+    is_site: BoolArray
+    is_ours: BoolArray
+
+    def in_vector_order(self) -> Samples:
+        """Return them along the curve."""
+        at = vector_order(self.xy, self.z)
+        return Samples(
+            self.number[at], self.xy[at], self.z[at], self.weight[at], self.is_site[at], self.is_ours[at]
+        )  # fmt: skip
+
+
+def with_sites(tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: float) -> Samples:
+    """Put the samples of a tile that count, each of this weight, and its sites together; without sites all are sites.
+
+    What is returned are new arrays.
+    """
+    kept, n_extra = np.ones(len(z), bool), 0
+    if tile.sites is not None and tile.site_xy is not None and tile.site_z is not None:
+        kept = np.isin(number, tile.sites, assume_unique=True)
+        extra = ~np.isin(tile.sites, number, assume_unique=True)
+        n_extra = int(extra.sum())
+        number = np.concatenate([number, tile.sites[extra]])
+        xy = np.concatenate([xy, tile.site_xy[extra]])
+        z = np.concatenate([z, tile.site_z[extra]])
+    weights = np.concatenate([np.full(len(kept), weight), np.zeros(n_extra)])
+    return Samples(number, xy, z, weights, np.concatenate([kept, np.ones(n_extra, bool)]), np.ones(len(z), bool))
+
+
+def _samples(tile: Tile) -> Samples:
+    """Return a tile's samples and sites; its corners are sites in any case, so that all samples are covered."""
+    found = with_sites(tile, *_window(tile), float(tile.stride) ** 2)
     h, w = len(tile.rows), len(tile.columns)
     corner = np.array([0, w - 1, (h - 1) * w, h * w - 1])
-    is_ours[corner] = kept[corner]
-    is_site[corner] = True
-    # a site between the rows that count covers nothing that they do not stand for
-    weight = np.concatenate([np.full(len(z), float(tile.stride) ** 2), np.zeros(n_extra)])
-    return (
-        np.concatenate([grid, tile.sites[extra]]),
-        np.concatenate([xy, tile.site_xy[extra]]),
-        np.concatenate([z, tile.site_z[extra]]),
-        None if tile.stride == 1 else weight,
-        is_site,
-        is_ours,
-    )
+    found.is_ours[corner] = found.is_site[corner]
+    found.is_site[corner] = True
+    return found
 
 
-def _box(tile: Tile) -> FloatArray:
+def box_of(tile: Tile) -> FloatArray:
     """Return the least and largest x, least and largest y of a tile."""
     return np.array([tile.x[0], tile.x[-1], tile.y[-1], tile.y[0]])
 
 
 def _surface(tile: Tile, number: IntArray, xy: FloatArray, z: FloatArray, weight: FloatArray | None) -> HeightSurface:
     """Return the surface of a tile as a model: the arrays that triangulating needs, and two faces for its extent."""
-    box = _box(tile)
+    box = box_of(tile)
     corners = np.flatnonzero(np.isin(xy[:, 0], box[:2]) & np.isin(xy[:, 1], box[2:]))
     points = np.column_stack([xy * tile.unit, z])
     a, b, c, d = corners[np.lexsort((xy[corners, 0], xy[corners, 1]))]
