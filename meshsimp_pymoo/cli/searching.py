@@ -111,7 +111,7 @@ def _simplify(request: Request, shown: Stages) -> int:
                 raise
             # nobody asked for tiles
             if not output.quiet:
-                why = re.split("; only|, and tiles", str(reason))[0]
+                why = re.split("; only|, (?:and|as) tiles", str(reason))[0]
                 say(f"{why}; so it is not cut into tiles but searched in one piece")
     else:
         refuse_alone(request.tiling)

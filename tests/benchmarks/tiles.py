@@ -32,7 +32,7 @@ from meshsimp_pymoo.search.coarse import SEARCHED
 from meshsimp_pymoo.search.greedy import thinning
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
-from meshsimp_pymoo.tiles.front import tiled_front
+from meshsimp_pymoo.tiles.front import TILE, tiled_front
 
 CONSOLE = Console(width=110)
 PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -176,7 +176,7 @@ def against(name, tiles):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--side", type=int, default=1000)
-    parser.add_argument("--tile", type=int, default=512)
+    parser.add_argument("--tile", type=int, default=TILE)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--folder", type=Path, help="where the relief and the front are put (default: a temporary one)")
     parser.add_argument("--against", metavar="MODEL")

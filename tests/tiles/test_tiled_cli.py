@@ -26,6 +26,7 @@ from meshsimp_pymoo.opening import open_grid
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.report import figures
 from meshsimp_pymoo.surface.model import build_model
+from meshsimp_pymoo.tiles.front import TILE
 from meshsimp_pymoo.tiles.thin import thin_tile
 
 # How pictures look is shown in tests/report.
@@ -231,6 +232,12 @@ def test_each_part_of_a_request_is_known_to_tiles_or_refused(path, tmp_path, mon
         tiled_command._refuse_unknown(dataclasses.replace(request, search=new(smoothing=3)))
 
 
+def test_the_help_says_how_large_tiles_are(capsys):
+    with pytest.raises(SystemExit):
+        main(["simplify", "--help"])
+    assert f"one side of a tile (default: {TILE}, for" in " ".join(capsys.readouterr().out.split())
+
+
 def test_a_scan_is_not_cut_into_tiles(tmp_path, capsys):
     assert main(["simplify", "face:300", "-o", str(tmp_path / "out"), "--tile", "64"]) == 2
     assert "only a height grid can be cut into tiles" in capsys.readouterr().err
@@ -242,7 +249,6 @@ def test_a_big_grid_that_tiles_cannot_be_of_is_searched_in_one_piece_unless_they
 ):
     heights = np.add.outer(np.arange(20.0), np.arange(30.0) ** 2)
     np.savez(tmp_path / "north.npz", z=heights, x=np.arange(30.0), y=np.arange(20.0))
-    monkeypatch.setattr(tiled_command, "wants_tiles", lambda request: True)
     monkeypatch.setattr("meshsimp_pymoo.cli.searching.wants_tiles", lambda request: True)
     command = ["simplify", str(tmp_path / "north.npz"), "-o", str(tmp_path / "out"), "--meshes", "none", "--up", "z"]
     assert main([*command, "--tile", "64"]) == 2
@@ -250,7 +256,7 @@ def test_a_big_grid_that_tiles_cannot_be_of_is_searched_in_one_piece_unless_they
     assert main([*command, "--evaluations", "150", "--algorithm", "nsga2_v1"]) == 2  # these options are not for tiles
     monkeypatch.setattr("meshsimp_pymoo.search.memetic.MOVES_PER_VERTEX", (1.0, 1.0))  # nor are those that shorten it
     assert main(command) == 0
-    assert "so it is not cut into tiles but searched in one piece" in capsys.readouterr().err
+    assert "columns to the east; so it is not cut into tiles but searched in one piece" in capsys.readouterr().err
     assert (tmp_path / "out" / "front.csv").exists()
 
 

@@ -143,7 +143,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         "--tile",
         type=tile,
         metavar="N|none",
-        help=f"samples along one side of a tile (default: 512, for {listed(counted)} from {TILED_FROM / 1e6:g} million "
+        help=f"samples along one side of a tile (default: 256, for {listed(counted)} from {TILED_FROM / 1e6:g} million "
         "samples on, where one piece does not fit into the memory)",
     )
     tiles.add_argument("--pieces", action="store_true", help="write the chosen mesh in pieces, one for each tile")
