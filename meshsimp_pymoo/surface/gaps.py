@@ -184,7 +184,7 @@ def _measure_rows_with_gaps(
     wanted = len(sizes) > 0
     guess = 0
     flat_bits = bits.ravel()
-    width = bits.shape[1]
+    n_bytes = bits.shape[1]
     for r in range(len(y)):
         t = starts[r]
         py = y[r]
@@ -193,7 +193,7 @@ def _measure_rows_with_gaps(
         maximum = 0.0
         uncovered = 0
         for c in range(len(x)):
-            if not is_there(flat_bits, width, r, c):
+            if not is_there(flat_bits, n_bytes, r, c):
                 continue
             px = x[c]
             t = locate(xy, mesh, t, px, py, exact_area)
