@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
@@ -359,7 +359,9 @@ def _what_is_thinned(model: Original, held: _Embedded, missing: int) -> Iterator
             f"To keep this page small, {len(held.solutions) - missing} of {len(held.solutions)} meshes are in it, an "
             "even selection; the others are hollow points in the chart, with all their numbers."
         )
-    n_seen = len(np.unique(model.faces))  # vertices that break lines added are in no face of the original
+    # vertices that break lines added are in no face of the original; a grid read by windows has none, and is not held
+    faces: Any = model.faces
+    n_seen = model.n_vertices if isinstance(faces, Rows) else len(np.unique(faces))
     if held.drawn < n_seen:
         yield (
             f"The original has {n_seen:,} vertices; it is drawn here from an even selection of "
