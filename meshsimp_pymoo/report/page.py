@@ -262,23 +262,22 @@ def _embedded(
     for mesh in found.values():
         used[mesh.faces.ravel()] = True
     vertices = np.flatnonzero(used)
-    place = np.cumsum(used) - 1
     solutions: list[dict[str, Any] | None] = [None] * len(kept)
     sizes: dict[int, int] = {}
     for row, mesh in found.items():
         largest = float(mesh.deviation.max())
         levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
         levels[~mesh.covered] = UNCOVERED_LEVEL
-        triangles, deviation = embedded_faces(place[mesh.faces]), embedded_array(levels)
+        triangles, deviation = embedded_faces(np.searchsorted(vertices, mesh.faces)), embedded_array(levels)
         held: dict[str, Any] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
         chains, _ = mesh_lines(surface, mesh.faces)
         if chains:
             edges = np.concatenate([np.column_stack([chain[:-1], chain[1:]]) for chain in chains])
-            held["lines"] = embedded_array(place[edges].astype(np.uint32))
+            held["lines"] = embedded_array(np.searchsorted(vertices, edges).astype(np.uint32))
             sizes[row] += len(held["lines"]["data"])
         solutions[row] = held
-    faces = embedded_faces(place[original])
+    faces = embedded_faces(np.searchsorted(vertices, original))
     room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
     while sizes and sum(sizes.values()) > room:
         dropped = next(row for row in reversed(rows) if row in sizes)
