@@ -163,10 +163,9 @@ def big(side, tile, jobs, folder, gaps):
         add_triangles(vertices, faces, heights, 1.0, 1.0, deviation)
         error = np.nansum(deviation)
         difference = "-" if int(row["uncovered"]) else f"{error / float(row['error']) - 1:.1e}"
-        table.add_row(
-            f"{len(faces):,}", row["error"], f"{error:.10g}", difference, "-" if gaps else str(find_cracks(vertices, faces)),
-            f"{np.isfinite(deviation).mean():.2%}", row["uncovered"],
-        )  # fmt: skip
+        cracks = "-" if gaps else str(find_cracks(vertices, faces))
+        covered = f"{np.isfinite(deviation).mean():.2%}"
+        table.add_row(f"{len(faces):,}", row["error"], f"{error:.10g}", difference, cracks, covered, row["uncovered"])
     CONSOLE.print(table)
 
 
