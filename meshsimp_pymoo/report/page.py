@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
@@ -262,23 +262,22 @@ def _embedded(
     for mesh in found.values():
         used[mesh.faces.ravel()] = True
     vertices = np.flatnonzero(used)
-    place = np.cumsum(used) - 1
     solutions: list[dict[str, Any] | None] = [None] * len(kept)
     sizes: dict[int, int] = {}
     for row, mesh in found.items():
         largest = float(mesh.deviation.max())
         levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
         levels[~mesh.covered] = UNCOVERED_LEVEL
-        triangles, deviation = embedded_faces(place[mesh.faces]), embedded_array(levels)
+        triangles, deviation = embedded_faces(np.searchsorted(vertices, mesh.faces)), embedded_array(levels)
         held: dict[str, Any] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
         chains, _ = mesh_lines(surface, mesh.faces)
         if chains:
             edges = np.concatenate([np.column_stack([chain[:-1], chain[1:]]) for chain in chains])
-            held["lines"] = embedded_array(place[edges].astype(np.uint32))
+            held["lines"] = embedded_array(np.searchsorted(vertices, edges).astype(np.uint32))
             sizes[row] += len(held["lines"]["data"])
         solutions[row] = held
-    faces = embedded_faces(place[original])
+    faces = embedded_faces(np.searchsorted(vertices, original))
     room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
     while sizes and sum(sizes.values()) > room:
         dropped = next(row for row in reversed(rows) if row in sizes)
@@ -359,7 +358,9 @@ def _what_is_thinned(model: Original, held: _Embedded, missing: int) -> Iterator
             f"To keep this page small, {len(held.solutions) - missing} of {len(held.solutions)} meshes are in it, an "
             "even selection; the others are hollow points in the chart, with all their numbers."
         )
-    n_seen = len(np.unique(model.faces))  # vertices that break lines added are in no face of the original
+    # vertices that break lines added are in no face of the original; a grid read by windows has none, and is not held
+    faces: Any = model.faces
+    n_seen = model.n_vertices if isinstance(faces, Rows) else len(np.unique(faces))
     if held.drawn < n_seen:
         yield (
             f"The original has {n_seen:,} vertices; it is drawn here from an even selection of "
