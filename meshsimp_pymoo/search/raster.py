@@ -203,7 +203,6 @@ def _insert_worst(
     n_heap = 0
     for t in range(0, end, RECORD):
         n_heap = _weigh(x, y, heights, per_column, samples, is_vertex, mesh, t, key, best, heap, at, n_heap)
-    t = 0
     while n < most and n_heap > 0 and key[2 * heap[0]] < 0.0:
         v = best[heap[0]]
         start = np.int64(heap[0]) * RECORD

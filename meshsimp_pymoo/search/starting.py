@@ -197,10 +197,11 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
         if not is_spanned:
             return Start.of(*fronts)
         limit = min(QUICK, KEPT_SHARE * limit)
-    order = _inserted_by_scanning(surface)
-    if order is not None:
-        most = int(RASTER_THINNED * surface.n_vertices)
-        sparse, larger = _some(surface, order, 0, most), _some(surface, order, most, len(order))
+    scanned = _inserted_by_scanning(surface)
+    if scanned is not None:
+        order, n_first = scanned
+        most = max(int(RASTER_THINNED * surface.n_vertices), n_first)
+        sparse, larger = _some(surface, order, n_first, most), _some(surface, order, most, len(order))
         timed(1.0, lambda: thinning(surface, kept=larger.kept(0), stop=stop))
         *large, back = fronts
         return Start.of(sparse, back, larger, *large)
@@ -212,10 +213,10 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
     return Start.of(inserted, back, *large)
 
 
-def _inserted_by_scanning(surface: Surface) -> IntArray | None:
-    """Return the vertices of a grid of heights in the order in which insertion finds them; None: it is no grid.
+def _inserted_by_scanning(surface: Surface) -> tuple[IntArray, int] | None:
+    """Return the vertices of a grid of heights in the order in which insertion finds them, and how many it begins with.
 
-    Nor is it taken where the maximum counts, or weights: it looks at the sum over all vertices alike.
+    None: it is no grid. Nor is it taken where the maximum counts, or weights: it looks at the sum over all vertices alike.
     """
     if not OBJECTIVES[surface.rules.measure].is_sum or surface.rules.weights is not None:
         return None
@@ -228,7 +229,7 @@ def _inserted_by_scanning(surface: Surface) -> IntArray | None:
     crossings = raster_insertion(
         raster.x, raster.y, raster.heights, raster.crossing[np.flatnonzero(first)], surface.n_vertices
     )
-    return raster.vertex[crossings]
+    return raster.vertex[crossings], int(first.sum())
 
 
 def _some(surface: Surface, order: IntArray, low: int, high: int) -> NestedFront:

@@ -309,7 +309,7 @@ def tiled_front(
     solutions = [samples[level > at] if new is None else new for at, new in zip(slopes, moved, strict=True)]
     quality = work.measure(slopes, solutions, threads)
     if until is not None:
-        work.move_large(solutions, moved, quality, _nearest_first(quality, wish or {}), until, threads)
+        work.move_large(slopes, solutions, moved, quality, _nearest_first(quality, wish or {}), until, threads)
     # a solution that is not better than a smaller one is none
     rows: list[int] = []
     for row in reversed(range(len(slopes))):
@@ -602,6 +602,7 @@ class _Phases:
 
     def move_large(
         self,
+        slopes: list[float],
         solutions: list[IntArray],
         moved: list[IntArray | None],
         quality: list[Quality],
@@ -611,10 +612,20 @@ class _Phases:
     ) -> None:
         """Move the vertices of the solutions that are not small, in this order, again and again while there is time.
 
-        What is better replaces the entries of ``solutions``, ``moved`` and ``quality``.
+        What is better replaces the entries of ``solutions``, ``moved`` and ``quality``, and is stored for a call that
+        goes on.
         """
         order = [k for k in order if quality[k].triangles > SEARCHED]
         seconds = {k: 0.0 for k in order}
+
+        def take(k: int, found: IntArray, better: Quality) -> None:
+            if better.error < quality[k].error and better.triangles <= quality[k].triangles:
+                solutions[k], moved[k], quality[k] = found, found, better
+
+        for k in order:
+            stored = self.store.get(_name("larger", slopes[k]))
+            if stored is not None:
+                take(k, stored["samples"], quality_of(zip(MEASURES, stored["numbers"].tolist(), strict=True)))
         for sweep in range(MOST_SWEEPS):
             for k in order:
                 begun = time.perf_counter()
@@ -623,9 +634,9 @@ class _Phases:
                 found = self.moved_by_tiles(solutions[k], SEEDS * sweep + k, until)
                 if found is None:
                     continue
-                better = measure(self.grid, weld(self.grid, found, self.rules), n_threads=threads)
-                if better.error < quality[k].error and better.triangles <= quality[k].triangles:
-                    solutions[k], moved[k], quality[k] = found, found, better
+                take(k, found, measure(self.grid, weld(self.grid, found, self.rules), n_threads=threads))
+                if solutions[k] is found:
+                    self.store.put(_name("larger", slopes[k]), samples=found, numbers=_numbers(quality[k]))
                 seconds[k] = time.perf_counter() - begun
                 self.progress(1.0, f"solution of {quality[k].triangles:,} triangles moved")
             if all(time.perf_counter() + took > until for took in seconds.values()):
@@ -666,12 +677,16 @@ class _Phases:
             stored = self.store.get(name)
             if stored is None:
                 q = measure(self.grid, weld(self.grid, kept, self.rules), n_threads=threads)
-                self.store.put(name, numbers=np.array(list(asdict(q).values()), np.float64))
+                self.store.put(name, numbers=_numbers(q))
             else:
                 q = quality_of(zip(MEASURES, stored["numbers"].tolist(), strict=True))
             quality.append(q)
             self.progress(0.8 + 0.2 * (k + 1) / len(solutions), f"solution {k + 1} of {len(solutions)} measured")
         return quality
+
+
+def _numbers(quality: Quality) -> FloatArray:
+    return np.array(list(asdict(quality).values()), np.float64)
 
 
 def _name(what: str, slope: float) -> str:

@@ -124,7 +124,8 @@ def test_a_grid_with_gaps_is_scanned_with_its_outline(monkeypatch):
         start = thinned(model, 60.0)
     same_meshes(model, start, np.unique(np.linspace(0, len(start) - 1, 30).astype(int)))
     assert start.triangles[-1] == len(model.faces)
-    order = starting._inserted_by_scanning(model)
+    order, n_first = starting._inserted_by_scanning(model)
+    assert n_first == np.count_nonzero(model.pinned | np.isin(np.arange(model.n_vertices), model.border))
     assert np.isin(model.border, order[: len(model.border) + int(model.pinned.sum())]).all()
 
 
@@ -136,7 +137,7 @@ def test_what_is_no_grid_or_does_not_count_the_sum_is_not_scanned():
 
 def test_some_subsets_of_an_order_are_a_front_of_some_sizes():
     model = rough(12)
-    order = starting._inserted_by_scanning(model)
+    order, _ = starting._inserted_by_scanning(model)
     front = starting._some(model, order, 10, 100)
     assert front.count[0] == 10
     assert front.count[-1] == 100
