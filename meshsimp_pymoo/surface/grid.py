@@ -17,6 +17,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ModelError, ResultError, warn_of
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import DEFAULT, Options
+from meshsimp_pymoo.formats.source import COORDINATE_LIMIT
 from meshsimp_pymoo.formats.source.heights import Heights
 from meshsimp_pymoo.formats.source.missing import is_nodata
 from meshsimp_pymoo.plane.lattice import Lattice, cells
@@ -331,6 +332,12 @@ class HeightGrid:
             lattice.enter(first, there)
             low = min(low, float(band.min(initial=np.inf, where=there)))
             high = max(high, float(band.max(initial=-np.inf, where=there)))
+        greatest = max(-low, high)
+        if greatest > COORDINATE_LIMIT:
+            raise ModelError(
+                f"{self.name}: heights reach {greatest:g}; rescale the grid to below {COORDINATE_LIMIT:g}, or name "
+                f"the height that means no sample (nodata, now {self.nodata})"
+            )
         n_crossings = self.shape[0] * self.shape[1]
         if lattice.count == n_crossings:
             return Scan(digest.hexdigest(), (low, high), None)

@@ -171,3 +171,12 @@ def test_a_model_that_lacks_a_face_of_its_cells_is_no_grid():
     model = build_model(grid_source(KINDS["a void"]), up="z")
     with pytest.raises(ModelError, match="has weights"):
         open_grid(model.with_weights(np.full(X.size, 2.0)))
+
+
+@pytest.mark.parametrize("kind", ["a void", None])
+def test_heights_beyond_what_can_be_squared_are_refused_as_in_one_piece(kind):
+    z = (HILLS if kind is None else KINDS[kind]) * 1e300
+    with pytest.raises(ModelError, match=r"coordinates reach \S+; rescale"):
+        build_model(grid_source(z), up="z")
+    with pytest.raises(ModelError, match=r"heights reach \S+; rescale the grid to below 1e\+75"):
+        _ = open_grid(z).lattice
