@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -12,7 +14,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray, are_distinct
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, NoHeightGrid, warn_of
+from meshsimp_pymoo.errors import ModelError, ModelWarning, NoHeightGrid, warn_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -317,10 +319,7 @@ def _refuse_other_sides(name: str, options: Options, *formats: str) -> None:
 
 
 def _grid_of_heights(name: str, found: PlacedHeights, options: Options) -> HeightGrid:
-    low, high = (np.array([end(found.x), end(found.y)]) for end in (np.min, np.max))
-    georeference = in_metric_frame(found.georeference, low, high, scale=options.scale, name=name)
-    x, y = georeference.get("scale", (1.0, 1.0))
-    return HeightGrid(
+    grid = HeightGrid(
         name,
         found.heights,
         found.x,
@@ -328,10 +327,18 @@ def _grid_of_heights(name: str, found: PlacedHeights, options: Options) -> Heigh
         nodata=found.nodata,
         corner=found.corner,
         file_columns=found.file_columns,
-        georeference=georeference,
-        scale=(x, y),
         options=options,
     )
+    low, high = (np.array([end(found.x), end(found.y)]) for end in (np.min, np.max))
+    framed = partial(in_metric_frame, found.georeference, scale=options.scale, name=name)
+    with warnings.catch_warnings():  # said below, of what there is
+        warnings.simplefilter("ignore", ModelWarning)
+        # a degree measures what it does in the middle of the samples that there are, for which all are read once more
+        if not isinstance(options.scale, tuple) and "scale" in framed(low, high) and grid.lattice is not None:
+            low, high = grid.file_plan
+    georeference = framed(low, high)
+    x, y = georeference.get("scale", (1.0, 1.0))
+    return replace(grid, georeference=georeference, scale=(x, y))
 
 
 # Crossings of rows and columns to a vertex: of more nearly all would be gaps.

@@ -122,10 +122,13 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
         budgets = "--moves, --time" if front.run.get("wish") else "--generations, --time"
         longer = f"; search longer ({budgets})"
         if "generations" not in front.run:  # tiles, which keep only so many
-            longer = (
-                f"; this front has no mesh of more than {front.quality[-1].triangles:,} triangles: name more beside it "
-                "(--triangles N), or do without tiles (--tile none)"
-            )
+            least, most = front.quality[0].triangles, front.quality[-1].triangles
+            instead = "or do without tiles (--tile none)"
+            if request.wish.triangles is not None and request.wish.triangles < least:
+                longer = f"; ask for {least} or more (--triangles N), {instead}"
+            else:
+                said = f"this front has no mesh of more than {most:,} triangles"
+                longer = f"; {said}: name more beside it (--triangles N), {instead}"
         say(f"{folder} holds a front, but no chosen mesh: {missed}{longer}")
         return TARGET_MISSED
     return OK

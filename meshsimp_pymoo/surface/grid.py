@@ -17,6 +17,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ModelError, ResultError, warn_of
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import DEFAULT, Options
+from meshsimp_pymoo.formats.source import COORDINATE_LIMIT
 from meshsimp_pymoo.formats.source.heights import Heights
 from meshsimp_pymoo.formats.source.missing import is_nodata
 from meshsimp_pymoo.plane.lattice import Lattice, cells
@@ -69,11 +70,14 @@ class Scan:
         The least and the greatest height of a vertex [file units].
     lattice : Lattice or None
         Which samples belong to a face; None: all.
+    plan : (2, 2) float array
+        Least and largest x and y of the samples that have data, in a face or not [file units].
     """
 
     hash: str
     heights_range: tuple[float, float]
     lattice: Lattice | None
+    plan: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,6 +311,11 @@ class HeightGrid:
         return self._scanned.heights_range
 
     @property
+    def file_plan(self) -> FloatArray:
+        """Least and largest x and y (2, 2) of the samples that have data, in a face or not [file units]."""
+        return self._scanned.plan
+
+    @property
     def file_box(self) -> FloatArray:
         """The lowest and the highest corner (2, 3) of the box around it [file units]."""
         if self.model is not None:
@@ -331,9 +340,16 @@ class HeightGrid:
             lattice.enter(first, there)
             low = min(low, float(band.min(initial=np.inf, where=there)))
             high = max(high, float(band.max(initial=-np.inf, where=there)))
+        greatest = max(-low, high)
+        if greatest > COORDINATE_LIMIT:
+            raise ModelError(
+                f"{self.name}: heights reach {greatest:g}; rescale the grid to below {COORDINATE_LIMIT:g}, or name "
+                f"the height that means no sample (nodata, now {self.nodata})"
+            )
         n_crossings = self.shape[0] * self.shape[1]
         if lattice.count == n_crossings:
-            return Scan(digest.hexdigest(), (low, high), None)
+            x, y = self.file_x, self.file_y
+            return Scan(digest.hexdigest(), (low, high), None, np.array([[x[0], y[-1]], [x[-1], y[0]]]))
         solid = lattice.without_singles()
         n_singles = lattice.count - solid.count
         if solid.count == 0:
@@ -348,7 +364,9 @@ class HeightGrid:
                 there = solid.rows(first, first + len(band))
                 low = min(low, float(band.min(initial=np.inf, where=there)))
                 high = max(high, float(band.max(initial=-np.inf, where=there)))
-        return Scan(digest.hexdigest(), (low, high), solid)
+        rows, first, last = lattice.ends()
+        x, y = self.file_x[[first.min(), last.max()]], self.file_y[rows[[-1, 0]]]
+        return Scan(digest.hexdigest(), (low, high), solid, np.column_stack([x, y]))
 
     def bands(self, *, first: int = 0, end: int | None = None) -> Any:
         """Yield (first row, heights of some rows as float64), from north to south, a few megabytes each."""

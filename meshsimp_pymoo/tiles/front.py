@@ -610,12 +610,12 @@ class _Phases:
         until: float,
         threads: int,
     ) -> None:
-        """Move the vertices of the solutions that are not small, in this order, again and again while there is time.
+        """Move the vertices of the solutions not small nor exact, in this order, again and again while there is time.
 
         What is better replaces the entries of ``solutions``, ``moved`` and ``quality``, and is stored for a call that
         goes on.
         """
-        order = [k for k in order if quality[k].triangles > SEARCHED]
+        order = [k for k in order if quality[k].triangles > SEARCHED and quality[k].error > 0.0]
         seconds = {k: 0.0 for k in order}
 
         def take(k: int, found: IntArray, better: Quality) -> None:

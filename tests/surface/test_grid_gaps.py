@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning, NoHeightGrid, ResultError
+from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.source.heights import grid_source
-from meshsimp_pymoo.opening import open_grid
+from meshsimp_pymoo.opening import open_grid, open_model
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import build_model
@@ -171,3 +172,31 @@ def test_a_model_that_lacks_a_face_of_its_cells_is_no_grid():
     model = build_model(grid_source(KINDS["a void"]), up="z")
     with pytest.raises(ModelError, match="has weights"):
         open_grid(model.with_weights(np.full(X.size, 2.0)))
+
+
+@pytest.mark.parametrize("kind", ["a void", None])
+def test_heights_beyond_what_can_be_squared_are_refused_as_in_one_piece(kind):
+    z = (HILLS if kind is None else KINDS[kind]) * 1e300
+    with pytest.raises(ModelError, match=r"coordinates reach \S+; rescale"):
+        build_model(grid_source(z), up="z")
+    with pytest.raises(ModelError, match=r"heights reach \S+; rescale the grid to below 1e\+75"):
+        _ = open_grid(z).lattice
+
+
+@pytest.mark.filterwarnings("ignore:.*coordinates are degrees")
+def test_a_degree_measures_what_it_does_where_the_samples_are(tmp_path):
+    path = tmp_path / "degrees.asc"
+    z = np.full((40, 30), -9999.0)
+    z[25:, 5:] = 7.0
+    z[25:, 5:] += np.random.default_rng(1).normal(size=z[25:, 5:].shape)
+    z[3, 3] = 1.0  # belongs to no face
+    head = "ncols 30\nnrows 40\nxllcorner 10\nyllcorner 46\ncellsize 0.1\nnodata_value -9999\n"
+    path.write_text(head + "\n".join(" ".join(map(str, row)) for row in z))
+    grid, model = open_grid(path, scale="degrees"), open_model(path, Options(scale="degrees"))
+    assert grid.scale == tuple(model.georeference["scale"])
+    kept = np.ones((1, grid.n_vertices), bool)
+    kept[:, 60:200] = False
+    placed = np.zeros((1, model.n_vertices), bool)
+    placed[:, np.argsort(model.source_index)] = kept
+    found, known = GridSurface(grid).evaluate(kept), HeightSurface(model).evaluate(placed)
+    np.testing.assert_allclose(found, known, rtol=1e-9)

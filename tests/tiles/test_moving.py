@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from dataclasses import asdict
 
 import numpy as np
@@ -121,3 +122,12 @@ def test_a_front_with_time_has_moved_vertices_and_the_size_that_is_wished_for(fr
     assert again.F.tobytes() == found.F.tobytes()
     again = measure(GRID, weld(GRID, np.flatnonzero(best.kept)))
     assert asdict(best.quality)["error"] == pytest.approx(again.error, rel=1e-12)
+
+
+def test_solutions_without_error_are_not_moved():
+    begun = time.perf_counter()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SearchWarning)
+        front = tiled_front(open_grid(np.ones((130, 140))), tile=64, until=begun + 600.0)
+    assert front.F.tolist() == [[0.0, 2.0]]
+    assert time.perf_counter() - begun < 300.0

@@ -274,6 +274,13 @@ def test_a_call_that_was_stopped_writes_the_same_bytes_and_its_folder_is_read_ag
     assert scored.quality.error == pytest.approx(again.quality[5].error, rel=1e-6)
 
 
+def test_who_asks_for_fewer_triangles_than_there_can_be_is_told_the_least(tmp_path, capsys):
+    np.save(tmp_path / "corner.npy", np.where((X < 30) & (Y < 20), HEIGHTS, np.nan)[:40, :50])
+    call = [*command(tmp_path / "corner.npy", tmp_path / "out", "--jobs", "1"), "--triangles", "1"]
+    assert main(call) == 1
+    assert "the least is 2; ask for 2 or more (--triangles N)" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_pieces_of_a_grid_with_gaps_and_its_page_are_written(tmp_path, capsys):
     np.save(tmp_path / "gaps.npy", KINDS["islands"])
