@@ -214,7 +214,7 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
 
 
 def _inserted_by_scanning(surface: Surface) -> tuple[IntArray, int] | None:
-    """Return the vertices of a grid of heights in the order in which insertion finds them, and how many it begins with.
+    """Return the vertices of a grid of heights as insertion finds them, in order, and how many it begins with.
 
     None: it is no grid. Nor is it taken where the maximum counts, or weights: it looks at the sum over all vertices alike.
     """
