@@ -216,7 +216,8 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
 def _inserted_by_scanning(surface: Surface) -> tuple[IntArray, int] | None:
     """Return the vertices of a grid of heights as insertion finds them, in order, and how many it begins with.
 
-    None: it is no grid. Nor is it taken where the maximum counts, or weights: it looks at the sum over all vertices alike.
+    None: it is no grid. Nor is it taken where the maximum counts, or weights: insertion looks at the sum over all
+    vertices alike.
     """
     if not OBJECTIVES[surface.rules.measure].is_sum or surface.rules.weights is not None:
         return None
