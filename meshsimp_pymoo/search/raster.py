@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.predicates import exact_ranges
 from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, TRIANGLE, insert, triangulate
@@ -70,7 +70,15 @@ def raster_of(surface: Surface) -> Raster | None:
     return Raster(x, y[::-1].copy(), heights.reshape(len(y), len(x)), vertex, crossing)
 
 
-def raster_insertion(x: FloatArray, y: FloatArray, heights: FloatArray, first: IntArray, most: int) -> IntArray:
+def raster_insertion(
+    x: FloatArray,
+    y: FloatArray,
+    heights: FloatArray,
+    first: IntArray,
+    most: int,
+    *,
+    stop: BoolArray | None = None,
+) -> IntArray:
     """Insert the worst samples of a grid one by one.
 
     Parameters
@@ -84,6 +92,8 @@ def raster_insertion(x: FloatArray, y: FloatArray, heights: FloatArray, first: I
         their hull is not looked at.
     most : int
         How many samples there may be in the end, these included.
+    stop : (1,) bool array, optional
+        Another thread that sets it ends the insertion soon after, with the samples so far.
 
     Returns
     -------
@@ -100,7 +110,7 @@ def raster_insertion(x: FloatArray, y: FloatArray, heights: FloatArray, first: I
     ranges = exact_ranges(np.concatenate([x, y])[:, None])
     n = _insert_worst(
         np.ascontiguousarray(x), np.ascontiguousarray(y), np.ascontiguousarray(heights, np.float64), samples,
-        len(first), *ranges,
+        len(first), *ranges, np.zeros(1, np.bool_) if stop is None else stop,
     )  # fmt: skip
     if n == 0:
         raise ValueError(f"the {len(first)} samples to begin with lie on one line; begin with some that do not")
@@ -179,6 +189,7 @@ def _insert_worst(
     n: int,
     exact_area: float,
     exact_lift: float,
+    stop: np.ndarray,
 ) -> int:
     """Insert samples after the first n until ``samples`` is full or nothing deviates; return how many there are."""
     h, w = heights.shape
@@ -203,7 +214,7 @@ def _insert_worst(
     n_heap = 0
     for t in range(0, end, RECORD):
         n_heap = _weigh(x, y, heights, per_column, samples, is_vertex, mesh, t, key, best, heap, at, n_heap)
-    while n < most and n_heap > 0 and key[2 * heap[0]] < 0.0:
+    while n < most and n_heap > 0 and key[2 * heap[0]] < 0.0 and not stop[0]:
         v = best[heap[0]]
         start = np.int64(heap[0]) * RECORD
         r = v // w

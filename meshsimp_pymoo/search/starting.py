@@ -5,9 +5,8 @@ greedy insertion finds as many vertices as fit, and these are thinned: from 15 t
 some per cent of thinning from all. Where it is stopped on its way, by the clock or by Ctrl-C, it has the large meshes,
 and a quick insertion finds small ones.
 
-Grids of heights are inserted into by scanning (:mod:`~meshsimp_pymoo.search.raster`), to the last vertex within a
-second or two for a million. Then 30 % are thinned, and of the larger meshes some of those that insertion has found are
-measured.
+Grids of heights are inserted into by scanning (:mod:`~meshsimp_pymoo.search.raster`), to 30 % of the vertices within a
+second for a million.
 """
 
 from __future__ import annotations
@@ -39,10 +38,11 @@ INSERT_SHARE = 0.5
 KEPT_SHARE = 0.3
 # What both may take together after Ctrl-C [s].
 QUICK = 1.2
-# Of a grid this share of the vertices is thinned, if not all; and so many of the meshes that insertion finds are
-# measured.
+# Of a grid at most this share of the vertices is thinned, if not all, each of which takes so many times as long; and
+# where thinning is stopped, so many of the meshes that insertion has found are measured.
 RASTER_THINNED = 0.3
-MEASURED = 24
+SPARSE = 2.5
+MEASURED = 12
 
 
 @dataclass(frozen=True)
@@ -197,14 +197,17 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
         if not is_spanned:
             return Start.of(*fronts)
         limit = min(QUICK, KEPT_SHARE * limit)
-    scanned = _inserted_by_scanning(surface)
+    fitting = (1.0 - INSERT_SHARE) * limit / (SPARSE * SECONDS_A_REMOVAL * surface.n_vertices)
+    scanned = _inserted_by_scanning(surface, min(fitting, RASTER_THINNED), limit, stop)
     if scanned is not None:
         order, n_first = scanned
-        most = max(int(RASTER_THINNED * surface.n_vertices), n_first)
-        sparse, larger = _some(surface, order, n_first, most), _some(surface, order, most, len(order))
-        timed(1.0, lambda: thinning(surface, kept=larger.kept(0), stop=stop))
+        kept = surface.pinned.copy()
+        kept[order] = True
+        timed(1.0, lambda: thinning(surface, kept=kept, stop=stop))
         *large, back = fronts
-        return Start.of(sparse, back, larger, *large)
+        # where it was stopped small meshes are those that insertion found
+        small = [_some(surface, order, n_first, len(order))] if stop[0] else []
+        return Start.of(*small, back, *large)
     timed(INSERT_SHARE, lambda: greedy_insertion(surface, choose="triangle", stop=stop))
     inserted = fronts[-1]
     timed(1.0 - INSERT_SHARE, lambda: thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
@@ -213,8 +216,10 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
     return Start.of(inserted, back, *large)
 
 
-def _inserted_by_scanning(surface: Surface) -> tuple[IntArray, int] | None:
-    """Return the vertices of a grid of heights as insertion finds them, in order, and how many it begins with.
+def _inserted_by_scanning(
+    surface: Surface, share: float, seconds: float, stop: BoolArray
+) -> tuple[IntArray, int] | None:
+    """Return a share of the vertices of a grid of heights as insertion finds them, and how many it begins with.
 
     None: it is no grid. Nor is it taken where the maximum counts, or weights: insertion looks at the sum over all
     vertices alike.
@@ -227,10 +232,12 @@ def _inserted_by_scanning(surface: Surface) -> tuple[IntArray, int] | None:
     first = surface.pinned.copy()
     if surface.n_vertices < raster.heights.size:  # what lies along gaps is not covered otherwise
         first[surface.border] = True
-    crossings = raster_insertion(
-        raster.x, raster.y, raster.heights, raster.crossing[np.flatnonzero(first)], surface.n_vertices
-    )
-    return raster.vertex[crossings], int(first.sum())
+    begin, most = raster.crossing[np.flatnonzero(first)], int(share * surface.n_vertices)
+    if not stop[1]:  # what ended before was the clock
+        stop[0] = False
+    with stopping(stop, seconds if seconds < np.inf else None):
+        found = raster_insertion(raster.x, raster.y, raster.heights, begin, most, stop=stop)
+    return raster.vertex[found], len(begin)
 
 
 def _some(surface: Surface, order: IntArray, low: int, high: int) -> NestedFront:
