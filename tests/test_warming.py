@@ -21,8 +21,9 @@ from meshsimp_pymoo.warming import PARTS, SEARCH, WISH, Warming
 # 145 until changes at an outline were costed without doing them (surface/bare.py, surface/trial.py, plane/stars.py) and
 # a search could begin with insertion: functions of their own, none of them twice. 190 until the meshes of a front were
 # measured between the vertices (surface/evaluate.py) and thinning was cut into parts that free meshes go on with. 205
-# until edges could be forced (plane/constraints.py): asked of records and of addresses of records.
-MOST_SPECIALISATIONS = 225
+# until edges could be forced (plane/constraints.py): asked of records and of addresses of records. 225 until footprints
+# could be bits (plane/footprint.py) and moves went along the vector by windows (search/local_search.py).
+MOST_SPECIALISATIONS = 228
 
 
 def test_what_python_calls_is_in_one_part_each():
