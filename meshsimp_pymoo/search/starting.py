@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -28,6 +28,8 @@ from meshsimp_pymoo.search.raster import raster_insertion, raster_of
 from meshsimp_pymoo.surface.measures import OBJECTIVES, TRIANGLES, measured
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.workers import on_threads, threads_for
+
+Found = TypeVar("Found")
 
 # What removing a vertex takes about where all are removed [s], and the share of the time that may be spent on it.
 SECONDS_A_REMOVAL = 1.2e-5
@@ -181,44 +183,43 @@ def _begin(surface: Surface, stop: BoolArray, seconds: float) -> Start:
     """Thin from all vertices, or from those that insertion finds, as far as the time goes."""
     limit = START_SHARE * seconds
     fronts: list[NestedFront] = []
+    is_first = True
 
-    def timed(share: float, work: Callable[[], NestedFront]) -> None:
-        if fronts:  # the one before was stopped; after Ctrl-C, which may come at any time, this one is not waited for
+    def timed(share: float, work: Callable[[], Found]) -> Found:
+        nonlocal is_first
+        if not is_first:  # the one before was stopped; after Ctrl-C, which may come at any time, it is not waited for
             stop[0] = False
-        seconds = share * (min(QUICK, limit) if fronts and stop[1] else limit)
+        seconds = share * (min(QUICK, limit) if stop[1] and not is_first else limit)
+        is_first = False
         with stopping(stop, seconds if seconds < np.inf else None):
-            fronts.append(work())
+            return work()
 
     is_spanned = can_insert(surface)
     if not is_spanned or surface.n_vertices * SECONDS_A_REMOVAL <= limit:
-        timed(1.0, lambda: thinning(surface, stop=stop))
+        fronts.append(timed(1.0, lambda: thinning(surface, stop=stop)))
         if not stop[0]:
             return Start((fronts[0],), np.inf)
         if not is_spanned:
             return Start.of(*fronts)
         limit = min(QUICK, KEPT_SHARE * limit)
     fitting = (1.0 - INSERT_SHARE) * limit / (SPARSE * SECONDS_A_REMOVAL * surface.n_vertices)
-    scanned = _inserted_by_scanning(surface, min(fitting, RASTER_THINNED), limit, stop)
+    scanned = timed(1.0, lambda: _inserted_by_scanning(surface, min(fitting, RASTER_THINNED), stop))
     if scanned is not None:
         order, n_first = scanned
         kept = surface.pinned.copy()
         kept[order] = True
-        timed(1.0, lambda: thinning(surface, kept=kept, stop=stop))
-        *large, back = fronts
+        back = timed(1.0, lambda: thinning(surface, kept=kept, stop=stop))
         # where it was stopped small meshes are those that insertion found
         small = [_some(surface, order, n_first, len(order))] if stop[0] else []
-        return Start.of(*small, back, *large)
-    timed(INSERT_SHARE, lambda: greedy_insertion(surface, choose="triangle", stop=stop))
-    inserted = fronts[-1]
-    timed(1.0 - INSERT_SHARE, lambda: thinning(surface, kept=inserted.kept(len(inserted) - 1), stop=stop))
+        return Start.of(*small, back, *fronts)
+    inserted = timed(INSERT_SHARE, lambda: greedy_insertion(surface, choose="triangle", stop=stop))
+    kept = inserted.kept(len(inserted) - 1)
+    back = timed(1.0 - INSERT_SHARE, lambda: thinning(surface, kept=kept, stop=stop))
     # thinned meshes are better than those inserted, as far down as they go
-    *large, inserted, back = fronts
-    return Start.of(inserted, back, *large)
+    return Start.of(inserted, back, *fronts)
 
 
-def _inserted_by_scanning(
-    surface: Surface, share: float, seconds: float, stop: BoolArray
-) -> tuple[IntArray, int] | None:
+def _inserted_by_scanning(surface: Surface, share: float, stop: BoolArray) -> tuple[IntArray, int] | None:
     """Return a share of the vertices of a grid of heights as insertion finds them, and how many it begins with.
 
     None: it is no grid. Nor is it taken where the maximum counts, or weights: insertion looks at the sum over all
@@ -233,10 +234,7 @@ def _inserted_by_scanning(
     if surface.n_vertices < raster.heights.size:  # what lies along gaps is not covered otherwise
         first[surface.border] = True
     begin, most = raster.crossing[np.flatnonzero(first)], int(share * surface.n_vertices)
-    if not stop[1]:  # what ended before was the clock
-        stop[0] = False
-    with stopping(stop, seconds if seconds < np.inf else None):
-        found = raster_insertion(raster.x, raster.y, raster.heights, begin, most, stop=stop)
+    found = raster_insertion(raster.x, raster.y, raster.heights, begin, most, stop=stop)
     return raster.vertex[found], len(begin)
 
 
