@@ -510,10 +510,16 @@ class Keeper:
         self.path = self.output.folder / CHECKPOINT
         #: When the search was begun, perhaps by another process.
         self.begun = now()
-        #: Whether the folder holds a checkpoint of this search.
-        self.is_kept = False
         self._checkpoints: Checkpoints | None = None
         self._warned = False
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the folder holds a checkpoint of this search: any other was refused, or is replaced.
+
+        Asked of the folder: a signal may come when the file is there and nobody has noted it yet.
+        """
+        return self.search.checkpoint is not None and self.path.exists()
 
     @property
     def what(self) -> dict[str, Any]:
@@ -540,7 +546,6 @@ class Keeper:
         if interval is not None and self.path.exists():
             try:
                 algorithm, before = self._go_on()
-                self.is_kept = True
             except CheckpointError as trouble:
                 if not self.output.overwrite:
                     raise ResultError(
@@ -597,7 +602,6 @@ class Keeper:
             return
         try:
             checkpoints.save(begun=self.begun)
-            self.is_kept = True
         except (CheckpointError, NotResumable, OSError) as problem:
             self._warn(problem)
 
@@ -646,7 +650,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
                 until=found.until,
             )
     except (ResultError, KeyboardInterrupt) as stop:
-        if not (keeper.is_kept and keeper.path.exists()):
+        if not keeper.is_kept:
             raise
         reason = "interrupted while the results were written" if isinstance(stop, KeyboardInterrupt) else str(stop)
         say(f"{reason}; the same command goes on from the checkpoint in {folder}")
