@@ -95,14 +95,11 @@ class NestedFront:
         kept[self.order[: k if self.count is None else self.count[k]]] = True
         return kept
 
-    def part(self, first: int, end: int) -> NestedFront:
-        """Return the front of some of the subsets: of all sizes it can be the smallest ones alone."""
-        error, triangles = self.error[first:end], self.triangles[first:end]
-        if self.count is not None:
-            return replace(self, error=error, triangles=triangles, count=self.count[first:end])
-        if first:
-            raise ValueError(f"the subsets from {first} on are no front of their own; take them from 0 on")
-        return replace(self, order=self.order[: end - 1], error=error, triangles=triangles)
+    def smallest(self, n: int) -> NestedFront:
+        """Return the front of the n smallest subsets."""
+        count = None if self.count is None else self.count[:n]
+        order = self.order[: n - 1] if count is None else self.order
+        return replace(self, order=order, error=self.error[:n], triangles=self.triangles[:n], count=count)
 
 
 def thinning(

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, Csr, IntArray
 from meshsimp_pymoo.compiling.draws import below, unit
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
@@ -65,7 +65,7 @@ FIT_FAILURES = 20
 # goes on by half of itself, so often over all of the vector, and more often where a visit is longer than so many moves,
 # that every place is seen at every temperature: with 4 and with 10 passes meshes are as good as without a window.
 # Meshes of fewer sites are worse by a window, and no faster.
-LARGE = 50_000
+WINDOWED_FROM = 50_000
 WINDOW, LEAST_WINDOW = 4_000, 8
 PASSES, VISIT = 8, 4_000
 
@@ -151,7 +151,7 @@ def anneal(
     is_best = True  # whether `differs` is said of the best state already
     n_movable = _listed(g, live, fixed, movable)
     # A window is looked at, from a place of the list on, and goes on along the vector.
-    is_windowed = n >= LARGE and n_movable * WINDOW >= LEAST_WINDOW * n
+    is_windowed = n >= WINDOWED_FROM and n_movable * WINDOW >= LEAST_WINDOW * n
     width, visit, begins, first, span = n_movable, moves, n_movable, 0, n
     if is_windowed:
         width = n_movable * WINDOW // n
@@ -364,34 +364,84 @@ def relocate(
                 if snapshot(ground, books, n)[2] > triangles:
                     _thin_to(ground, books, pinned, triangles, flag)
                 fit_size(ground, books, n, pinned, True, triangles, state, flag)
-            result: BoolArray
-            result, total, n_now = snapshot(ground, books, n)
-            n_movable = int(np.count_nonzero(result & ~pinned))
-            if moves > 0 and np.isfinite(total):
-                differs = np.zeros(n, np.bool_)
-                anneal(
-                    ground,
-                    books,
-                    n,
-                    pinned,
-                    np.empty(n, np.int64),
-                    surface.border,
-                    *surface.neighbours,
-                    moves,
-                    temperature * max(float(total), 0.0) / max(n_movable, 1),
-                    cooling,
-                    int(n_now) if triangles is None else triangles,
-                    tuple(map(float, shares)),
-                    state,
-                    flag,
-                    made,
-                    differs,
-                    np.empty(n, np.int64),
-                )
-                result = snapshot(ground, books, n)[0] ^ differs
-        return result
+            return annealed(
+                ground,
+                books,
+                pinned,
+                surface.border,
+                surface.neighbours,
+                moves=moves,
+                temperature=temperature,
+                cooling=cooling,
+                triangles=triangles,
+                shares=shares,
+                state=state,
+                stop=flag,
+                made=made,
+            )
 
     return on_threads(work, [kept], stop=flag)[0]
+
+
+def annealed(
+    ground: Any,
+    books: Any,
+    fixed: BoolArray,
+    border: IntArray,
+    neighbours: Csr,
+    *,
+    moves: int,
+    temperature: float,
+    cooling: float,
+    state: NDArray[np.uint64],
+    triangles: int | None = None,
+    shares: MoveShares = USUAL_MOVES,
+    stop: BoolArray | None = None,
+    made: IntArray | None = None,
+) -> BoolArray:
+    """Anneal the subset that books hold; return the best one (N,) that was seen.
+
+    Parameters
+    ----------
+    ground, books : records
+        Of a surface of N vertices; the books end at the last mesh.
+    fixed : (N,) bool array
+        Sites that stay.
+    border, neighbours : int arrays
+        Where one triangle is to be had, and where each vertex may move.
+    moves, temperature, cooling, triangles, shares, stop, made
+        As :func:`relocate` has them.
+    state : (1,) uint64 array
+        Of the random moves.
+    """
+    n = len(fixed)
+    result: BoolArray
+    result, total, n_now = snapshot(ground, books, n)
+    n_movable = int(np.count_nonzero(result & ~fixed))
+    if moves <= 0 or not np.isfinite(total):
+        return result
+    differs = np.zeros(n, np.bool_)
+    anneal(
+        ground,
+        books,
+        n,
+        fixed,
+        np.empty(n, np.int64),
+        border,
+        *neighbours,
+        moves,
+        temperature * max(float(total), 0.0) / max(n_movable, 1),
+        cooling,
+        int(n_now) if triangles is None else triangles,
+        tuple(map(float, shares)),
+        state,
+        stop_flag(stop),
+        np.empty(1, np.int64) if made is None else made,
+        differs,
+        np.empty(n, np.int64),
+    )
+    best: BoolArray = snapshot(ground, books, n)[0] ^ differs
+    return best
 
 
 def relocate_all(

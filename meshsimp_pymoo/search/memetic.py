@@ -47,8 +47,7 @@ from meshsimp_pymoo.search.free import (
     steps_between,
 )
 from meshsimp_pymoo.search.greedy import NestedFront, thinning
-from meshsimp_pymoo.search.local_search import LARGE as LARGE_MOVES
-from meshsimp_pymoo.search.local_search import USUAL_MOVES, MoveShares, relocate_all
+from meshsimp_pymoo.search.local_search import USUAL_MOVES, WINDOWED_FROM, MoveShares, relocate_all
 from meshsimp_pymoo.search.operators import NestedSubsets, PackedDuplicates, PinnedCorners
 from meshsimp_pymoo.search.requirements import surface_of
 from meshsimp_pymoo.search.starting import Start, at_hand
@@ -243,7 +242,7 @@ class DownTheLadder(Mating):
         temperature *= self.heat * (1 + getattr(algorithm, "idle", 0))
         loads = self._loads(problem, pop, rows, np.concatenate([rungs for rungs, is_first in sweep if is_first]))
         moves = self._moves(problem, algorithm, loads, turn, np.concatenate([rungs for rungs, _ in sweep[self.step :]]))
-        if problem.n_var >= LARGE_MOVES and time_limit(algorithm) is not None:
+        if problem.n_var >= WINDOWED_FROM and time_limit(algorithm) is not None:
             turn, moves = turn[moves > 0], moves[moves > 0]
         parents = rows[turn if fresh else turn + 1]
         limit = time_limit(algorithm, _subsets_share(algorithm))
@@ -273,7 +272,7 @@ class DownTheLadder(Mating):
         n_kept = np.array([np.count_nonzero(individual.X & movable) for individual in pop])[np.maximum(rows, 0)]
         n_kept, full = np.maximum(n_kept, 1), FULL_SHARE * problem.n_var
         work, effort = np.minimum(n_kept, full), 1.0 + problem.n_var / (CROWD * n_kept)
-        if problem.n_var >= LARGE_MOVES:
+        if problem.n_var >= WINDOWED_FROM:
             work *= full / np.maximum(n_kept, full) / np.sqrt(effort)
             work[first] *= BEGINNING if self.inherit else 1.0
         return Loads(n_kept, work, effort, BUILDING[0] * problem.n_var + BUILDING[1] * n_kept, n_kept > full)
@@ -286,7 +285,7 @@ class DownTheLadder(Mating):
         share = _subsets_share(algorithm)
         deadline = time_limit(algorithm, share)
         n_within = None if within is None else round(share * within.n_max_moves)
-        is_large, work, effort = problem.n_var >= LARGE_MOVES, loads.work, loads.work * loads.effort
+        is_large, work, effort = problem.n_var >= WINDOWED_FROM, loads.work, loads.work * loads.effort
         if deadline is not None and not self.effort:
             self.begun = time.time() - algorithm.start_time
         spent = 0.0 if deadline is None else time.time() - algorithm.start_time - self.begun

@@ -75,7 +75,7 @@ class Start:
             too_large = np.flatnonzero(front.triangles >= least)
             n = int(too_large[0]) if len(too_large) else len(front)
             if n:
-                parts.insert(0, front.part(0, n))
+                parts.insert(0, front.smallest(n))
                 least = float(front.triangles[:n].min())
         return cls(tuple(parts))
 

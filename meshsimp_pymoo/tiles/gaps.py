@@ -40,6 +40,7 @@ from meshsimp_pymoo.tiles.thin import (
     circle_of,
     is_within,
     thin_sites,
+    with_rest,
     with_sites,
 )
 
@@ -104,10 +105,7 @@ def start_with_gaps(tile: Tile) -> tuple[IntArray, FloatArray]:
         return number, np.full(len(number), np.inf)
     sparse = _inserted(tile, setting)
     setting = setting if sparse is None else sparse
-    removed, level = _thinned(setting, np.inf)
-    candidates = setting.number[setting.is_site]
-    rest = np.setdiff1d(candidates, removed, assume_unique=True)
-    return np.concatenate([rest, removed]), np.concatenate([np.full(len(rest), np.inf), level])
+    return with_rest(setting, *_thinned(setting, np.inf))
 
 
 def _inserted(tile: Tile, setting: Setting) -> Setting | None:

@@ -18,11 +18,9 @@ from meshsimp_pymoo.arrays import Csr, IntArray
 from meshsimp_pymoo.plane.order import find_corners
 from meshsimp_pymoo.plane.triangulation import RECORD
 from meshsimp_pymoo.reprs import brief
-from meshsimp_pymoo.search.local_search import USUAL_MOVES, anneal
-from meshsimp_pymoo.surface.books import Live
+from meshsimp_pymoo.search.local_search import annealed
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.model import placed_model
-from meshsimp_pymoo.surface.moves import snapshot
 from meshsimp_pymoo.tiles.gaps import setting_with_gaps
 from meshsimp_pymoo.tiles.thin import Setting, Tile, setting_of
 
@@ -71,39 +69,21 @@ def move_sites(task: Moving) -> tuple[IntArray, IntArray]:
         setting = _to_move(whole)
     except ValueError:  # what the books say of sites that span no triangle, and of nothing else
         return nothing, nothing
-    with setting.surface.books(setting.is_site) as books:
-        return _moved(tile, setting, books, task.seed)
-
-
-def _moved(tile: Tile, setting: Setting, books: Live, seed: int) -> tuple[IntArray, IntArray]:
-    ground, number, n = setting.surface.ground(), setting.number, len(setting.number)
-    fixed, _ = setting.judge(books)
-    before, total, n_triangles = snapshot(ground, books, n)
-    n_movable = int(np.count_nonzero(before & ~fixed))
-    if n_movable == 0 or not np.isfinite(total):
-        return np.empty(0, np.int64), np.empty(0, np.int64)
-    differs = np.zeros(n, np.bool_)
-    anneal(
-        ground,
-        books,
-        n,
-        fixed,
-        np.empty(n, np.int64),
-        np.empty(0, np.int64),  # what has one triangle is at the outline, which stays
-        *_beside(tile, number),
-        MOVES * n_movable,
-        TEMPERATURE * max(float(total), 0.0) / n_movable,
-        COOLING,
-        int(n_triangles),
-        tuple(map(float, USUAL_MOVES)),
-        np.array([seed], np.uint64),
-        np.zeros(1, np.bool_),
-        np.empty(1, np.int64),
-        differs,
-        np.empty(n, np.int64),
-    )
-    after = snapshot(ground, books, n)[0] ^ differs
-    return np.sort(number[before & ~after]), np.sort(number[after & ~before])
+    number, sites = setting.number, setting.is_site
+    with setting.surface.books(sites) as books:
+        fixed, _ = setting.judge(books)
+        found = annealed(
+            setting.surface.ground(),
+            books,
+            fixed,
+            np.empty(0, np.int64),  # what has one triangle is at the outline, which stays
+            _beside(tile, number),
+            moves=MOVES * int(np.count_nonzero(sites & ~fixed)),
+            temperature=TEMPERATURE,
+            cooling=COOLING,
+            state=np.array([task.seed], np.uint64),
+        )
+    return np.sort(number[sites & ~found]), np.sort(number[found & ~sites])
 
 
 def _to_move(whole: Setting) -> Setting:

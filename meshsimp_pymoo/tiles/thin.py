@@ -169,8 +169,7 @@ def start_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
     surface = _surface(tile, number[order], xy[order], z[order], None)
     setting = Setting(surface, number[order], is_site, lambda live: (on_border.ravel()[order], np.empty(0, bool)))
     removed, level = thin_sites(setting, np.inf)
-    samples = np.concatenate([number[border], number[order[removed]]])
-    return samples, np.concatenate([np.full(len(border), np.inf), level])
+    return with_rest(setting, setting.number[removed], level)
 
 
 def thin_tile(tile: Tile) -> tuple[IntArray, FloatArray]:
@@ -248,6 +247,12 @@ def thin_sites(setting: Setting, limit: float) -> tuple[IntArray, FloatArray]:
     level = hull_levels(saved, error[: n_removed + 1])
     n_wanted = int(np.searchsorted(level, limit, side="right"))
     return removed[:n_wanted], level[:n_wanted]
+
+
+def with_rest(setting: Setting, removed: IntArray, level: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the numbers of a tile's sites, those that were not removed first, at an infinite level."""
+    rest = np.setdiff1d(setting.number[setting.is_site], removed, assume_unique=True)
+    return np.concatenate([rest, removed]), np.concatenate([np.full(len(rest), np.inf), level])
 
 
 def hull_levels(saved: IntArray, error: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from pymoo.optimize import minimize
 from meshsimp_pymoo import MeshProblem, workers
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.search.greedy import thinning
-from meshsimp_pymoo.search.local_search import LARGE, USUAL_MOVES, anneal, relocate, relocate_all
+from meshsimp_pymoo.search.local_search import USUAL_MOVES, WINDOWED_FROM, anneal, relocate, relocate_all
 from meshsimp_pymoo.search.operators import (
     HalfPlaneCrossover,
     NestedSubsets,
@@ -69,7 +69,7 @@ def test_the_unit_of_a_model_makes_no_difference_to_its_annealing():
 def large():
     """A model on which moves look at a window, and a subset of it."""
     problem = MeshProblem("peaks:230")
-    assert problem.n_var >= LARGE
+    assert problem.n_var >= WINDOWED_FROM
     return problem, problem.pinned | (np.random.default_rng(3).random(problem.n_var) < 0.02)
 
 

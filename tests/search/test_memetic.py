@@ -199,7 +199,7 @@ def test_a_budget_in_moves_makes_a_quick_sweep_and_a_slow_one(monkeypatch):
 
 
 def test_a_large_model_has_no_quick_sweep_where_there_are_few_moves(monkeypatch):
-    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    monkeypatch.setattr(module, "WINDOWED_FROM", 0)
     asked = []
     monkeypatch.setattr(
         module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(int(moves.sum())), X.copy())[1]
@@ -212,7 +212,7 @@ def test_a_large_model_has_no_quick_sweep_where_there_are_few_moves(monkeypatch)
 
 
 def test_with_a_deadline_rungs_of_a_large_model_that_would_hardly_be_moved_are_left_as_they_are(monkeypatch):
-    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    monkeypatch.setattr(module, "WINDOWED_FROM", 0)
     asked = []
     monkeypatch.setattr(module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(moves), X.copy())[1])
     problem = MeshProblem("face:200")
@@ -229,7 +229,7 @@ def test_with_a_deadline_rungs_of_a_large_model_that_would_hardly_be_moved_are_l
 
 
 def test_where_all_rungs_of_a_large_model_would_hardly_be_moved_all_are_moved_a_little(monkeypatch):
-    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    monkeypatch.setattr(module, "WINDOWED_FROM", 0)
     monkeypatch.setattr(module, "time_limit", lambda *_: (1e-9, 1e-9, 0.0))
     asked = []
     monkeypatch.setattr(module, "relocate_all", lambda _, X, moves, *__, **___: (asked.append(moves), X.copy())[1])
@@ -245,7 +245,7 @@ def test_where_all_rungs_of_a_large_model_would_hardly_be_moved_all_are_moved_a_
 
 
 def test_a_generation_of_which_no_rung_is_moved_has_no_children(monkeypatch):
-    monkeypatch.setattr(module, "LARGE_MOVES", 0)
+    monkeypatch.setattr(module, "WINDOWED_FROM", 0)
     monkeypatch.setattr(module, "time_limit", lambda *_: (1e-9, 1e-9, 0.0))
     problem = MeshProblem("face:200")
     algorithm = memetic(4, triangles=(40, 380))
