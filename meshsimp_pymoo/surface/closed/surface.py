@@ -17,6 +17,7 @@ from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.closed.books import ClosedLive, make_live, with_peaks
 from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspace, triangulate_closed
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
+from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
@@ -55,6 +56,8 @@ class ClosedSurface(ModelSurface):
     def __init__(self, model: ClosedModel, rules: Rules = DEFAULT) -> None:
         _refuse_rules(model.name, rules)
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        if rules.break_lines is not None:
+            self.model = lined_closed_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = named_vertices(self.model, rules.pin)
         self.pinned[self.model.poles] = True
@@ -142,6 +145,14 @@ class ClosedSurface(ModelSurface):
             build(ground, live, np.flatnonzero(kept), self.model.name)
             yield live
 
+    def line_chains(self, kept: BoolArray) -> tuple[IntArray, ...]:
+        """Return each break line as the chain of edges that it is in the mesh of a subset (N,): rows, in order.
+
+        Beside the vertices that thinning left these are the kept ones whose images lie exactly on the line.
+        """
+        lines = self.model.lines
+        return () if lines is None else lines.chains_through(self._ground.lines, kept | self.pinned)
+
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""
         return self._triangulated(kept)[0]
@@ -190,7 +201,12 @@ class ClosedSurface(ModelSurface):
         """Return what is said of a mesh of vertices (V, 3) in the frame of the points beside the deviations."""
         centres, share = self._between
         away, _ = distances_to_mesh(centres, vertices, faces)
-        return {"surface_error": float((share * away).sum())} | measured_angles(vertices, faces)
+        said = {"surface_error": float((share * away).sum())} | measured_angles(vertices, faces)
+        lines = self.model.lines
+        if lines is not None:
+            away, _ = distances_to_mesh(np.concatenate(lines.originals), vertices, faces)
+            said |= lines.errors(away)
+        return said
 
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Measure a mesh of the model's own vertices with any edges, by true distance; see :meth:`score`."""
@@ -278,8 +294,3 @@ def _refuse_rules(name: str, rules: Rules) -> None:
                 f"{name}: {what}={value!r} (--{what} {value}) describes height surfaces, and this is a closed one, "
                 "whose meshes cover all of it; leave it out"
             )
-    if rules.break_lines is not None:
-        raise ModelError(
-            f"{name}: break lines are for height surfaces, and this is a closed one; leave break_lines "
-            "(--break-lines) out"
-        )
