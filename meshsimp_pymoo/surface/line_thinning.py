@@ -45,7 +45,13 @@ PutBack = Callable[[Chords], set[tuple[int, int]]]
 
 
 def thinned_runs(
-    runs: Runs, places: FloatArray, points: FloatArray, tolerance: float, also: PutBack | None = None
+    runs: Runs,
+    places: FloatArray,
+    points: FloatArray,
+    tolerance: float,
+    *,
+    farthest_in: FloatArray,
+    also: PutBack | None = None,
 ) -> tuple[list[IntArray], int]:
     """Return which vertices of each run stay, as positions in it, and how many of them were put back.
 
@@ -59,12 +65,14 @@ def thinned_runs(
         Where they are in space.
     tolerance : float
         How far a vertex may be from the chord that stands for it, in space.
+    farthest_in : (P, 2) or (P, 3) float array
+        Where the distances are taken by which it is decided what is put back first: the places or the points.
     also : function, optional
         What else is to be put back, of chords that neither cross nor pass a vertex of another; they are looked at
         again, until it is nothing.
     """
-    along = [points[run] for run in runs.runs]
-    kept: list[IntArray] = [np.flatnonzero(stays) for stays in thinned(along, tolerance)]
+    kept: list[IntArray] = [np.flatnonzero(stays) for stays in thinned([points[run] for run in runs.runs], tolerance)]
+    along = [farthest_in[run] for run in runs.runs]
     n_put_back = 0
     while True:
         chords = _chords(runs, kept)

@@ -541,7 +541,7 @@ class _Lining:
 
         tolerance = self.height_tolerance
         kept, self.found["put_back_line_vertices"] = thinned_runs(
-            runs, places, points, tolerance, over if own.any() else None
+            runs, places, points, tolerance, farthest_in=points, also=over if own.any() else None
         )
         return kept
 

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from meshsimp_pymoo.errors import InputError, ModelError
+from meshsimp_pymoo.plane.segments import enclosed_points, points_on
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.given_lines import lines_of_word
-from meshsimp_pymoo.surface.line_thinning import thinned_runs
+from meshsimp_pymoo.surface.line_thinning import Chords, thinned_runs
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.lining import USUAL_TOLERANCE
-from meshsimp_pymoo.surface.polylines import cut_into_runs
+from meshsimp_pymoo.surface.polylines import Runs, cut_into_runs, farthest_between
 from meshsimp_pymoo.surface.rules import is_word_for_lines
+
+# An image so near to a chord may be on it: a few times what images are rounded to.
+ON = 2.0**-50
 
 
 def lined_closed_model(model: ClosedModel, break_lines: Any, tolerance: float | None) -> ClosedModel:
@@ -27,7 +32,9 @@ def lined_closed_model(model: ClosedModel, break_lines: Any, tolerance: float | 
         raise ModelError(f"{model.name}: is a closed surface, whose break lines are 'sharp:DEGREES' or 'outline'")
     lines = lines_of_word(model, break_lines)
     runs = cut_into_runs(lines, model.poles.ravel())
-    kept, n_back = thinned_runs(runs, model.xy, model.points, float(tolerance))
+    kept, n_back = thinned_runs(
+        runs, model.xy, model.points, float(tolerance), farthest_in=model.xy, also=partial(_astray, model, runs)
+    )
     chains = tuple(runs.joined(kept))
     found = {
         "lines": len(lines),
@@ -44,3 +51,19 @@ def lined_closed_model(model: ClosedModel, break_lines: Any, tolerance: float | 
         found={what: n for what, n in found.items() if n},
     )
     return replace(model, lines=made)
+
+
+def _astray(model: ClosedModel, runs: Runs, chords: Chords) -> set[tuple[int, int]]:
+    """Return what is put back so that no vertex of the model is on the wrong side of a chord, or on it by chance."""
+    longer = np.flatnonzero(chords.high - chords.low > 1)
+    rings = [chords.between(runs, s) for s in longer.tolist()]
+    if not rings:
+        return set()
+    wrong = set(enclosed_points(model.xy, np.arange(model.n_vertices), rings)[:, 1].tolist())
+    on = points_on(model.xy, chords.ends[longer], ON)
+    wrong |= {k for p, k in on.tolist() if p not in rings[k]}
+    return {
+        (int(chords.run[s]), int(chords.low[s]) + farthest_between(model.xy[ring], 0, len(ring) - 1)[0])
+        for k, (s, ring) in enumerate(zip(longer, rings, strict=True))
+        if k in wrong
+    }
