@@ -21,7 +21,7 @@ from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
-from meshsimp_pymoo.surface.closed.refit import rounds_of_refit
+from meshsimp_pymoo.surface.closed.refit import Held, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
 from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
@@ -270,13 +270,28 @@ class ClosedSurface(ModelSurface):
         samples = np.concatenate([self.points, centres])
         counts = np.concatenate([weights, share * weights.sum()])
         best, error = self.points[rows], np.inf
-        for vertices, away in rounds_of_refit(best, compact, samples, counts, until=until):
+        for vertices, away in rounds_of_refit(best, compact, samples, counts, held=self._held(rows), until=until):
             there = float((weights * away[:n]).sum())
             if there < error:
                 best, error = vertices, there
         moved = (best != self.points[rows]).any(axis=1)
         found = np.where(moved[:, None], self.model.to_file(best), self.model.file_points[rows])
         return Refitted(mesh.faces, rows, found, min(error, before), before, 0.0)
+
+    def _held(self, rows: IntArray) -> Held | None:
+        """Return what break lines ask of the vertices of a mesh, rows of the model, that are moved."""
+        lines = self.model.lines
+        if lines is None:
+            return None
+        kept = np.zeros(self.n_vertices, bool)
+        kept[rows] = True
+        ends = []
+        for line, chain in zip(lines.originals, self.line_chains(kept), strict=True):
+            k = np.arange(len(chain) - 1)
+            _, nearest = distances_to_mesh(line, self.points[chain], np.column_stack([k, k + 1, k + 1]))
+            at = np.searchsorted(rows, chain)
+            ends.append(np.column_stack([at[nearest], at[nearest + 1]]))
+        return Held(np.concatenate(lines.originals), np.concatenate(ends), lines.tolerance)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ClosedSurface:
         return self
