@@ -370,7 +370,9 @@ def test_many_parts_are_flattened_one_by_one():
 
 def test_parts_too_small_to_have_a_mesh_are_left_out_and_said():
     mesh = trimesh.util.concatenate([bumpy(2), trimesh.Trimesh([[9.0, 0, 0], [9, 1, 0], [9, 0, 1]], [[0, 1, 2]])])
-    with pytest.warns(ModelWarning, match=r"1 part of fewer than 4 vertices \(3 vertices\) cannot be simplified and are"):
+    with pytest.warns(
+        ModelWarning, match=r"1 part of fewer than 4 vertices \(3 vertices\) cannot be simplified and are"
+    ):
         model = open_model(as_source(mesh, "bits"), CLOSED)
     assert model.n_vertices == len(mesh.vertices) - 3
     assert model.found["small_parts_left_out"] == 1
@@ -385,7 +387,9 @@ def test_flattening_turns_no_face_over_and_depends_on_no_order(name):
     rng = np.random.default_rng(2)
     listed = rng.permutation(len(mesh.vertices))
     place = np.argsort(listed)
-    other = open_model(trimesh.Trimesh(mesh.vertices[listed], place[rng.permutation(mesh.faces)], process=False), CLOSED)
+    other = open_model(
+        trimesh.Trimesh(mesh.vertices[listed], place[rng.permutation(mesh.faces)], process=False), CLOSED
+    )
     model = opened(name)
     assert np.array_equal(other.xy, model.xy)
     assert np.array_equal(other.file_points, model.file_points)
