@@ -14,8 +14,8 @@ Two are real terrain from the sample data that matplotlib installs. The others a
 whole front is known (``plane``, ``roof``, ``pyramid``), smooth and rough test surfaces, a synthetic scan of a
 face, outlines with a hole or a bay, an embankment with break lines (``load_lines``), and closed surfaces, with flat
 faces (``tetrahedron``, ``cube``, ``icosahedron``), smooth (``sphere``, ``ellipsoid``, ``blob``), of several parts
-(``pebbles``) or with sharp edges (``bracket``); a ``blob`` with holes is a scan of a body. Everything is a pure function
-of the parameters, the scan noise included.
+(``pebbles``) or with sharp edges (``bracket``); a ``blob`` with holes is a scan of a body. Everything is a pure
+function of the parameters, the scan noise included.
 """
 
 from __future__ import annotations
