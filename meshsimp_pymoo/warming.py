@@ -90,7 +90,7 @@ def _body() -> Any:
     faces = np.array([[0, 2, 1], [0, 1, 4], [1, 3, 4], [1, 2, 3], [0, 4, 2], [4, 3, 2]], np.int32)
     xy = np.array([[0.0, 0.0], [0.75, 0.0], [0.0, 0.75], [0.25, 0.25], [0.125, 0.125]])
     rows, same = np.arange(5), np.eye(3)
-    model = ClosedModel("body", points, faces, xy, np.array([0, 2, 1]), rows, points, {}, same, np.zeros(3))
+    model = ClosedModel("body", points, faces, xy, np.array([[0, 2, 1]]), rows, points, {}, same, np.zeros(3))
     return ClosedSurface(model)
 
 
@@ -149,7 +149,7 @@ def _closed() -> None:
 
     surface = _body()
     model = surface.model
-    faults(model.xy, model.faces, model.pole)
+    faults(model.xy, model.faces, model.poles)
     hilbert_keys(model.xy)
     surface.evaluate(surface.pinned[None])
     surface.score(surface.points, surface.faces)

@@ -183,7 +183,7 @@ def last_bits(points, faces):
     """Flatten as usual, and move images in their last bits as other libraries would."""
     found = embedding.embed(points, faces)
     moved = found.xy + 2.0**-52 * np.random.default_rng(1).integers(-3, 4, found.xy.shape)
-    moved[found.pole] = found.xy[found.pole]
+    moved[found.poles] = found.xy[found.poles]
     return found._replace(xy=moved)
 
 

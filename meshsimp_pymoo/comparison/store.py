@@ -56,7 +56,7 @@ NOT_STORED = ("attributes", "facts", "georeference", "found", "material")
 # Break lines are stored as arrays whose names begin so.
 LINES = "lines_"
 # What closed models alone have.
-OF_CLOSED = "pole"
+OF_CLOSED = "poles"
 # What a model need not have.
 OPTIONAL = ("weights", "scale")
 

@@ -6,6 +6,10 @@ the few faces that touch the cell asked.
 
 The samples of a height grid with gaps are crossings of rows and columns, and its faces follow from which of them are
 there: two to a cell with four samples, one to a cell with three. So a bit a sample is all that is asked for there.
+
+The images of a closed surface fill the plane but for its holes, and are thousands of times denser here than there, so
+that no cells fit all of it: whether a point lies in a hole is whether a ray from it crosses the rims an odd number of
+times, and a tree of boxes over the edges of the rims says which ones to ask.
 """
 
 from __future__ import annotations
@@ -15,12 +19,15 @@ from typing import NamedTuple
 import numpy as np
 
 from meshsimp_pymoo.compiling.functions import entry, inner
+from meshsimp_pymoo.plane.nearest import boxes_of_runs
 
 OUTSIDE, INSIDE, MIXED = 0, 1, 2
 # How far from three times a point rounding may put the sum of three corners.
 TOUCH = 4e-15
 # Cells there are at most.
 MOST_CELLS = 2**26
+# Edges of rims in one leaf of the tree over them.
+RIM_LEAF = 4
 
 
 class Footprint(NamedTuple):
@@ -30,7 +37,7 @@ class Footprint(NamedTuple):
     ----------
     side : int
         Cells along one side of the unit square; 0 where the projection is convex, so that all of the hull is inside.
-        Of a lattice 1.
+        Of a lattice, and of rims, 1.
     columns : int
         Cells in a row: rows and columns end beyond the mesh. Of a lattice the bytes in a row of bits.
     state : (rows * columns,) uint8 array
@@ -43,6 +50,10 @@ class Footprint(NamedTuple):
         Vertex rows of the faces.
     x, y : (C,), (R,) float arrays
         Where the columns of a lattice are, ascending, and its rows, descending; empty where faces are listed.
+    rim : (E, 2) int32 array
+        Edges of the rims of holes, in any direction, those near each other listed so; empty elsewhere.
+    boxes : (2 L, 4) float array
+        Of the tree over runs of ``RIM_LEAF`` of them, as of :func:`~meshsimp_pymoo.plane.nearest.boxes_of_runs`.
     """
 
     side: int
@@ -53,6 +64,29 @@ class Footprint(NamedTuple):
     faces: np.ndarray
     x: np.ndarray
     y: np.ndarray
+    rim: np.ndarray
+    boxes: np.ndarray
+
+
+NO_CELLS = np.zeros(0, np.int32)
+NO_RIM, NO_BOXES = np.empty((0, 2), np.int32), np.empty((0, 4))
+
+
+def rim_footprint(xy: np.ndarray, rim: np.ndarray) -> Footprint:
+    """Return all of the plane but what lies within closed rims.
+
+    Parameters
+    ----------
+    xy : (N, 2) float array
+        Coordinates in the unit square.
+    rim : (E, 2) int array
+        The edges of the rims, those near each other listed so. Every vertex ends an even number of them.
+    """
+    rim = np.ascontiguousarray(rim, np.int32)
+    leaves = boxes_of_runs(xy[rim.ravel()], 2 * RIM_LEAF)
+    # two columns and rows of cells: the unit square and what is beyond
+    state = np.zeros(4, np.uint8)
+    return Footprint(1, 2, state, NO_CELLS, NO_CELLS, NO_CELLS.reshape(0, 3), np.empty(0), np.empty(0), rim, leaves)
 
 
 def lattice_footprint(bits: np.ndarray, x: np.ndarray, y: np.ndarray) -> Footprint:
@@ -67,7 +101,8 @@ def lattice_footprint(bits: np.ndarray, x: np.ndarray, y: np.ndarray) -> Footpri
     """
     none = np.zeros(0, np.int32)
     state = np.ascontiguousarray(bits).ravel()
-    return Footprint(1, bits.shape[1], state, none, none, none.reshape(0, 3), np.array(x, float), np.array(y, float))
+    at = np.array(x, float), np.array(y, float)
+    return Footprint(1, bits.shape[1], state, none, none, none.reshape(0, 3), *at, NO_RIM, NO_BOXES)
 
 
 @inner
@@ -107,12 +142,38 @@ def inside(xy: np.ndarray, footprint: Footprint, x3: float, y3: float) -> bool:
     """Whether a third of (x3, y3), in the unit square, lies in the closed projection; ``xy``: the model's."""
     if len(footprint.x) > 0:
         return _in_lattice(footprint.state, footprint.columns, footprint.x, footprint.y, x3, y3)
+    if len(footprint.rim) > 0:
+        return not _within(xy, footprint.rim, footprint.boxes, x3, y3)
     scale = footprint.side / 3.0
     cell = int(y3 * scale) * footprint.columns + int(x3 * scale)
     kind = footprint.state[cell]
     if kind == MIXED:
         return _in_some_face(xy, footprint.start, footprint.items, footprint.faces, cell, x3, y3)
     return kind == INSIDE
+
+
+@inner
+def _within(xy: np.ndarray, rim: np.ndarray, boxes: np.ndarray, x3: float, y3: float) -> bool:
+    """Whether a ray from a third of (x3, y3) along x crosses closed rims an odd number of times."""
+    n_leaves = len(boxes) // 2
+    odd = False
+    node = 1
+    while node > 0:
+        if 3.0 * boxes[node, 2] <= y3 and y3 <= 3.0 * boxes[node, 3] and x3 <= 3.0 * boxes[node, 1]:
+            if node < n_leaves:
+                node *= 2
+                continue
+            first = (node - n_leaves) * RIM_LEAF
+            for k in range(first, min(first + RIM_LEAF, len(rim))):
+                a, b = rim[k, 0], rim[k, 1]
+                rises = 3.0 * xy[2 * a + 1] <= y3
+                if rises != (3.0 * xy[2 * b + 1] <= y3):
+                    side = _left_of(xy, a, b, x3, y3)
+                    odd ^= side > 0.0 if rises else side < 0.0
+        while node & 1:  # the right one of two: done with what is above it
+            node >>= 1
+        node += node > 0
+    return odd
 
 
 @inner
@@ -300,7 +361,8 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     none = np.zeros(0, np.int32)
     faces = np.ascontiguousarray(faces, np.int32)
     if convex:
-        return Footprint(0, 0, np.zeros(0, np.uint8), none, none, faces, np.empty(0), np.empty(0))
+        at = np.empty(0), np.empty(0)
+        return Footprint(0, 0, np.zeros(0, np.uint8), none, none, faces, *at, NO_RIM, NO_BOXES)
     flat = np.ascontiguousarray(xy, float).ravel()
     # Two cells a face in the box of the mesh: fine enough that few cells are mixed and each of those has few faces, and
     # still small beside the model.
@@ -317,4 +379,5 @@ def make_footprint(xy: np.ndarray, faces: np.ndarray, outline: np.ndarray, *, co
     items = np.zeros(start[-1], np.int32)
     cursor = start.copy()
     _face_cells(flat, faces, side, columns, state, cursor, items, True)
-    return Footprint(side, columns, state, start.astype(np.int32), items, faces, np.empty(0), np.empty(0))
+    at = np.empty(0), np.empty(0)
+    return Footprint(side, columns, state, start.astype(np.int32), items, faces, *at, NO_RIM, NO_BOXES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -60,6 +60,11 @@ class ModelLines:
         halves = [np.linalg.norm(np.diff(line, axis=0), axis=1) / 2.0 for line in self.originals]
         length = np.concatenate([np.r_[half, 0.0] + np.r_[0.0, half] for half in halves])
         return np.asarray(length / length.sum())
+
+    def with_rows(self, place: IntArray) -> ModelLines:
+        """Return the same lines of a model whose vertex i has become vertex ``place[i]``."""
+        chains = tuple(place[chain].astype(np.int64) for chain in self.chains)
+        return replace(self, chains=chains, added=np.sort(place[self.added]).astype(np.int64))
 
     @cached_property
     def hash(self) -> str:

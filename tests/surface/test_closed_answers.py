@@ -62,10 +62,10 @@ def test_the_pole_is_at_the_trunk_where_no_corner_is_sharp_or_seen_from_it_thing
     smooth = closed("blob:500")
     centre = smooth.points.mean(axis=0)
     away = np.linalg.norm(smooth.points - centre, axis=1)
-    assert away[smooth.model.pole].max() < np.median(away)
+    assert away[smooth.model.poles].max() < np.median(away)
     spiked = tube(30.0)
     model = closed_model(spiked)
-    assert np.abs(model.points[model.pole] - model.points.mean(axis=0)).max() < 5.0
+    assert np.abs(model.points[model.poles] - model.points.mean(axis=0)).max() < 5.0
 
 
 @pytest.mark.parametrize(("name", "most"), [("tetrahedron:17", 8), ("cube:17", 34), ("icosahedron:9", 44)])
@@ -80,7 +80,7 @@ def test_a_tetrahedron_in_a_ball_is_as_far_from_it_as_reckoned_by_hand():
     """Four points of the sphere: every other one is as far as the nearest face, edge or corner."""
     surface = closed("sphere:400")
     kept = surface.pinned.copy()
-    kept[np.argmax(np.linalg.norm(surface.points - surface.points[surface.model.pole[0]], axis=1))] = True
+    kept[np.argmax(np.linalg.norm(surface.points - surface.points[surface.model.poles[0, 0]], axis=1))] = True
     mesh = surface.simplify(kept)
     assert len(mesh.faces) == 4
     expected = distances(surface.points, surface.points, mesh.faces)
@@ -144,8 +144,8 @@ def test_a_model_turned_shifted_scaled_and_listed_otherwise_has_the_same_errors(
     one, other = (ClosedSurface(closed_model(mesh)) for mesh in (source, moved))
     for share in (0.02, 0.2, 0.6):
         in_file = rng.random(len(source.points)) < share
-        in_file[one.model.source_index[one.model.pole]] = True
-        assert set(listed[other.model.source_index[other.model.pole]]) <= set(np.flatnonzero(in_file))
+        in_file[one.model.source_index[one.model.poles]] = True
+        assert set(listed[other.model.source_index[other.model.poles]]) <= set(np.flatnonzero(in_file))
         first = one.simplify(in_file[one.model.source_index])
         second = other.simplify(in_file[listed][other.model.source_index])
         assert second.quality.triangles == first.quality.triangles

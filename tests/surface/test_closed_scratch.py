@@ -71,7 +71,7 @@ def test_the_error_is_that_of_a_slow_twin(share, seed):
     faces = mesh.faces.tolist()
     deviation = np.zeros(surface.n_vertices)
     for q in np.flatnonzero(~kept).tolist():
-        own = set(faces[holder(model.xy, faces, model.pole.tolist(), q)])
+        own = set(faces[holder(model.xy, faces, model.poles[0].tolist(), q)])
         around = [face for face in faces if len(own & set(face)) >= 2]
         deviation[q] = min(to_triangle(model.points[q], *model.points[face]) for face in around)
     np.testing.assert_allclose(mesh.deviation, deviation, rtol=1e-9, atol=1e-12)

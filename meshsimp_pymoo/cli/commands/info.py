@@ -224,7 +224,7 @@ def _as_closed(
     except ModelError as problem:
         return str(problem)
     least = shortest_edge(model.xy, model.faces)
-    flips, _ = faults(model.xy, model.faces, model.pole)
+    flips, _ = faults(model.xy, model.faces, model.poles)
     content |= {"flips": flips, "least_image_edge": least}
     rows["flattened"] = f"{flips} faces flipped, the shortest edge {least:.3g} of the plane's side"
     return None

@@ -13,7 +13,10 @@ MOST_TOUCHED = 48
 GONE, IN_CAVITY, CAME, BESIDE = 1, 2, 4, 8
 
 # Entries of ``tally``.
-END, N_FREE, N_SITES, N_GONE, N_CAME, N_BESIDE, N_LOG, N_LOOKED_AT = range(8)
+END, N_FREE, N_SITES, N_GONE, N_CAME, N_BESIDE, N_LOG, N_LOOKED_AT, N_IN_MESH, N_SHORT = range(10)
+
+# Of a site, as bits of ``idle``.
+UNUSED, LOOKED_AT = 1, 2
 
 # Where nobody asks for the maximum.
 NO_PEAKS = np.empty(0, np.float64)
@@ -33,6 +36,9 @@ class ClosedLive(NamedTuple):
     place: np.ndarray  # (N,) the triangle that holds a vertex; some triangle of a site
     squares: np.ndarray  # (N, 4) squared distance to the own triangle and those across its sides (inf: not nearer)
     site: np.ndarray  # (N,) whether the vertex is in the triangulation
+    uses: np.ndarray  # (N,) triangles of the mesh at each site, or (0,) where there are no holes
+    idle: np.ndarray  # (N,) whether a site is in no triangle of the mesh, by the books, or (0,)
+    of_part: np.ndarray  # (P,) sites of each part
     free: np.ndarray  # (2 N,) unused records
     mark: np.ndarray  # (2 N,) what an operation makes of each record
     gone: np.ndarray  # (2 N,) triangles that it takes away
@@ -56,10 +62,10 @@ class ClosedLive(NamedTuple):
     star_inserted: np.ndarray  # (N,)
     tally: np.ndarray  # numbers of things, see the names above
     amount: np.ndarray  # running sums, as in `surface.books`
-    peaks: np.ndarray  # (4 N,) tree of the largest deviations in each triangle, or (0,)
+    peaks: np.ndarray  # tree of the largest deviations in each triangle, then of sites in none, or (0,)
 
 
-def make_live(n_vertices: int) -> ClosedLive:
+def make_live(n_vertices: int, n_parts: int = 1, *, has_holes: bool = False) -> ClosedLive:
     """Return empty books for a model of that size; about 600 N bytes, of which only what is used becomes resident."""
     n = n_vertices + 4
     return ClosedLive(
@@ -71,6 +77,9 @@ def make_live(n_vertices: int) -> ClosedLive:
         place=np.empty(n, np.uint32),
         squares=np.empty((n, 4), np.float64),
         site=np.empty(n, np.uint8),
+        uses=np.empty(n if has_holes else 0, np.int32),
+        idle=np.empty(n if has_holes else 0, np.uint8),
+        of_part=np.empty(n_parts, np.int64),
         free=np.empty(2 * n, np.uint32),
         mark=np.zeros(2 * n, np.uint8),
         gone=np.empty(2 * n, np.uint32),
@@ -92,12 +101,12 @@ def make_live(n_vertices: int) -> ClosedLive:
         star_order=np.empty(n, np.int64),
         star_side=np.empty(n, np.int32),
         star_inserted=np.empty(n, np.uint8),
-        tally=np.zeros(8, np.int64),
+        tally=np.zeros(10, np.int64),
         amount=np.zeros(4, np.float64),
         peaks=NO_PEAKS,
     )
 
 
 def with_peaks(live: ClosedLive) -> ClosedLive:
-    """Return the books with room for the largest deviation of each triangle."""
-    return live._replace(peaks=np.zeros(2 * len(live.head)))
+    """Return the books with room for the largest deviation of each triangle, and of each site that none uses."""
+    return live._replace(peaks=np.zeros(2 * (len(live.head) + len(live.idle))))

@@ -66,6 +66,24 @@ def enter_plane(xyz: np.ndarray, a: int, b: int, c: int, planes: np.ndarray, k: 
 
 
 @inner(inline=True)
+def enter_no_plane(planes: np.ndarray, k: int) -> None:
+    """Write row k of ``planes`` so that it says of no point that it is far."""
+    planes[k, 0], planes[k, 1], planes[k, 2], planes[k, 3] = 0.0, 0.0, 0.0, 0.0
+
+
+@inner(inline=True)
+def enter_hole(planes: np.ndarray, k: int) -> None:
+    """Write row k of ``planes`` so that every point is infinitely far from it: the triangle is not in the mesh."""
+    planes[k, 0], planes[k, 1], planes[k, 2], planes[k, 3] = 0.0, 0.0, 0.0, np.inf
+
+
+@inner(inline=True)
+def is_in_mesh(planes: np.ndarray, k: int) -> bool:
+    """Whether row k of ``planes`` is none of a triangle in a hole."""
+    return planes[k, 3] < np.inf
+
+
+@inner(inline=True)
 def nearer(
     xyz: np.ndarray, planes: np.ndarray, k: int, a: int, b: int, c: int, x: float, y: float, z: float, known: float
 ) -> float:

@@ -1,14 +1,19 @@
-"""A closed mesh of genus 0 flattened once: every vertex gets an image in the plane, and no face is turned over.
+"""A mesh of genus 0 flattened once, part by part: every vertex gets an image in the plane, and no face is turned over.
 
-One original face, the *pole*, is the outside: its vertices are the corners of a triangle that holds all other images.
-They are part of every mesh, so it is a face at the sharpest corner, which every mesh wants, if there is a sharp one and
-nothing gets too small as seen from there; else one at the trunk, from where limbs shrink least. Each of the others
-is the weighted mean of those of its neighbours. With positive weights no face flips (Tutte [1]_); these are the
+Holes are closed first, each by a *virtual vertex* amid its rim and a fan of triangles, for as long as it takes to
+flatten the rest.
+
+One original face of each part, its *pole*, is the outside: its vertices are the corners of a triangle that holds all
+other images. They are part of every mesh, so it is a face at the sharpest corner, which every mesh wants, if there is a
+sharp one and nothing gets too small as seen from there; else one at the trunk, from where limbs shrink least. Each of
+the others is the weighted mean of those of its neighbours. With positive weights no face flips (Tutte [1]_); these are the
 cotangent weights, which make angles in the plane like those on the surface (Pinkall and Polthier [2]_), bounded from
 below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
 
 Seen from the top of a sphere that the plane touches below, these are images on the sphere (stereographically); the
 Delaunay triangulation of any of them with the outside as one more triangle is the convex hull there.
+
+Several parts lie beside each other, each in a square of its own.
 
 References
 ----------
@@ -25,10 +30,11 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.order import unit_square
 from meshsimp_pymoo.plane.predicates import orient_sign
+from meshsimp_pymoo.surface.edges import Edges, components
 
 # Weights are at least this share of their median, and at most its inverse.
 LEAST_SHARE = 1e-3
@@ -48,17 +54,22 @@ class Embedding(NamedTuple):
     Attributes
     ----------
     xy : (N, 2) float array
-        In the unit square, multiples of 2**-52; those of the pole are the corners of the hull.
-    pole : (3,) int array
-        The vertices of the face that is the outside, clockwise in the plane.
+        In the unit square, multiples of 2**-52; those of a pole are the corners of the hull of its part.
+    poles : (P, 3) int array
+        For each of P parts the vertices of the face that is its outside, clockwise in the plane.
+    n_flipped, n_coinciding : int
+        How many faces, those that close holes among them, are flat or flipped in the plane, and how many images
+        coincide with another one: it is an embedding if there are none.
     """
 
     xy: FloatArray
-    pole: IntArray
+    poles: IntArray
+    n_flipped: int
+    n_coinciding: int
 
 
-def embed(points: FloatArray, faces: IntArray) -> Embedding:
-    """Flatten a closed mesh of genus 0.
+def embed(points: FloatArray, faces: IntArray, part: IntArray) -> Embedding:
+    """Flatten a mesh whose parts are of genus 0 once their holes are closed.
 
     Parameters
     ----------
@@ -66,22 +77,76 @@ def embed(points: FloatArray, faces: IntArray) -> Embedding:
         The vertices, in an order that does not depend on the file: the last bits of the images do.
     faces : (T, 3) int array
         The triangles, wound alike.
+    part : (N,) int array
+        Which part each vertex belongs to: 0, 1, ...
 
     Returns
     -------
     Embedding
-        The images that floating point gives; see :func:`faults` for whether they are an embedding.
+        The images that floating point gives.
     """
-    corner = _sharp_face(points, faces)
+    n, n_faces, n_parts = len(points), len(faces), int(part.max()) + 1
+    centres, fans = closed_holes(points, faces)
+    part_of_hole = np.empty(len(centres), np.int64)
+    part_of_hole[fans[:, 2] - n] = part[fans[:, 0]]
+    points, part = np.concatenate([points, centres]), np.concatenate([part, part_of_hole])
+    faces = np.concatenate([faces, fans])
+    # a pole beside a hole would have nothing of the surface beside it there
+    whole = np.ones(len(points), bool)
+    whole[fans] = False
+    whole_faces = whole[faces].all(axis=1)
+    side = 2 ** int(np.ceil(0.5 * np.log2(n_parts)))
+    xy, poles, place = np.empty((len(points), 2)), np.empty((n_parts, 3), np.int64), np.empty(len(points), np.int64)
+    for k, (rows, own) in enumerate(zip(_by_number(part), _by_number(part[faces[:, 0]]), strict=True)):
+        place[rows] = np.arange(len(rows))
+        inner = np.flatnonzero(whole_faces[own])
+        allowed = inner if len(inner) else np.flatnonzero(own < n_faces)
+        found, pole = _part_embedded(points[rows], place[faces[own]], allowed)
+        xy[rows] = (np.array(divmod(k, side)) + found) / side + 1.0 - 1.0  # rounded as all images are
+        poles[k] = rows[pole]
+    return Embedding(xy[:n], poles, *faults(xy, faces, poles))
+
+
+def _by_number(number: IntArray) -> list[IntArray]:
+    """Return which entries have the number 0, which 1, ..."""
+    return np.split(np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))[:-1])
+
+
+def _part_embedded(points: FloatArray, faces: IntArray, allowed: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return the images of one part without holes, and its pole, which is among the allowed faces."""
+    corner = _sharp_face(points, faces, allowed)
     if corner is not None:
-        found = _embedded(points, faces, faces[corner].astype(np.int64))
-        if shortest_edge(found.xy, faces) >= LEAST_EDGE and faults(found.xy, faces, found.pole) == (0, 0):
-            return found
-    return _embedded(points, faces, faces[_trunk_face(points, faces)].astype(np.int64))
+        pole = faces[corner].astype(np.int64)
+        xy = _embedded(points, faces, pole)
+        if shortest_edge(xy, faces) >= LEAST_EDGE and faults(xy, faces, pole[None]) == (0, 0):
+            return xy, pole
+    pole = faces[_trunk_face(points, faces, allowed)].astype(np.int64)
+    return _embedded(points, faces, pole), pole
 
 
-def _embedded(points: FloatArray, faces: IntArray, pole: IntArray) -> Embedding:
-    """Flatten a closed mesh with this face for the outside."""
+def closed_holes(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return the virtual vertices (H, 3) amid the rims of holes, and the faces (E, 3) from rims to them.
+
+    No two rims may meet, and the virtual vertices are numbered from behind the others on. A rim's is the mean of its
+    edges by length.
+    """
+    edges = Edges.of(faces)
+    if len(edges.border) == 0:
+        return np.empty((0, 3)), np.empty((0, 3), np.int64)
+    ends = edges.ends(np.sort(edges.border))
+    number = np.full(len(points), -1)
+    rim = np.unique(ends)
+    number[rim] = np.arange(len(rim))
+    hole = components(len(rim), number[ends[:, 0]], number[ends[:, 1]])[number[ends[:, 0]]]
+    length = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1)
+    middle = points[ends].mean(axis=1)
+    whole = np.maximum(np.bincount(hole, length), 1e-300)
+    centres = np.column_stack([np.bincount(hole, length * middle[:, k]) / whole for k in range(3)])
+    return centres, np.column_stack([ends[:, 1], ends[:, 0], len(points) + hole])
+
+
+def _embedded(points: FloatArray, faces: IntArray, pole: IntArray) -> FloatArray:
+    """Return the images of a closed mesh with this face for the outside."""
     inner = np.ones(len(points), bool)
     inner[pole] = False
     rows = np.flatnonzero(inner)
@@ -100,10 +165,10 @@ def _embedded(points: FloatArray, faces: IntArray, pole: IntArray) -> Embedding:
     xy = xy @ _unsheared(points, faces, xy, pole)
     xy -= xy[pole].min(axis=0)
     xy *= (1.0 - MARGIN) / xy[pole].max()
-    return Embedding(unit_square(xy)[1], pole)
+    return unit_square(xy)[1]
 
 
-def faults(xy: FloatArray, faces: IntArray, pole: IntArray) -> tuple[int, int]:
+def faults(xy: FloatArray, faces: IntArray, poles: IntArray) -> tuple[int, int]:
     """Return how many faces are flat or flipped in the plane, and how many images coincide with another one.
 
     Parameters
@@ -111,12 +176,23 @@ def faults(xy: FloatArray, faces: IntArray, pole: IntArray) -> tuple[int, int]:
     xy : (N, 2) float array
         Images, multiples of 2**-52 in the unit square.
     faces : (T, 3) int array
-    pole : (3,) int array
-        The face that is the outside.
+    poles : (P, 3) int array
+        The faces that are the outside of a part.
     """
-    outside = (np.sort(faces, axis=1) == np.sort(pole)).all(axis=1)
-    flipped = _n_flipped(np.ascontiguousarray(xy).ravel(), np.ascontiguousarray(faces[~outside], np.int64))
-    return int(flipped), len(xy) - len(np.unique(np.ascontiguousarray(xy).view(np.complex128)))
+    inside = np.ascontiguousarray(faces[~are_poles(faces, poles)], np.int64)
+    return int(_n_flipped(np.ascontiguousarray(xy).ravel(), inside)), _n_coinciding(xy)
+
+
+def are_poles(faces: IntArray, poles: IntArray) -> BoolArray:
+    """Tell which of the faces (T, 3) are among the poles (P, 3)."""
+    of_pole = np.full(int(max(faces.max(), poles.max())) + 1, -1)
+    of_pole[poles] = np.arange(len(poles))[:, None]
+    pole = of_pole[faces]
+    return np.asarray((pole[:, 0] >= 0) & (pole == pole[:, :1]).all(axis=1))
+
+
+def _n_coinciding(xy: FloatArray) -> int:
+    return len(xy) - len(np.unique(np.ascontiguousarray(xy).view(np.complex128)))
 
 
 def shortest_edge(xy: FloatArray, faces: IntArray) -> float:
@@ -134,8 +210,10 @@ def _n_flipped(xy: np.ndarray, faces: np.ndarray) -> int:
     return n
 
 
-def _sharp_face(points: FloatArray, faces: IntArray) -> int | None:
-    """Return the face of the widest angle at the vertex whose angles lack most of a full turn; None if none lacks much.
+def _sharp_face(points: FloatArray, faces: IntArray, allowed: IntArray) -> int | None:
+    """Return the allowed face of the widest angle at the vertex whose angles lack most of a full turn.
+
+    None if none lacks much. Only vertices of allowed faces count.
 
     However the model is turned or listed it is the same one, but where several are alike.
     """
@@ -145,19 +223,22 @@ def _sharp_face(points: FloatArray, faces: IntArray) -> int | None:
         u, v = sides[k], -sides[k - 1]
         angles[:, k] = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
     lacks = 2.0 * np.pi - np.bincount(faces.ravel(), angles.ravel(), len(points))
-    sharpest = int(np.argmax(lacks))
+    is_allowed = np.zeros(len(points), bool)
+    is_allowed[faces[allowed]] = True
+    sharpest = int(np.argmax(np.where(is_allowed, lacks, -np.inf)))
     if lacks[sharpest] < SHARP:
         return None
-    return int(np.argmax(np.where(faces == sharpest, angles, 0.0).max(axis=1)))
+    there = np.where(faces[allowed] == sharpest, angles[allowed], 0.0).max(axis=1)
+    return int(allowed[np.argmax(there)])
 
 
-def _trunk_face(points: FloatArray, faces: IntArray) -> int:
-    """Return the face nearest to the centroid of the surface."""
+def _trunk_face(points: FloatArray, faces: IntArray, allowed: IntArray) -> int:
+    """Return the allowed face nearest to the centroid of the surface."""
     a, b, c = (points[faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     centres = (a + b + c) / 3.0
     away = centres - (area[:, None] * centres).sum(axis=0) / area.sum()
-    return int(np.argmin((away**2).sum(axis=1)))
+    return int(allowed[np.argmin((away[allowed] ** 2).sum(axis=1))])
 
 
 def _weights(points: FloatArray, faces: IntArray) -> sparse.csr_matrix:
@@ -186,7 +267,7 @@ def _unsheared(points: FloatArray, faces: IntArray, xy: FloatArray, pole: IntArr
     With J the derivative of the image on a face, J J^T / det J is the identity where shapes are kept. Its mean over the
     surface becomes that.
     """
-    inside = ~(np.sort(faces, axis=1) == np.sort(pole)).all(axis=1)
+    inside = ~are_poles(faces, pole[None])
     a, b, c = (points[faces[inside, k]] for k in range(3))
     pa, pb, pc = (xy[faces[inside, k]] for k in range(3))
     u, v = b - a, c - a

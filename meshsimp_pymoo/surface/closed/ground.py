@@ -6,8 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.plane.constraints import NO_CONSTRAINTS, Constraints
+from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.plane.constraints import Constraints, make_constraints
+from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.predicates import exact_ranges
+from meshsimp_pymoo.surface.closed.distance import squared_distance
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.rules import Rules
@@ -21,10 +25,13 @@ class ClosedGround(NamedTuple):
 
     xy: np.ndarray  # (2 N,) images in the unit square
     xyz: np.ndarray  # (3 N,) the vertices [model units]
-    pole: np.ndarray  # (3,) vertices of the face that is the outside
+    poles: np.ndarray  # (3 P,) vertices of the faces that are the outside of each part
+    part: np.ndarray  # (N,) which part each vertex belongs to, or (0,): all to one
+    footprint: Footprint  # where in the plane the surface is; of side 0 if it has no holes
+    far: np.ndarray  # (N,) how far each vertex is from the pole of its part, or (0,) where there are no holes
     exact_area: float  # up to where double precision is exact, see plane.predicates
     exact_lift: float
-    lines: Constraints  # forced edges: none
+    lines: Constraints  # forced edges: of the poles, if there are several, and of break lines
     weight: np.ndarray  # (N,) what each cost is multiplied by, or (0,): 1
     weighed: bool  # whether the cost of a vertex in a sum is not d_p itself, but what weighed_cost makes of it
     power: int  # to which d_p counts in it: 1, 2 or 8
@@ -42,10 +49,13 @@ def make_ground(model: ClosedModel, rules: Rules) -> ClosedGround:
     return ClosedGround(
         xy=np.ascontiguousarray(model.xy).ravel(),
         xyz=np.ascontiguousarray(model.points).ravel(),
-        pole=np.ascontiguousarray(model.pole, np.int64),
+        poles=np.ascontiguousarray(model.poles, np.int64).ravel(),
+        part=np.ascontiguousarray(model.part, np.int32) if model.n_parts > 1 else np.empty(0, np.int32),
+        footprint=model.footprint,
+        far=_to_poles(model) if len(model.rim) else np.empty(0),
         exact_area=area,
         exact_lift=lift,
-        lines=NO_CONSTRAINTS,
+        lines=_forced_edges(model),
         weight=weight,
         weighed=power > 1 or len(weight) > 0,
         power=power,
@@ -54,3 +64,31 @@ def make_ground(model: ClosedModel, rules: Rules) -> ClosedGround:
         bound=np.inf,
         by_peak=not OBJECTIVES[rules.measure].is_sum,
     )
+
+
+def _to_poles(model: ClosedModel) -> FloatArray:
+    """Return how far each vertex is from the pole of its part, which every mesh has."""
+    far = np.empty(model.n_vertices)
+    _enter_distances(np.ascontiguousarray(model.points).ravel(), model.poles, model.part.astype(np.int64), far)
+    return far
+
+
+@entry
+def _enter_distances(xyz: np.ndarray, poles: np.ndarray, part: np.ndarray, far: np.ndarray) -> None:
+    for i in range(len(far)):
+        a, b, c = poles[part[i], 0], poles[part[i], 1], poles[part[i], 2]
+        far[i] = np.sqrt(squared_distance(xyz, a, b, c, xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]))
+
+
+def _forced_edges(model: ClosedModel) -> Constraints:
+    """Return the edges that keep parts apart, and those of break lines."""
+    segments = [np.empty((0, 2), np.int64)] if model.lines is None else [model.lines.segments]
+    n_between = 0
+    if model.n_parts > 1:
+        between = np.stack([model.poles, np.roll(model.poles, -1, axis=1)], axis=2).reshape(-1, 2)
+        segments.insert(0, between)
+        n_between = len(between)
+    found = make_constraints(model.xy, np.concatenate(segments), model.footprint)
+    # what holds an edge of a pole in the mesh is the pole, and it lies on the left of where no other triangle counts
+    found.left[:n_between] = 1
+    return found

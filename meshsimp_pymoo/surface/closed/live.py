@@ -5,6 +5,9 @@ there is no outline: the corners of the hull are pinned, so all triangles are pa
 depends on the triangles across the edges of its own too: those *beside* the changed ones are costed again, for the
 sides that have changed alone.
 
+Where there are holes, some triangles are no part of the mesh, and a site that no triangle of the mesh uses is in none:
+it costs as a vertex does that lies in a hole (see `closed.evaluate`). What lies between parts never changes.
+
 A change that is tried is made in the records of the triangles, every write into which is logged, and taken back; the
 lists of the vertices are left as they are.
 """
@@ -17,8 +20,17 @@ from meshsimp_pymoo.arrays import IntArray
 from meshsimp_pymoo.compiling.functions import entry, inner
 from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.conflict import conflict, turn
+from meshsimp_pymoo.plane.constraints import constrain
 from meshsimp_pymoo.plane.stars import cavity_of, triangles_around
-from meshsimp_pymoo.plane.triangulation import INFINITE, LAST_INDEX, RECORD, TRIANGLE, locate, triangulate
+from meshsimp_pymoo.plane.triangulation import (
+    INFINITE,
+    LAST_INDEX,
+    RECORD,
+    TRIANGLE,
+    locate,
+    locate_at_random,
+    triangulate,
+)
 from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.books import COVERED_ERROR as COST
 from meshsimp_pymoo.surface.books import LARGEST, PEAK
@@ -28,18 +40,22 @@ from meshsimp_pymoo.surface.closed.books import (
     END,
     GONE,
     IN_CAVITY,
+    LOOKED_AT,
     MOST_TOUCHED,
     N_BESIDE,
     N_CAME,
     N_FREE,
     N_GONE,
+    N_IN_MESH,
     N_LOG,
     N_LOOKED_AT,
+    N_SHORT,
     N_SITES,
+    UNUSED,
     ClosedLive,
 )
-from meshsimp_pymoo.surface.closed.distance import enter_plane, nearer, squared_distance
-from meshsimp_pymoo.surface.closed.evaluate import holder
+from meshsimp_pymoo.surface.closed.distance import is_in_mesh, nearer, squared_distance
+from meshsimp_pymoo.surface.closed.evaluate import enter_outside, enter_triangle, holder, is_outside, pole_of
 from meshsimp_pymoo.surface.closed.ground import ClosedGround
 from meshsimp_pymoo.surface.closed.model import LEAST_VERTICES
 from meshsimp_pymoo.surface.costs import counts, enter_peak, noted_cost, weighed_cost
@@ -51,11 +67,14 @@ from meshsimp_pymoo.surface.trial import ears_of
 
 
 @inner(inline=True)
-def _corners(g: ClosedGround, mesh: np.ndarray, t: int) -> tuple[int, int, int]:
-    """Return the vertices of triangle t; those of the outside where it is a ghost."""
+def _corners(g: ClosedGround, mesh: np.ndarray, t: int, i: int) -> tuple[int, int, int]:
+    """Return the vertices of triangle t, at vertex i or beside it; those of its pole where t is outside."""
     if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX:
-        return np.int64(g.pole[0]), np.int64(g.pole[1]), np.int64(g.pole[2])
-    return np.int64(mesh[t]), np.int64(mesh[t + 1]), np.int64(mesh[t + 2])
+        return pole_of(g, i)
+    a, b, c = np.int64(mesh[t]), np.int64(mesh[t + 1]), np.int64(mesh[t + 2])
+    if is_outside(g.part, a, b, c):
+        return pole_of(g, i)
+    return a, b, c
 
 
 @inner
@@ -63,7 +82,7 @@ def _enter_square(g: ClosedGround, live: ClosedLive, t: int, side: int, i: int, 
     """Write how far vertex i of triangle t is from the triangle across a side into a row of ``squares``."""
     xyz = g.xyz
     s = np.int64(live.mesh[t + side + 4]) & TRIANGLE
-    a, b, c = _corners(g, live.mesh, s)
+    a, b, c = _corners(g, live.mesh, s, i)
     live.squares[row, side + 1] = nearer(
         xyz, live.planes, s >> 3, a, b, c, xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2], live.squares[row, 0]
     )
@@ -73,17 +92,20 @@ def _enter_square(g: ClosedGround, live: ClosedLive, t: int, side: int, i: int, 
 def _enter_squares(g: ClosedGround, live: ClosedLive, t: int, i: int, row: int) -> None:
     """Write how far vertex i is from triangle t, which holds it, and those across its sides."""
     xyz = g.xyz
-    a, b, c = _corners(g, live.mesh, t)
-    live.squares[row, 0] = squared_distance(xyz, a, b, c, xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2])
+    live.squares[row, 0] = np.inf
+    if is_in_mesh(live.planes, t >> 3):
+        a, b, c = _corners(g, live.mesh, t, i)
+        live.squares[row, 0] = squared_distance(xyz, a, b, c, xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2])
     for side in range(3):
         _enter_square(g, live, t, side, i, row)
 
 
 @inner(inline=True)
-def _deviation(live: ClosedLive, row: int) -> float:
-    """Return d_p of what a row of ``squares`` is about."""
+def _deviation(g: ClosedGround, live: ClosedLive, i: int, row: int) -> float:
+    """Return d_p of vertex i, which a row of ``squares`` is about."""
     squares = live.squares
-    return np.sqrt(min(min(squares[row, 0], squares[row, 1]), min(squares[row, 2], squares[row, 3])))
+    least = min(min(squares[row, 0], squares[row, 1]), min(squares[row, 2], squares[row, 3]))
+    return np.sqrt(least) if least < np.inf or len(g.far) == 0 else g.far[i]
 
 
 @inner
@@ -135,9 +157,21 @@ def _link(live: ClosedLive, h: int, twin: int, logged: bool) -> None:
 
 
 @inner(inline=True)
+def _count_use(live: ClosedLive, t: int, change: int) -> None:
+    """Count a triangle of the mesh that comes, 1, or goes, -1, at its corners."""
+    mesh = live.mesh
+    live.tally[N_IN_MESH] += change
+    if len(live.uses) > 0:
+        for k in range(3):
+            live.uses[mesh[t + k]] += change
+
+
+@inner(inline=True)
 def _note_gone(live: ClosedLive, t: int, logged: bool) -> None:
     """List a triangle among those that go."""
     n = live.tally[N_GONE]
+    if is_in_mesh(live.planes, t >> 3):
+        _count_use(live, t, -1)
     live.gone[n] = t
     live.mark[t >> 3] |= GONE
     if logged:
@@ -188,9 +222,14 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
     if w >= 0:
         t0 = np.int64(live.place[w])
         if mark[t0 >> 3] & GONE:
+            lined = len(g.lines.at) > 0  # conflict is for those that w sees
             for k in range(n_ears):
                 t0 = np.int64(gone[k])
-                if conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift):
+                if (
+                    _holds(g, live, t0, w)
+                    if lined
+                    else conflict(g.xy, mesh[t0], mesh[t0 + 1], mesh[t0 + 2], w, g.exact_area, g.exact_lift)
+                ):
                     break
         n_cavity, n_rim = cavity_of(g.xy, mesh, t0, w, cavity, rim, live.stack, g.lines, g.exact_area, g.exact_lift)
         for k in range(n_cavity):
@@ -230,8 +269,8 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
         mark[np.int64(came[k]) >> 3] |= CAME
     for k in range(tally[N_CAME]):
         t = np.int64(came[k])
-        a, b, c = np.int64(mesh[t]), np.int64(mesh[t + 1]), np.int64(mesh[t + 2])
-        enter_plane(g.xyz, a, b, c, live.planes, t >> 3)
+        if enter_triangle(g, live.planes, t >> 3, np.int64(mesh[t]), np.int64(mesh[t + 1]), np.int64(mesh[t + 2])):
+            _count_use(live, t, 1)
         for e in range(3):
             h = np.int64(mesh[t + e + 4])
             s = h & TRIANGLE
@@ -269,7 +308,54 @@ def _cost_beside(g: ClosedGround, live: ClosedLive, s: int, i: int, row: int) ->
     for k in range(3):
         if bits & (1 << k):
             _enter_square(g, live, s, k, i, row)
-    return _deviation(live, row)
+    return _deviation(g, live, i, row)
+
+
+@inner(inline=True)
+def _idle_cost(g: ClosedGround, i: int) -> float:
+    """Return the cost of a site that no triangle of the mesh uses."""
+    d = g.far[i]
+    return weighed_cost(g, d, i) if g.weighed else d
+
+
+@inner
+def _tried_idle(g: ClosedGround, live: ClosedLive, v: int) -> float:
+    """Return by how much more the sites at the changed triangles cost that no triangle of the mesh uses."""
+    idle, uses = live.idle, live.uses
+    change = 0.0
+    if v >= 0 and idle[v] & UNUSED:
+        change -= _idle_cost(g, v)
+    for k in range(live.tally[N_CAME]):
+        t = np.int64(live.came[k])
+        for e in range(3):
+            i = np.int64(live.mesh[t + e])
+            if idle[i] & LOOKED_AT:
+                continue
+            idle[i] |= LOOKED_AT
+            was = live.site[i] != 0 and idle[i] & UNUSED != 0
+            if uses[i] == 0:
+                change += noted_cost(g, live, g.far[i], i)
+            if was:
+                change -= _idle_cost(g, i)
+    for k in range(live.tally[N_CAME]):
+        t = np.int64(live.came[k])
+        for e in range(3):
+            idle[np.int64(live.mesh[t + e])] &= UNUSED
+    return change
+
+
+@inner
+def _enter_idle(g: ClosedGround, live: ClosedLive, i: int) -> None:
+    """Enter whether any triangle of the mesh uses vertex i, if it is a site, and what it costs if none does."""
+    idle = live.idle
+    is_idle = live.site[i] != 0 and live.uses[i] == 0
+    if idle[i] & UNUSED and not is_idle:
+        live.amount[COST] -= _idle_cost(g, i)
+    elif is_idle and not idle[i] & UNUSED:
+        live.amount[COST] += noted_cost(g, live, g.far[i], i)
+    idle[i] = UNUSED if is_idle else 0
+    if len(live.peaks) > 0:
+        enter_peak(live, len(live.head) + i, g.far[i] if is_idle and counts(g, i) else 0.0)
 
 
 @inner
@@ -283,6 +369,8 @@ def _tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> f
         change -= live.subtotal[np.int64(live.gone[k]) >> 3]
     for k in range(tally[N_BESIDE]):
         change -= live.subtotal[np.int64(live.beside[k]) >> 3]
+    if len(live.idle) > 0:
+        change += _tried_idle(g, live, v)
     q = 0
     for k in range(-1, tally[N_GONE]):
         # the vertices of the triangles that go, and v itself
@@ -291,7 +379,7 @@ def _tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> f
             if i != w:
                 q = _holder_among_new(g, live, q, i)
                 _enter_squares(g, live, np.int64(live.came[q]), i, scratch)
-                change += noted_cost(g, live, _deviation(live, scratch), i)
+                change += noted_cost(g, live, _deviation(g, live, i, scratch), i)
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
         if change > limit:
             return np.inf
@@ -312,11 +400,18 @@ def _tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> f
 def _undo(live: ClosedLive, n_free: int, end: int) -> None:
     """Take back what :func:`_replace` made, with a log."""
     tally = live.tally
+    for k in range(tally[N_CAME]):
+        t = np.int64(live.came[k])
+        if is_in_mesh(live.planes, t >> 3):
+            _count_use(live, t, -1)
     for k in range(tally[N_LOG] - 1, -1, -1):
         live.mesh[live.log_at[k]] = live.log_value[k]
     for k in range(tally[N_GONE]):
+        t = np.int64(live.gone[k])
         for e in range(4):
-            live.planes[np.int64(live.gone[k]) >> 3, e] = live.saved[k, e]
+            live.planes[t >> 3, e] = live.saved[k, e]
+        if is_in_mesh(live.planes, t >> 3):
+            _count_use(live, t, 1)
     _unmark(live)
     tally[N_FREE] = n_free
     tally[END] = end
@@ -333,6 +428,7 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
     if v >= 0:
         live.site[v] = 0
         tally[N_SITES] -= 1
+        _count_site(g, live, v, -1)
         pool[n] = v
         n += 1
     for k in range(tally[N_GONE]):
@@ -351,6 +447,7 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
     if w >= 0:
         live.site[w] = 1
         tally[N_SITES] += 1
+        _count_site(g, live, w, 1)
     for k in range(tally[N_CAME]):
         t = np.int64(live.came[k])
         head[t >> 3] = -1
@@ -367,7 +464,7 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
         place[i] = t
         following[i] = head[r]
         head[r] = i
-        d = noted_cost(g, live, _deviation(live, i), i)
+        d = noted_cost(g, live, _deviation(g, live, i, i), i)
         subtotal[r] += d
         amount[COST] += d
     for k in range(tally[N_BESIDE]):
@@ -380,6 +477,13 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
             subtotal[r] += noted_cost(g, live, _cost_beside(g, live, s, i, i), i)
             i = np.int64(following[i])
         amount[COST] += subtotal[r]
+    if len(live.idle) > 0:
+        if v >= 0:
+            _enter_idle(g, live, v)
+        for k in range(tally[N_CAME]):
+            t = np.int64(live.came[k])
+            for e in range(3):
+                _enter_idle(g, live, np.int64(mesh[t + e]))
     if with_peaks:
         for k in range(tally[N_CAME]):
             r = np.int64(live.came[k]) >> 3
@@ -394,7 +498,28 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
         amount[COST] = 0.0
         for r in range(tally[END] >> 3):
             amount[COST] += subtotal[r]
+        for i in range(len(live.idle)):
+            if live.idle[i] & UNUSED:
+                amount[COST] += _idle_cost(g, i)
         amount[PEAK] = amount[COST]
+
+
+@inner(inline=True)
+def _count_site(g: ClosedGround, live: ClosedLive, i: int, change: int) -> None:
+    """Count a site of a part that comes, 1, or goes, -1."""
+    part = np.int64(g.part[i]) if len(g.part) > 0 else np.int64(0)
+    n = live.of_part[part] + change
+    live.of_part[part] = n
+    if n == LEAST_VERTICES - (change < 0):
+        live.tally[N_SHORT] -= change
+
+
+@inner(inline=True)
+def _may_go(g: ClosedGround, live: ClosedLive, v: int, w: int) -> bool:
+    """Whether enough sites are left of the part of v, once it has gone and vertex w has come."""
+    if len(g.part) == 0:
+        return w >= 0 or live.tally[N_SITES] > LEAST_VERTICES
+    return (w >= 0 and g.part[v] == g.part[w]) or live.of_part[g.part[v]] > LEAST_VERTICES
 
 
 @inner
@@ -404,7 +529,7 @@ def _peak_in(g: ClosedGround, live: ClosedLive, r: int) -> float:
     i = np.int64(live.head[r])
     while i >= 0:
         if counts(g, i):
-            peak = max(peak, _deviation(live, i))
+            peak = max(peak, _deviation(g, live, i, i))
         i = np.int64(live.following[i])
     return peak
 
@@ -430,7 +555,7 @@ def _degree(live: ClosedLive, v: int, most: int) -> int:
 
 @inner(inline=True)
 def _total(live: ClosedLive) -> float:
-    return live.amount[COST] if live.tally[N_SITES] >= LEAST_VERTICES else np.inf
+    return live.amount[COST] if live.tally[N_SHORT] == 0 else np.inf
 
 
 @answers(moves.exchange, ClosedGround)
@@ -438,7 +563,7 @@ def _total(live: ClosedLive) -> float:
 def exchange(g: ClosedGround, live: ClosedLive, v: int, w: int) -> bool:
     """Remove site v and insert vertex w, either of them -1 for none; return False if v cannot go."""
     live.amount[LARGEST] = 0.0
-    if v >= 0 and w < 0 and live.tally[N_SITES] <= LEAST_VERTICES:
+    if v >= 0 and not _may_go(g, live, v, w):
         return False
     if not _replace(g, live, v, w, False):
         return False
@@ -447,20 +572,20 @@ def exchange(g: ClosedGround, live: ClosedLive, v: int, w: int) -> bool:
 
 
 @inner
-def _done_and_undone(g: ClosedGround, live: ClosedLive, v: int, w: int) -> float:
+def _done_and_undone(g: ClosedGround, live: ClosedLive, v: int, w: int) -> tuple[float, int]:
     amount = live.amount
-    cost, peak = amount[COST], amount[PEAK]
+    cost, peak, n_before = amount[COST], amount[PEAK], live.tally[N_IN_MESH]
     amount[PEAK] = 0.0  # nothing is added up anew for a mere trial
     if not exchange(g, live, v, w):
         amount[PEAK] = peak
-        return np.inf
-    change = amount[COST] - cost
+        return np.inf, 0
+    change, triangles = amount[COST] - cost, live.tally[N_IN_MESH] - n_before
     largest = amount[LARGEST]
     amount[PEAK] = 0.0
     exchange(g, live, w, v)
     # the sums are what they were, without the rounding of having come and gone
     amount[COST], amount[PEAK], amount[LARGEST] = cost, peak, largest
-    return change
+    return change, triangles
 
 
 @answers(moves.try_exchange, ClosedGround)
@@ -471,16 +596,16 @@ def try_exchange(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float
     Infinite where v cannot go, and where the change is found to exceed ``limit`` before it is known.
     """
     tally = live.tally
-    triangles = 2 * (np.int64(w >= 0) - np.int64(v >= 0))
+    n_before = tally[N_IN_MESH]
     live.amount[LARGEST] = 0.0
     tally[N_LOOKED_AT] = 0
     if v >= 0:
-        if w < 0 and tally[N_SITES] <= LEAST_VERTICES:
+        if not _may_go(g, live, v, w):
             return np.inf, 0
         tally[N_LOOKED_AT] = _degree(live, v, MOST_TOUCHED)
         if tally[N_LOOKED_AT] > MOST_TOUCHED:
             tally[N_LOOKED_AT] = _degree(live, v, len(live.site))
-            return _done_and_undone(g, live, v, w), triangles
+            return _done_and_undone(g, live, v, w)
     if w >= 0:
         # how many are in conflict with w is known by looking; the star of v makes at most so many more
         n_cavity, _ = cavity_of(
@@ -496,10 +621,11 @@ def try_exchange(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float
             g.exact_lift,
         )
         if n_cavity > MOST_TOUCHED:
-            return _done_and_undone(g, live, v, w), triangles
+            return _done_and_undone(g, live, v, w)
     n_free, end = tally[N_FREE], tally[END]
     if not _replace(g, live, v, w, True):
         return np.inf, 0
+    triangles = tally[N_IN_MESH] - n_before
     change = _tried(g, live, v, w, limit)
     _undo(live, n_free, end)
     return change, triangles
@@ -516,7 +642,7 @@ def total_cost(g: ClosedGround, live: ClosedLive) -> float:
 @inner(inline=True)
 def error_now(g: ClosedGround, live: ClosedLive) -> float:
     """Sum of the costs, or the largest deviation where the books know it; inf where there is no mesh."""
-    return live.peaks[1] if len(live.peaks) > 0 and live.tally[N_SITES] >= LEAST_VERTICES else _total(live)
+    return live.peaks[1] if len(live.peaks) > 0 and live.tally[N_SHORT] == 0 else _total(live)
 
 
 @answers(moves.ranked, ClosedGround)
@@ -530,8 +656,7 @@ def _ranked(g: ClosedGround, live: ClosedLive, change: float) -> tuple[float, fl
 @answers(moves.n_triangles, ClosedGround)
 @inner(inline=True)
 def _n_triangles(g: ClosedGround, live: ClosedLive) -> int:
-    n = live.tally[N_SITES]
-    return 2 * n - 4 if n >= LEAST_VERTICES else 0
+    return live.tally[N_IN_MESH] if live.tally[N_SHORT] == 0 else 0
 
 
 @answers(moves.n_sites, ClosedGround)
@@ -614,7 +739,7 @@ def _worst_in(g: ClosedGround, live: ClosedLive, cell: int) -> tuple[int, float,
     most = 0.0
     i = np.int64(live.head[cell])
     while i >= 0:
-        d = _deviation(live, i)
+        d = _deviation(g, live, i, i)
         if len(live.peaks) > 0:
             d = d if counts(g, i) else 0.0
         elif g.weighed:
@@ -647,6 +772,10 @@ def _build_closed(
     end = triangulate(site_xy, len(sites), first, order, inserted, mesh, g.exact_area, g.exact_lift)
     if end == 0:
         return False
+    lined = len(g.lines.at) > 0
+    if lined:
+        n = len(sites)
+        constrain(site_xy, mesh, end, g.lines, sites, n, live.place, g.exact_area, g.exact_lift)
     tally[:] = 0
     live.amount[:] = 0.0
     live.peaks[:] = 0.0
@@ -656,39 +785,52 @@ def _build_closed(
     n_all = len(g.xy) // 2
     for i in range(n_all):
         live.site[i] = 0
+    live.of_part[:] = 0
+    tally[N_SHORT] = len(live.of_part)
     for k in range(len(sites)):
         live.site[sites[k]] = 1
+        _count_site(g, live, sites[k], 1)
+    live.uses[:] = 0
+    live.idle[:] = 0
+    tally[N_IN_MESH] = len(live.of_part)
+    for k in range(len(g.poles) if len(live.uses) > 0 else 0):
+        live.uses[g.poles[k]] = 1
     for t in range(0, end, RECORD):
         for k in range(3):
             if mesh[t + k] <= LAST_INDEX:
                 mesh[t + k] = sites[mesh[t + k]]
-                live.place[mesh[t + k]] = t
         live.head[t >> 3] = -1
         live.subtotal[t >> 3] = 0.0
-    for t in range(0, end, RECORD):
-        a, b, c = _corners(g, mesh, t)
-        enter_plane(g.xyz, a, b, c, live.planes, t >> 3)
-        if (mesh[t] | mesh[t + 1] | mesh[t + 2]) <= LAST_INDEX:
-            for k in range(3):
-                live.place[mesh[t + k]] = t
+        if (mesh[t] | mesh[t + 1] | mesh[t + 2]) > LAST_INDEX:
+            enter_outside(g, live.planes, t >> 3)
+            continue
+        for k in range(3):
+            live.place[mesh[t + k]] = t
+        if enter_triangle(g, live.planes, t >> 3, np.int64(mesh[t]), np.int64(mesh[t + 1]), np.int64(mesh[t + 2])):
+            _count_use(live, t, 1)
     t = np.int64(live.place[sites[0]])
     for i in range(n_all):
         if live.site[i]:
             t = np.int64(live.place[i])
             continue
-        t = locate(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
+        if lined:
+            t = locate_at_random(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
+        else:
+            t = locate(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
         t = holder(g.xy, mesh, t, g.xy[2 * i], g.xy[2 * i + 1], g.exact_area)
         r = t >> 3
         live.place[i] = t
         live.following[i] = live.head[r]
         live.head[r] = i
         _enter_squares(g, live, t, i, i)
-        d = noted_cost(g, live, _deviation(live, i), i)
+        d = noted_cost(g, live, _deviation(g, live, i, i), i)
         live.subtotal[r] += d
         live.amount[COST] += d
     if len(live.peaks) > 0:
         for r in range(end >> 3):
             enter_peak(live, r, _peak_in(g, live, r))
+    for k in range(len(sites) if len(live.idle) > 0 else 0):
+        _enter_idle(g, live, np.int64(sites[k]))
     live.amount[PEAK] = live.amount[COST]
     return True
 
@@ -702,10 +844,10 @@ def build(ground: ClosedGround, live: ClosedLive, sites: IntArray, name: str) ->
         If the pole's are not; ``name`` is what the message calls the model.
     """
     sites = np.ascontiguousarray(sites, np.int64)
-    first = np.searchsorted(sites, ground.pole)
+    first = np.searchsorted(sites, ground.poles[:3])
     n = len(sites)
-    is_there = np.isin(ground.pole, sites).all()
+    is_there = np.isin(ground.poles, sites).all()
     site_xy = np.ascontiguousarray(ground.xy.reshape(-1, 2)[sites]).ravel()
     order, inserted = np.arange(n), np.empty(n, np.uint8)
     if not is_there or not _build_closed(ground, live, sites, site_xy, first.astype(np.int64), order, inserted):
-        raise ValueError(f"{n} kept vertices of {name} lack some of the 3 that are pinned; keep these first")
+        raise ValueError(f"{n} kept vertices of {name} lack some of those that are pinned; keep these first")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -10,14 +9,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import canonical_faces
+from meshsimp_pymoo.plane.footprint import Footprint, make_footprint, rim_footprint
 from meshsimp_pymoo.plane.hilbert import HILBERT_BITS, hilbert_keys
 from meshsimp_pymoo.surface.closed.embedding import embed, faults
 from meshsimp_pymoo.surface.edges import Edges, border_loops, components, next_corner
+from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import Mesh, checksum
 from meshsimp_pymoo.surface.units import length_unit
 
@@ -46,7 +47,8 @@ class Topology:
     mismatched : int
         Edges whose two faces are wound against each other.
     genus : int or None
-        Number of handles of all parts, if every edge has two faces wound alike; fans count as vertices of their own.
+        Number of handles of all parts, once their holes are closed, if no edge has more than two faces, or two that
+        are wound against each other; fans count as vertices of their own.
     """
 
     components: int
@@ -58,27 +60,21 @@ class Topology:
 
     @property
     def is_sphere(self) -> bool:
-        """Whether it is one closed surface of genus 0."""
-        return self.refusal is None
+        """Whether it is one surface without holes, of genus 0."""
+        return self.refusal is None and self.components == 1 and self.loops == 0
 
     @property
     def refusal(self) -> str | None:
-        """Why it is none, in a few words."""
+        """Why it is no closed surface even once its holes are closed, in a few words; None if it is."""
         if self.crowded:
-            return f"is not manifold ({_count(self.crowded, 'edge')} of more than two faces)"
-        if self.loops:
-            return f"has {_count(self.loops, 'hole')}"
-        if self.components > 1:
-            return f"has {self.components} parts"
+            return f"is not manifold ({count(self.crowded, 'edge')} of more than two faces)"
         if self.touching:
-            return (
-                f"is not manifold ({_count(self.touching, 'vertex', 'vertices')} in which several fans of faces meet)"
-            )
+            return f"is not manifold ({count(self.touching, 'vertex', 'vertices')} in which several fans of faces meet)"
         if self.mismatched:
-            between = _count(self.mismatched, "edge")
+            between = count(self.mismatched, "edge")
             return f"is not wound alike, or has one side only ({between} between faces wound against each other)"
         if self.genus:
-            return f"has genus {self.genus} ({_count(self.genus, 'handle')}, as a ring has one)"
+            return f"has genus {self.genus} ({count(self.genus, 'handle')}, as a ring has one)"
         return None
 
 
@@ -100,12 +96,13 @@ def topology(faces: IntArray) -> Topology:
     fans = _fans(faces, first, second)
     used = len(np.unique(flat))
     n_parts = int(part.max()) + 1
-    n_crowded, n_border = len(edges.crowded), len(edges.border)
+    n_crowded = len(edges.crowded)
     touching = int(fans - used) if n_crowded == 0 else 0
+    n_loops = border_loops(edges)[0]
     genus = None
-    if not n_crowded and not n_border and not mismatched:
-        genus = (2 * n_parts - (fans - len(edges.counts) + len(faces))) // 2
-    return Topology(n_parts, border_loops(edges)[0], n_crowded, touching, mismatched, genus)
+    if not n_crowded and not mismatched:
+        genus = (2 * n_parts - (fans - len(edges.counts) + len(faces) + n_loops)) // 2
+    return Topology(n_parts, n_loops, n_crowded, touching, mismatched, genus)
 
 
 def _fans(faces: IntArray, first: IntArray, second: IntArray) -> int:
@@ -117,13 +114,13 @@ def _fans(faces: IntArray, first: IntArray, second: IntArray) -> int:
     return int(components(3 * len(faces), ends[0].ravel(), other.ravel()).max()) + 1
 
 
-def _count(n: int, what: str, many: str | None = None) -> str:
+def count(n: int, what: str, many: str | None = None) -> str:
     return f"{n:,} {what if n == 1 else many or what + 's'}"
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedModel(Mesh):
-    """A closed mesh of genus 0 in vector order.
+    """A closed mesh in vector order: parts of genus 0 once their holes are closed.
 
     The vertices are stored along a Hilbert curve over their images in the plane, so that neighbours on the vector are
     neighbours on the surface. Order and images are a function of the positions and faces alone, whatever order the file
@@ -140,8 +137,9 @@ class ClosedModel(Mesh):
     xy : (N, 2) float array
         Their images in the plane, multiples of 2**-52 in the unit square; see
         :mod:`~meshsimp_pymoo.surface.closed.embedding`.
-    pole : (3,) int array
-        The vertices of the face that is the outside of the plane, clockwise there. Every mesh keeps them.
+    poles : (P, 3) int array
+        For each of P parts the vertices of the face that is the outside of its images, clockwise there. Every mesh has
+        it.
     source_index : (N,) int array
         Row of each vertex in the file.
     file_points : (N, 3) float array
@@ -164,13 +162,15 @@ class ClosedModel(Mesh):
         Model units to a unit of the file along its axes.
     material : Material, optional
         What all faces look like, as far as the file says.
+    lines : ModelLines, optional
+        Polylines that are chains of edges of every mesh.
     """
 
     name: str
     points: FloatArray
     faces: npt.NDArray[np.int32]
     xy: FloatArray
-    pole: IntArray
+    poles: IntArray
     source_index: IntArray
     file_points: FloatArray
     attributes: dict[str, npt.NDArray[Any]]
@@ -182,9 +182,11 @@ class ClosedModel(Mesh):
     georeference: dict[str, Any] = field(default_factory=dict, repr=False)
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     material: Material | None = field(default=None, repr=False)
+    lines: ModelLines | None = None
 
     def __repr__(self) -> str:
         weighted = "" if self.weights is None else ", weighted"
+        weighted += "" if self.lines is None else f", {count(len(self.lines.chains), 'break line')}"
         size = " x ".join(f"{side:.4g}" for side in np.ptp(self.points, axis=0))
         return (
             f"<ClosedModel {self.name}: {self.n_vertices:,} vertices, {len(self.faces):,} triangles{weighted}, "
@@ -196,6 +198,35 @@ class ClosedModel(Mesh):
         """What is subtracted after turning: nothing."""
         return np.zeros(3)
 
+    @property
+    def n_parts(self) -> int:
+        """Number P of parts that no edge connects."""
+        return len(self.poles)
+
+    @cached_property
+    def part(self) -> IntArray:
+        """Which part each vertex belongs to (N,): 0, 1, ... in the order of the poles."""
+        return _parts(self.faces, self.poles, self.n_vertices)
+
+    @cached_property
+    def rim(self) -> IntArray:
+        """The edges (E, 2) of the rims of holes, the face on their left in the plane, by their lesser vertex."""
+        edges = Edges.of(self.faces.astype(np.int64))
+        ends = edges.ends(edges.border)
+        return ends[np.lexsort((ends.max(axis=1), ends.min(axis=1)))]
+
+    @cached_property
+    def border(self) -> IntArray:
+        """The vertices at the rims of holes, ascending."""
+        return np.unique(self.rim)
+
+    @cached_property
+    def footprint(self) -> Footprint:
+        """Where in the plane the surface is: within no hole."""
+        if len(self.rim) == 0:
+            return make_footprint(self.xy, self.faces, np.empty((0, 2)), convex=True)
+        return rim_footprint(self.xy, self.rim)
+
     @cached_property
     def hash(self) -> str:
         """SHA-256 of geometry and weights: the same for the same vertices and faces in the same file order.
@@ -206,7 +237,9 @@ class ClosedModel(Mesh):
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
         weights = None if self.weights is None else self.weights[order]
-        return checksum(self.points[order], canonical_faces(place[self.faces]), self.source_index[order], weights)
+        lines = None if self.lines is None else self.lines.with_rows(place).hash.encode()
+        parts = self.points[order], canonical_faces(place[self.faces]), self.source_index[order], weights, lines
+        return checksum(*parts)
 
     def with_images(self, xy: FloatArray, source_index: IntArray) -> ClosedModel:
         """Return the model with images (N, 2) that were stored, and in the vector order of the rows stored with them.
@@ -225,11 +258,13 @@ class ClosedModel(Mesh):
         order = np.empty_like(here)
         order[there] = here
         moved = self._reordered(order, xy)
-        # which face the outside is may hang on last bits too; it is the one that is turned over
+        # which face the outside is may hang on last bits too; it is the one of each part that is turned over
         a, b, c = (xy[moved.faces[:, k]] for k in range(3))
         turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        moved = replace(moved, pole=moved.faces[np.argmin(turned)].astype(np.int64))
-        _refuse_faults(moved.name, moved.xy, moved.faces, moved.pole)
+        order = np.lexsort((turned, moved.part[moved.faces[:, 0]]))
+        first = np.searchsorted(moved.part[moved.faces[order, 0]], np.arange(moved.n_parts))
+        moved = replace(moved, poles=moved.faces[order[first]].astype(np.int64))
+        _refuse_faults(moved.name, len(moved.faces), *faults(moved.xy, moved.faces, moved.poles))
         return moved
 
     def _reordered(self, order: IntArray, xy: FloatArray) -> ClosedModel:
@@ -240,16 +275,27 @@ class ClosedModel(Mesh):
             points=self.points[order],
             faces=place[self.faces],
             xy=xy,
-            pole=place[self.pole].astype(np.int64),
+            poles=place[self.poles].astype(np.int64),
             source_index=self.source_index[order],
             file_points=self.file_points[order],
             attributes={name: values[order] for name, values in self.attributes.items()},
             weights=None if self.weights is None else self.weights[order],
+            lines=None if self.lines is None else self.lines.with_rows(place),
         )
 
 
+def _parts(faces: IntArray, poles: IntArray, n: int) -> IntArray:
+    """Return which part each of n vertices belongs to, 0, 1, ... in the order of the poles; -1 without a face."""
+    found = components(n, faces[:, :2].ravel(), faces[:, 1:].ravel())
+    number = np.full(int(found.max()) + 1, -1)
+    number[found[poles[:, 0]]] = np.arange(len(poles))
+    return number[found]
+
+
 def closed_model(source: SourceMesh) -> ClosedModel:
-    """Check that a source mesh is one closed surface of genus 0, flatten it and put it in vector order.
+    """Check that a source mesh is one or more surfaces of genus 0, flatten it and put it in vector order.
+
+    Holes are allowed: the surface is taken as if they were closed, and no mesh has the triangles that close them.
 
     Raises
     ------
@@ -259,7 +305,7 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     Warns
     -----
     ModelWarning
-        Of vertices that belong to no face.
+        Of vertices that belong to no face, and of parts too small to have a mesh.
     """
     if source.sort != "mesh":
         raise ModelError(
@@ -270,23 +316,30 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     used[source.faces] = True
     n_unused = len(used) - int(used.sum())
     if n_unused:
-        warnings.warn(
-            f"{source.name}: {n_unused} of {len(used)} vertices belong to no face and are left out",
-            ModelWarning,
-            stacklevel=3,
-        )
+        warn_of(f"{source.name}: {n_unused} of {len(used)} vertices belong to no face and are left out")
     what = topology(source.faces).refusal
     if what is not None:
         raise ModelError(
-            f"{source.name}: {what}; a closed surface is one part without holes, like a sphere: split, fill or mend it "
-            "in a mesh program, or cut out one side as a height surface with --patch front (patch='front')"
+            f"{source.name}: {what}; a closed surface is made of parts like spheres, with holes or without: split or "
+            "mend it in a mesh program, or cut out one side as a height surface with --patch front (patch='front')"
+        )
+    kept, n_small = _without_small_parts(source.faces, used)
+    if n_small:
+        if not kept.any():
+            raise ModelError(
+                f"{source.name}: all of its {count(n_small, 'part')} have fewer than {LEAST_VERTICES} vertices; a "
+                "closed surface has more"
+            )
+        warn_of(
+            f"{source.name}: {count(n_small, 'part')} of fewer than {LEAST_VERTICES} vertices "
+            f"({count(int(used.sum() - kept.sum()), 'vertex', 'vertices')}) cannot be simplified and are left out"
         )
     measured = source.measured.points
-    rows = np.flatnonzero(used)
+    rows = np.flatnonzero(kept)
     rows = rows[np.lexsort(source.points[rows].T[::-1])]
     place = np.full(len(used), -1, np.int64)
     place[rows] = np.arange(len(rows))
-    faces = canonical_faces(place[source.faces])
+    faces = canonical_faces(place[source.faces[kept[source.faces[:, 0]]]])
     pivot = measured[rows].min(axis=0)
     local = measured[rows] - pivot
     if not local.any(axis=0).all() or np.linalg.matrix_rank(local - local.mean(axis=0)) < 3:
@@ -295,28 +348,37 @@ def closed_model(source: SourceMesh) -> ClosedModel:
         raise ModelError(
             f"{source.name}: extends over {local.max():g} only; rescale the model to above {LEAST_EXTENT:g}"
         )
-    found = embed(local, faces)
-    _refuse_faults(source.name, found.xy, faces, found.pole)
+    part = components(len(rows), faces[:, :2].ravel(), faces[:, 1:].ravel())
+    found = embed(local, faces, part)
+    _refuse_faults(source.name, len(faces), found.n_flipped, found.n_coinciding)
     rotation = _shown_side(local)
+    changed = {"merged": len(source.repeats), "small_parts_left_out": n_small}
     model = ClosedModel(
         name=source.name,
         points=local @ rotation.T,
         faces=faces.astype(np.int32),
         xy=found.xy,
-        pole=found.pole,
+        poles=found.poles,
         source_index=source.rows[rows],
         file_points=source.points[rows],
         attributes={name: values[rows] for name, values in source.attributes.items()},
         rotation=rotation,
         pivot=pivot,
         repeats=source.repeats,
-        found={"merged": len(source.repeats)} if len(source.repeats) else {},
+        found={name: n for name, n in changed.items() if n},
         georeference=source.georeference,
         scale=source.scale,
         material=source.material,
     )
     order = _vector_order(found.xy)
     return model._reordered(order, np.ascontiguousarray(found.xy[order]))
+
+
+def _without_small_parts(faces: IntArray, used: BoolArray) -> tuple[BoolArray, int]:
+    """Return which of the used vertices belong to parts that have enough of them, and how many parts have not."""
+    part = components(len(used), faces[:, :2].ravel(), faces[:, 1:].ravel())
+    sizes = np.bincount(part[used], minlength=int(part.max()) + 1)
+    return used & (sizes[part] >= LEAST_VERTICES), int(((sizes > 0) & (sizes < LEAST_VERTICES)).sum())
 
 
 def _vector_order(xy: FloatArray) -> IntArray:
@@ -331,12 +393,11 @@ def _fit(xy: FloatArray) -> bool:
     return bool((xy >= 0.0).all() and (xy <= 1.0).all())
 
 
-def _refuse_faults(name: str, xy: FloatArray, faces: IntArray, pole: IntArray) -> None:
-    flipped, coinciding = faults(xy, faces, pole)
+def _refuse_faults(name: str, n_faces: int, flipped: int, coinciding: int) -> None:
     if flipped or coinciding:
         raise ModelError(
-            f"{name}: cannot be flattened: {_count(coinciding, 'image coincides', 'images coincide')} and "
-            f"{_count(flipped, 'face is', 'faces are')} flipped of {len(faces):,}, since limbs longer than some 28 of "
+            f"{name}: cannot be flattened: {count(coinciding, 'image coincides', 'images coincide')} and "
+            f"{count(flipped, 'face is', 'faces are')} flipped of {n_faces:,}, since limbs longer than some 28 of "
             "their radii shrink below what double precision tells apart; cut them off, or cut out one side as a height "
             "surface with --patch front (patch='front')"
         )

@@ -57,10 +57,13 @@ class ClosedSurface(ModelSurface):
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
         self.rules = rules
         self.pinned: BoolArray = named_vertices(self.model, rules.pin)
-        self.pinned[self.model.pole] = True
+        self.pinned[self.model.poles] = True
+        if self.model.lines is not None:
+            self.pinned[self.model.lines.vertices] = True
         is_small = self.n_vertices < LARGE
         self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)
-        self._books = Reserve(partial(make_live, self.n_vertices), is_small)
+        has_holes = len(self.model.rim) > 0
+        self._books = Reserve(partial(make_live, self.n_vertices, self.model.n_parts, has_holes=has_holes), is_small)
 
     def __repr__(self) -> str:
         return (
@@ -70,8 +73,8 @@ class ClosedSurface(ModelSurface):
 
     @property
     def border(self) -> IntArray:
-        """There is none."""
-        return np.empty(0, np.int64)
+        """The vertices at the rims of holes."""
+        return self.model.border
 
     @property
     def places(self) -> FloatArray:
@@ -164,12 +167,12 @@ class ClosedSurface(ModelSurface):
         ValueError
             If there are fewer than 4, or the pole is not among them.
         """
-        faces, numbers, deviation = self._triangulated(kept)
+        faces, numbers, deviation, covered = self._triangulated(kept)
         quality = as_quality(numbers, self.total_weight, **self._of_mesh(self.points, faces))
         at = slice(None) if rows is None else rows
-        return Simplified(faces, quality, deviation[at], np.ones(len(deviation[at]), bool))
+        return Simplified(faces, quality, deviation[at], covered[at])
 
-    def _triangulated(self, kept: Any) -> tuple[IntArray, FloatArray, FloatArray]:
+    def _triangulated(self, kept: Any) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
         row = np.array(require_bool(kept, "a subset is a bool array, one entry a vertex"), order="C")
         if row.shape != (self.n_vertices,):
             raise ValueError(
@@ -178,8 +181,8 @@ class ClosedSurface(ModelSurface):
         found = triangulate_closed(self._ground, self._workspaces, row)
         if found[1][TRIANGLES] == 0:
             raise ValueError(
-                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4, those that "
-                "are pinned among them"
+                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4 of each part, "
+                "those that are pinned among them"
             )
         return found
 
