@@ -43,7 +43,7 @@ from pymoo.optimize import minimize
 from rich.console import Console
 from rich.table import Table
 
-from meshsimp_pymoo import Front, MeshProblem, Moves, memetic, simplify_to
+from meshsimp_pymoo import Front, FrontSolution, MeshProblem, Moves, memetic, simplify_to
 from meshsimp_pymoo.comparison.baselines import BASELINES, largest_at_most
 from meshsimp_pymoo.comparison.meshlab import load_pymeshlab
 from meshsimp_pymoo.errors import InputError, Missed, ToolUnavailable
@@ -206,12 +206,22 @@ def ours(problem: MeshProblem, sizes: dict[float, int], options: argparse.Namesp
             say(f"{share:g} %: {reason}")
             continue
         searched = shared_time or time.perf_counter() - start
-        used, corners = np.unique(found.faces, return_inverse=True)
-        yield share, SUBSET, (problem.model.file_points[used], corners.reshape(-1, 3)), searched
+        yield share, SUBSET, own_mesh(found), searched
         start = time.perf_counter()
-        fitted = found.refit()
-        place = np.searchsorted(fitted.rows, fitted.faces)
-        yield share, REFITTED, (fitted.vertices, place), searched + time.perf_counter() - start
+        fitted = refitted_mesh(found)
+        yield share, REFITTED, fitted, searched + time.perf_counter() - start
+
+
+def own_mesh(found: FrontSolution) -> Mesh:
+    """Return the mesh of a solution."""
+    used, corners = np.unique(found.faces, return_inverse=True)
+    return found.front.model.file_points[used], corners.reshape(-1, 3)
+
+
+def refitted_mesh(found: FrontSolution) -> Mesh:
+    """Return the mesh of a solution, its vertices moved to where they fit best."""
+    fitted = found.refit()
+    return fitted.vertices, np.searchsorted(fitted.rows, fitted.faces)
 
 
 def compared(

@@ -153,9 +153,10 @@ def _distances(points: FloatArray, segments: FloatArray) -> FloatArray:
     # one at least is as near as the nearest middle, so that only those whose middles are near enough are looked at
     middles = cKDTree(0.5 * (segments[:, 0] + segments[:, 1]))
     near = middles.query(points)[0] + 0.5 * np.sqrt(square.max())
-    found = np.empty(len(points))
-    for k, (point, rows) in enumerate(zip(points, middles.query_ball_point(points, near * (1 + 1e-9)), strict=True)):
-        away = point - start[rows]
-        share = np.clip((away * step[rows]).sum(axis=1) / np.where(square > 0, square, 1.0)[rows], 0.0, 1.0)
-        found[k] = np.sqrt(((away - share[:, None] * step[rows]) ** 2).sum(axis=1).min())
-    return found
+    rows = middles.query_ball_point(points, near * (1.0 + 1e-9))
+    counts = np.array([len(found) for found in rows])
+    segment = np.concatenate(rows).astype(np.int64)
+    away = np.repeat(points, counts, axis=0) - start[segment]
+    share = np.clip((away * step[segment]).sum(axis=1) / np.where(square > 0, square, 1.0)[segment], 0.0, 1.0)
+    distance = np.linalg.norm(away - share[:, None] * step[segment], axis=1)
+    return np.minimum.reduceat(distance, np.cumsum(counts) - counts)
