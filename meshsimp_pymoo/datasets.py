@@ -857,11 +857,11 @@ def _shared_out(n: int, shares: npt.ArrayLike) -> IntArray:
 
 
 # Sizes of the bracket [mm]: length of its foot, height of its back, how thick and how wide both are, the radius of the
-# fillet between them; of the boss on the foot and of the pocket, a blind hole, in the back how far their middles are
-# from the edge, radius, and height or depth; the chamfer of the boss.
-FOOT, BACK, THICK, WIDE, FILLET = 80.0, 60.0, 10.0, 60.0, 15.0
-BOSS_AT, BOSS_RADIUS, BOSS_HEIGHT, CHAMFER = 28.0, 14.0, 12.0, 2.0
-POCKET_AT, POCKET_RADIUS, POCKET_DEPTH = 18.0, 8.0, 5.0
+# fillet between them, by how much the back is crowned; of the boss on the foot and of the pocket, a blind hole, in the
+# back how far their middles are from the edge, radius, and height or depth; the chamfer and the dish of the boss.
+FOOT, BACK, THICK, WIDE, FILLET, CROWN = 80.0, 60.0, 10.0, 60.0, 25.0, 6.0
+BOSS_AT, BOSS_RADIUS, BOSS_HEIGHT, CHAMFER, DISH = 28.0, 14.0, 12.0, 2.0, 2.0
+POCKET_AT, POCKET_RADIUS, POCKET_DEPTH = 14.0, 8.0, 5.0
 # So many vertices at least, that no round side turns by 30 degrees from one face to the next; so many around a circle.
 LEAST_ON_BRACKET, LEAST_AROUND = 1000, 24
 # The bracket's inner side, flattened, goes along the foot, around the fillet and up the back.
@@ -873,7 +873,7 @@ Panel = tuple[list[FloatArray], Callable[[FloatArray], FloatArray]]
 
 
 def _bracket(vertices: int = 5000) -> SourceMesh:
-    """Return a closed bracket in millimetres, as from CAD: flat sides, a fillet, a boss, a blind hole, sharp edges."""
+    """Return a closed bracket in millimetres, as from CAD: flat and round sides, a boss, a blind hole, sharp edges."""
     _check_range("vertices", vertices, LEAST_ON_BRACKET, MAX_SCATTERED)
     profile = FOOT * THICK + (BACK - THICK) * THICK + (1.0 - 0.25 * math.pi) * FILLET**2
     area = 2.0 * profile + WIDE * (FOOT + BACK + 2.0 * THICK + INNER)
@@ -884,19 +884,24 @@ def _bracket(vertices: int = 5000) -> SourceMesh:
         (BOSS_AT, BOSS_RADIUS),
         [(BOSS_RADIUS, 0.0), (BOSS_RADIUS, BOSS_HEIGHT - CHAMFER), (BOSS_RADIUS - CHAMFER, BOSS_HEIGHT)],
         (0.0, 0.0, 1.0),
+        DISH,
         gap,
     )
     pocket, pocket_end, pocket_points, pocket_faces = _turned(
         (INNER - POCKET_AT, POCKET_RADIUS),
         [(POCKET_RADIUS, 0.0), (POCKET_RADIUS, POCKET_DEPTH)],
         (-1.0, 0.0, 0.0),
+        0.0,
         gap,
     )
     side = _side_of_bracket(gap)
+    bottom, top = _rectangle(WIDE, FOOT, gap)[:, ::-1], _rectangle(THICK, WIDE, gap)
+    for edge in (bottom, top):  # of the back, which is crowned
+        edge[edge[:, 0] == 0.0, 0] = _crown(edge[edge[:, 0] == 0.0, 1])
     panels: list[Panel] = [
-        ([_rectangle(WIDE, FOOT, gap)], lambda flat: np.insert(flat[:, ::-1], 2, 0.0, axis=1)),
-        ([_rectangle(BACK, WIDE, gap)], lambda flat: np.insert(flat[:, ::-1], 0, 0.0, axis=1)),
-        ([_rectangle(THICK, WIDE, gap)], lambda flat: np.insert(flat, 2, BACK, axis=1)),
+        ([bottom[:, ::-1]], lambda flat: np.insert(flat[:, ::-1], 2, 0.0, axis=1)),
+        ([_rectangle(BACK, WIDE, gap)], lambda flat: np.column_stack([_crown(flat[:, 1]), flat[:, ::-1]])),
+        ([top], lambda flat: np.insert(flat, 2, BACK, axis=1)),
         ([_rectangle(WIDE, THICK, gap)], lambda flat: np.insert(flat, 0, FOOT, axis=1)),
         ([_rectangle(WIDE, INNER, gap), boss, pocket], _inner_side),
         ([side], lambda flat: np.insert(flat, 1, 0.0, axis=1)),
@@ -905,6 +910,11 @@ def _bracket(vertices: int = 5000) -> SourceMesh:
         pocket_end,
     ]
     return _closed(*_sewn(panels, [(boss_points, boss_faces), (pocket_points, pocket_faces)], vertices, gap))
+
+
+def _crown(across: FloatArray) -> FloatArray:
+    """Return where the bracket's back is along its foot."""
+    return CROWN * ((2.0 * across / WIDE - 1.0) ** 2 - 1.0)
 
 
 def _inner_side(flat: FloatArray) -> FloatArray:
@@ -944,7 +954,11 @@ def _rectangle(width: float, height: float, gap: float) -> FloatArray:
 
 
 def _turned(
-    place: tuple[float, float], profile: list[tuple[float, float]], axis: tuple[float, float, float], gap: float
+    place: tuple[float, float],
+    profile: list[tuple[float, float]],
+    axis: tuple[float, float, float],
+    dish: float,
+    gap: float,
 ) -> tuple[FloatArray, Panel, FloatArray, IntArray]:
     """Make a round thing on the inner side of the bracket of rings of vertices, each turned by half a step.
 
@@ -956,6 +970,8 @@ def _turned(
         Radius and height of the circles that are its edges, from the side on.
     axis : (float, float, float)
         Which way its height goes.
+    dish : float
+        How deep the middle of its end is below the last circle.
     gap : float
         How far vertices are apart, about.
 
@@ -984,8 +1000,13 @@ def _turned(
     there = np.roll(here, -1)
     strip = np.concatenate([[here, there, here + around], [there, there + around, here + around]], axis=1).T
     faces = np.concatenate([strip + k * around for k in range(len(stations) - 1)])
-    top = stations[-1][1] * np.array(axis)
-    return flat[0], ([flat[-1]], lambda disc: _inner_side(disc) + top), np.concatenate(points), faces
+
+    def end(disc: FloatArray) -> FloatArray:
+        out = np.minimum(np.hypot(*(disc - [0.5 * WIDE, along]).T) / profile[-1][0], 1.0)
+        out[:around] = 1.0  # the rim
+        return _inner_side(disc) + (profile[-1][1] - dish * (1.0 - out**2))[:, None] * np.array(axis)
+
+    return flat[0], ([flat[-1]], end), np.concatenate(points), faces
 
 
 def _sewn(

@@ -92,9 +92,11 @@ def test_a_sphere_an_ellipsoid_and_a_blob_without_bumps_are_those():
     assert 0.1 < radius.std() < 0.4
 
 
-# How long the bracket's sharp edges are [mm]: from side to side, around both sides, around the boss and the hole.
-SIDE = 80.0 + 10.0 + (55.0 + 7.5 * np.pi + 35.0) + 10.0 + 60.0
-SHARP = 5 * 60.0 + 2 * SIDE + 2 * np.pi * (14.0 + 14.0 + 12.0 + 8.0 + 8.0)
+# How long the bracket's sharp edges are [mm]: from side to side, two of them crowned by 6 on 60, around both sides,
+# around the boss and the hole.
+CROWNED = 2.0 * np.hypot(1.0, 24.0 / 60.0 * np.linspace(0.0, 1.0, 10_001)).mean() * 30.0
+SIDE = 80.0 + 10.0 + (45.0 + 12.5 * np.pi + 25.0) + 10.0 + 60.0
+SHARP = 3 * 60.0 + 2 * CROWNED + 2 * SIDE + 2 * np.pi * (14.0 + 14.0 + 12.0 + 8.0 + 8.0)
 
 
 @pytest.mark.parametrize("vertices", [1000, 1001, 3333, 12_000])
@@ -103,13 +105,13 @@ def test_a_bracket_is_one_closed_part_of_known_volume_and_known_sharp_edges(vert
     assert len(source.points) == len(np.unique(source.points, axis=0)) == vertices
     assert topology(source.faces).is_sphere
     part = trimesh.Trimesh(source.points, source.faces, process=False)
-    boss = np.pi * (14.0**2 * 10.0 + (14.0**2 + 14.0 * 12.0 + 12.0**2) * 2.0 / 3.0)
-    prism = 60.0 * (80.0 * 10.0 + 50.0 * 10.0 + (1.0 - np.pi / 4) * 15.0**2)
+    boss = np.pi * (14.0**2 * 10.0 + (14.0**2 + 14.0 * 12.0 + 12.0**2) * 2.0 / 3.0 - 12.0**2 * 2.0 / 2.0)
+    prism = 60.0 * (80.0 * 10.0 + 50.0 * 10.0 + (1.0 - np.pi / 4) * 25.0**2 + 6.0 * 2.0 / 3.0 * 60.0)
     assert part.volume == pytest.approx(prism + boss - np.pi * 8.0**2 * 5.0, rel=2e-3)
     ends = source.points[part.face_adjacency_edges[part.face_adjacency_angles > np.radians(30.0)]]
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(SHARP, rel=2e-3)
     flat = part.face_adjacency_angles < 1e-6
-    assert flat.mean() > 0.6  # so that there is something to take away
+    assert flat.mean() > 0.5  # so that there is something to take away
     assert part.face_adjacency_angles[part.face_adjacency_angles < np.radians(30.0)].max() < np.radians(20.0)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
+from scipy import sparse
+from scipy.sparse import linalg
 from scipy.spatial import cKDTree
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
@@ -44,8 +44,8 @@ def rims(faces: IntArray) -> list[IntArray]:
 def whole_scan(points: FloatArray, faces: IntArray, seed: int = 1) -> Mesh:
     """Return a front patch as a whole scan: with a back, shut all around, but cut off at the foot.
 
-    The back is the front mirrored, less deep, and wound the other way; both outlines, their longest rims, are joined by
-    a strip of triangles. The cut leaves a ragged rim. Other holes of the front are there twice.
+    The back is the front mirrored at a membrane that spans its outline, the longest rim, less deep, and wound the other
+    way; both outlines are joined by a strip of triangles. The cut leaves a ragged rim. Other holes are there twice.
 
     Parameters
     ----------
@@ -64,28 +64,33 @@ def whole_scan(points: FloatArray, faces: IntArray, seed: int = 1) -> Mesh:
     faces = np.asarray(faces, np.int64)
     outline, *inner = rims(faces)
     length = np.linalg.norm(points[outline] - points[np.roll(outline, -1)], axis=1).mean()
-    low = points[:, 2].min() - 0.5 * length  # half a strip in front of the mirror
-    back = points * [1.0, 1.0, -DEPTH] + [0.0, 0.0, (1.0 + DEPTH) * low]
-    n, k = len(points), len(outline)
-    # rings between the outlines, so that triangles of the strip are about as high as wide; half the front at most
-    apart = points[outline, 2] - back[outline, 2]
-    n_rings = min(max(0, round(float(np.median(apart)) / length) - 1), n // (2 * k))
-    share = (np.arange(n_rings) + 1) / (n_rings + 1)
-    between = points[outline] + share[:, None, None] * (back[outline] - points[outline])
-    rows = [outline, *(2 * n + k * np.arange(n_rings)[:, None] + np.arange(k)), outline + n]
-    strips = []
-    for one, two in itertools.pairwise(rows):
-        after, after_two = np.roll(one, -1), np.roll(two, -1)
-        # the faces of the front go along their rim forwards, so these go backwards
-        strips += [np.column_stack([after, one, two]), np.column_stack([after, two, after_two])]
-    whole = np.concatenate([points, back, between.reshape(-1, 3)])
-    shut = np.concatenate([faces, faces[:, ::-1] + n, *strips])
+    below = _membrane(points[:, 2], faces, outline) - points[:, 2]
+    back = points + np.column_stack([np.zeros((len(points), 2)), (1.0 + DEPTH) * below - length])
+    n = len(points)
+    # the faces of the front go along their rim forwards, so these go backwards
+    after = np.roll(outline, -1)
+    strip = [np.column_stack([after, outline, outline + n]), np.column_stack([after, outline + n, after + n])]
+    whole = np.concatenate([points, back])
+    shut = np.concatenate([faces, faces[:, ::-1] + n, *strip])
     for foot in FEET:
         left = _cut_off(whole, shut, foot, RAGS * length, np.random.default_rng(seed))
         if len(rims(left)) == 2 * len(inner) + 1:
             used, corners = np.unique(left, return_inverse=True)
             return whole[used], corners.reshape(-1, 3)
     raise ValueError(f"cut off at {', '.join(f'{foot:.0%}' for foot in FEET)} of its height it has more than one rim")
+
+
+def _membrane(height: FloatArray, faces: IntArray, outline: IntArray) -> FloatArray:
+    """Return heights (V,) that are those given at an outline, and elsewhere the mean of their neighbours'."""
+    n = len(height)
+    ends = np.unique(np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
+    joined = sparse.coo_array((np.ones(len(ends)), ends.T), (n, n)).tocsr()
+    joined = joined + joined.T
+    inner = np.setdiff1d(np.arange(n), outline)
+    laplacian = (sparse.diags_array(joined.sum(axis=1)) - joined).tocsr()[inner]
+    found = height.copy()
+    found[inner] = linalg.spsolve(laplacian[:, inner].tocsc(), -laplacian[:, outline] @ height[outline])
+    return found
 
 
 def _cut_off(points: FloatArray, faces: IntArray, foot: float, rags: float, rng: np.random.Generator) -> IntArray:
