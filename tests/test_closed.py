@@ -179,19 +179,19 @@ def test_saved_twice_a_front_is_the_same_bytes(front, tmp_path):
 # ------------------------------------------------------------------------------------------- images of another version
 
 
-def last_bits(points, faces):
+def last_bits(points, faces, part):
     """Flatten as usual, and move images in their last bits as other libraries would."""
-    found = embedding.embed(points, faces)
+    found = embedding.embed(points, faces, part)
     moved = found.xy + 2.0**-52 * np.random.default_rng(1).integers(-3, 4, found.xy.shape)
     moved[found.poles] = found.xy[found.poles]
     return found._replace(xy=moved)
 
 
-def another_pole(points, faces):
+def another_pole(points, faces, part):
     """Flatten from within another face, as where several are equally near to the middle but for rounding."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(embedding, "_trunk_face", lambda *_: 7)
-        return embedding.embed(points, faces)
+        return embedding.embed(points, faces, part)
 
 
 OTHERS = [last_bits, another_pole]
@@ -210,7 +210,7 @@ def test_a_front_made_with_other_images_is_read_back_as_it_was_made(ball, tmp_pa
     assert usual.hash == problem.model.hash
     for given in (None, ball, usual, surface_of(usual, made.surface.rules)):
         read = Front.load(tmp_path / "out", model=given)
-        for name in ("xy", "pole", "faces", "points", "source_index", "weights"):
+        for name in ("xy", "poles", "faces", "points", "source_index", "weights"):
             assert np.array_equal(getattr(read.model, name), getattr(problem.model, name)), name
         for one, same in zip(made, read, strict=True):
             assert np.array_equal(one.faces, same.faces)

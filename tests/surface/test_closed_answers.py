@@ -144,8 +144,8 @@ def test_a_model_turned_shifted_scaled_and_listed_otherwise_has_the_same_errors(
     one, other = (ClosedSurface(closed_model(mesh)) for mesh in (source, moved))
     for share in (0.02, 0.2, 0.6):
         in_file = rng.random(len(source.points)) < share
-        in_file[one.model.source_index[one.model.poles]] = True
-        assert set(listed[other.model.source_index[other.model.poles]]) <= set(np.flatnonzero(in_file))
+        in_file[one.model.source_index[one.model.poles[0]]] = True
+        assert set(listed[other.model.source_index[other.model.poles[0]]]) <= set(np.flatnonzero(in_file))
         first = one.simplify(in_file[one.model.source_index])
         second = other.simplify(in_file[listed][other.model.source_index])
         assert second.quality.triangles == first.quality.triangles

@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse import linalg
+from scipy.sparse import csgraph, linalg
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
@@ -44,6 +44,8 @@ MOST_SHEAR = 50.0
 # A corner is sharp if the angles of its faces lack so much of a full turn: those of a cube lack pi / 2, of an
 # icosahedron pi / 3 [radians]. Seen from there no image may be closer to its neighbour than this.
 SHARP, LEAST_EDGE = 1.0, 2.0**-30
+# A pole is at least this share as far from holes as anything of its part.
+AWAY_FROM_HOLES = 0.5
 # What is left outside when images are scaled into the unit square.
 MARGIN = 2.0**-10
 
@@ -91,20 +93,29 @@ def embed(points: FloatArray, faces: IntArray, part: IntArray) -> Embedding:
     part_of_hole[fans[:, 2] - n] = part[fans[:, 0]]
     points, part = np.concatenate([points, centres]), np.concatenate([part, part_of_hole])
     faces = np.concatenate([faces, fans])
-    # a pole beside a hole would have nothing of the surface beside it there
-    whole = np.ones(len(points), bool)
-    whole[fans] = False
-    whole_faces = whole[faces].all(axis=1)
+    away = _away_from(np.unique(fans), points, faces)[faces].min(axis=1)
     side = 2 ** int(np.ceil(0.5 * np.log2(n_parts)))
     xy, poles, place = np.empty((len(points), 2)), np.empty((n_parts, 3), np.int64), np.empty(len(points), np.int64)
     for k, (rows, own) in enumerate(zip(_by_number(part), _by_number(part[faces[:, 0]]), strict=True)):
         place[rows] = np.arange(len(rows))
-        inner = np.flatnonzero(whole_faces[own])
-        allowed = inner if len(inner) else np.flatnonzero(own < n_faces)
+        # seen from a pole beside a hole, the hole would be most of the plane
+        own_away = np.where(own < n_faces, away[own], -1.0)
+        allowed = np.flatnonzero(own_away >= AWAY_FROM_HOLES * own_away.max())
         found, pole = _part_embedded(points[rows], place[faces[own]], allowed)
         xy[rows] = (np.array(divmod(k, side)) + found) / side + 1.0 - 1.0  # rounded as all images are
         poles[k] = rows[pole]
     return Embedding(xy[:n], poles, *faults(xy, faces, poles))
+
+
+def _away_from(sources: IntArray, points: FloatArray, faces: IntArray) -> FloatArray:
+    """Return how far it is along edges from each vertex to the nearest of the sources; 0 where there are none."""
+    if len(sources) == 0:
+        return np.zeros(len(points))
+    ends = np.concatenate([faces[:, [k, k - 1]] for k in range(3)])
+    length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    graph = sparse.csr_matrix((np.maximum(length, 1e-300), ends.T), (len(points), len(points)))
+    found = csgraph.dijkstra(graph, indices=sources, min_only=True)
+    return np.where(np.isfinite(found), found, 0.0)
 
 
 def _by_number(number: IntArray) -> list[IntArray]:

@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
-from meshsimp_pymoo.surface.closed.refit import rounds_of_refit
+from meshsimp_pymoo.surface.closed.refit import Samples, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
 from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
@@ -28,6 +28,8 @@ from meshsimp_pymoo.surface.score import measured_angles, mesh_quality
 from meshsimp_pymoo.surface.surface import ModelSurface, Refitted, Scored, Simplified, View, checked_faces
 from meshsimp_pymoo.workers import Reserve
 
+# What a sample of a rim counts where vertices are moved, as a share of what a vertex does.
+RIM_WEIGHT = 0.25
 # From so many vertices on, books and workspaces that are not used are given back: hundreds of bytes a vertex each.
 LARGE = 300_000
 
@@ -250,17 +252,26 @@ class ClosedSurface(ModelSurface):
         if before == 0.0:
             return Refitted(mesh.faces, rows, self.model.file_points[rows], before, before, before)
         weights = np.ones(n) if self.model.weights is None else self.model.weights
-        centres, share = self._between
-        samples = np.concatenate([self.points, centres])
-        counts = np.concatenate([weights, share * weights.sum()])
-        best, error = self.points[rows], np.inf
-        for vertices, away in rounds_of_refit(best, compact, samples, counts, until=until):
+        best, least, error = self.points[rows], np.inf, before
+        samples = self._samples(weights)
+        for vertices, away, beside in rounds_of_refit(best, compact, samples, until=until):
             there = float((weights * away[:n]).sum())
-            if there < error:
-                best, error = vertices, there
+            # where there are rims they decide too, but the error is never above what it was
+            rated = there + float((samples.rim_weights * beside).sum())
+            if rated < least and there <= before:
+                best, least, error = vertices, rated, there
         moved = (best != self.points[rows]).any(axis=1)
         found = np.where(moved[:, None], self.model.to_file(best), self.model.file_points[rows])
-        return Refitted(mesh.faces, rows, found, min(error, before), before, 0.0)
+        return Refitted(mesh.faces, rows, found, error, before, 0.0)
+
+    def _samples(self, weights: FloatArray) -> Samples:
+        """Return the vertices, the centres of the faces, and on rims their vertices and the middles of their edges."""
+        centres, share = self._between
+        ends = self.model.rim
+        rim = np.concatenate([self.points[self.model.border], self.points[ends].mean(axis=1)])
+        of_rim = np.full(len(rim), RIM_WEIGHT * weights.mean())
+        points = np.concatenate([self.points, centres])
+        return Samples(points, np.concatenate([weights, share * weights.sum()]), rim, of_rim)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ClosedSurface:
         return self
