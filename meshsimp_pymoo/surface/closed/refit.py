@@ -147,7 +147,9 @@ class _Rows(NamedTuple):
     def matrix(self, n_vertices: int) -> sparse.csr_matrix:
         """Return the matrix (n, 3 V), each row times the root of its weight."""
         n, k = self.corners.shape
-        values = (self.shares[:, :, None] * self.normal[:, None, :]).reshape(-1) * np.repeat(np.sqrt(self.weights), 3 * k)
+        values = (self.shares[:, :, None] * self.normal[:, None, :]).reshape(-1) * np.repeat(
+            np.sqrt(self.weights), 3 * k
+        )
         columns = (3 * self.corners[:, :, None] + np.arange(3)).reshape(-1)
         return sparse.csr_matrix((values, columns, np.arange(0, 3 * k * n + 1, 3 * k)), shape=(n, 3 * n_vertices))
 
