@@ -359,6 +359,10 @@ class ClosedModel(Mesh):
         parts = self.points[order], canonical_faces(place[self.faces]), self.source_index[order], weights, lines
         return checksum(*parts)
 
+    def without_lines(self) -> ClosedModel:
+        """Return the model as it was before it had break lines."""
+        return self if self.lines is None else replace(self, lines=None)
+
     def with_images(self, xy: FloatArray, source_index: IntArray) -> ClosedModel:
         """Return the model with images (N, 2) that were stored, and in the vector order of the rows stored with them.
 
