@@ -24,7 +24,6 @@ from meshsimp_pymoo.surface.units import length_unit
 
 # A mesh of fewer vertices is none.
 LEAST_VERTICES = 4
-LEAST_TRIANGLES = 2 * LEAST_VERTICES - 4
 # Squared areas multiply four lengths: of sides near 1e-77 they leave the range of doubles, and weights and errors are
 # wrong without a word. Sides may be 1e-17 of the box.
 LEAST_EXTENT = 1e-60
