@@ -1,5 +1,5 @@
-"""The closed surface: a mesh without a border and of genus 0, where a subset means the convex hull of its images on a
-sphere.
+"""The closed surface: parts of genus 0 once their holes are closed, where a subset means, for each part, the convex hull
+of its images on a sphere without what lies in holes.
 
 Bottom up: `embedding` flattens the original once, `model` holds it in vector order, `distance` says how far a vertex is
 from a triangle, `nearest` from a whole mesh, `ground` and `books` are the records of compiled functions, `evaluate`

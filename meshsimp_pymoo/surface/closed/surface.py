@@ -1,4 +1,4 @@
-"""The closed surface: a mesh of genus 0 without a border, where a subset means the convex hull of its images."""
+"""The closed surface: parts of genus 0, with holes or without, where a subset means the convex hulls of its images."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspa
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
-from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.closed.model import LEAST_VERTICES, ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 from meshsimp_pymoo.surface.closed.refit import Held, Samples, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
@@ -38,9 +38,10 @@ LARGE = 300_000
 class ClosedSurface(ModelSurface):
     """A closed model and the rules for it; see `Surface` for what its attributes are.
 
-    The mesh of a subset is the Delaunay triangulation of its images and the outside as one more triangle: it is
-    watertight, of genus 0, uses all n vertices and has 2 n - 4 triangles. The deviation d_p of a vertex is its distance
-    in space to the triangle that holds its image and to those across its edges.
+    The mesh of a subset is the Delaunay triangulation of its images and the outside of each part as one more triangle,
+    without what lies in holes. Without holes each part is watertight, of genus 0, uses all n vertices and has 2 n - 4
+    triangles. The deviation d_p of a vertex is its distance in space to the triangle that holds its image and to those
+    across its edges, as far as they are in the mesh.
 
     Parameters
     ----------
@@ -80,6 +81,17 @@ class ClosedSurface(ModelSurface):
     def border(self) -> IntArray:
         """The vertices at the rims of holes."""
         return self.model.border
+
+    @property
+    def least_triangles(self) -> int:
+        """No mesh has fewer triangles: each part has its pole, and without holes two for each vertex but four.
+
+        With holes more vertices can be fewer triangles.
+        """
+        if len(self.model.rim):
+            return self.model.n_parts
+        pinned = np.bincount(self.model.part[self.pinned], minlength=self.model.n_parts)
+        return int((2 * np.maximum(pinned, LEAST_VERTICES) - 4).sum())
 
     @property
     def places(self) -> FloatArray:
@@ -318,5 +330,5 @@ def _refuse_rules(name: str, rules: Rules) -> None:
         if (value := getattr(rules, what)) is not None:
             raise ModelError(
                 f"{name}: {what}={value!r} (--{what} {value}) describes height surfaces, and this is a closed one, "
-                "whose meshes cover all of it; leave it out"
+                "whose holes stay open and whose uncovered vertices cost their distance; leave it out"
             )
