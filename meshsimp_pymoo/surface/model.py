@@ -60,6 +60,7 @@ class Mesh:
     offset: FloatArray
     xy: FloatArray
     weights: FloatArray | None
+    georeference: dict[str, Any]
     repeats: IntArray
     scale: FloatArray
 

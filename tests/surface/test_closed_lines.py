@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,8 @@ def test_every_forced_edge_is_in_the_mesh_of_every_subset(name, share):
         mesh = surface.simplify(kept)
         there = edges(mesh.faces)
         for chain in surface.line_chains(kept):
-            assert {(min(a, b), max(a, b)) for a, b in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True)} <= there
+            assert {
+                (min(a, b), max(a, b)) for a, b in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True)
+            } <= there
         assert mesh.quality.line_max_error <= surface.model.lines.tolerance
         assert mesh.quality.triangles == 2 * kept.sum() - 4
