@@ -35,7 +35,7 @@ from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.given_lines import lines_in_file_frame, lines_of_word
 from meshsimp_pymoo.surface.line_thinning import Chords, thinned_runs
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.model import Mesh, OpenModel
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.polylines import Runs, cut_into_runs
 from meshsimp_pymoo.surface.rules import OUTLINE, is_word_for_lines
@@ -177,13 +177,23 @@ def lined_model(model: OpenModel, break_lines: Any, tolerance: float | None) -> 
     >>> roof.points[roof.lines.chains[0]].tolist(), len(roof.lines.added)
     ([[1.0, 0.0, 1.0], [1.0, 2.0, 1.0]], 0)
     """
-    is_word = is_word_for_lines(break_lines)
-    if tolerance is None and is_word:
+    lining = _Lining(model, tolerance_of(model, break_lines, tolerance))
+    return lining.of_word(break_lines) if is_word_for_lines(break_lines) else lining.of_lines(break_lines)
+
+
+def tolerance_of(model: Mesh, break_lines: Any, tolerance: float | None) -> float:
+    """Return how far lines may move: what is said, else what is usual for lines that a word names.
+
+    Raises
+    ------
+    InputError
+        If it is missing or no number of at least 0.
+    """
+    if tolerance is None and is_word_for_lines(break_lines):
         tolerance = USUAL_TOLERANCE * model.diagonal
     if tolerance is None or not 0.0 <= tolerance < np.inf:
         raise InputError(f"line_tolerance is {tolerance}; give how far break lines may move in space, 0 or more")
-    lining = _Lining(model, float(tolerance))
-    return lining.of_word(break_lines) if is_word else lining.of_lines(break_lines)
+    return float(tolerance)
 
 
 class _Lining:
@@ -233,7 +243,8 @@ class _Lining:
         if n_soft and not (model.rotation[2] == (0.0, 0.0, 1.0)).all():
             raise ModelError(
                 f"{source.name}: {n_soft} of {len(source.lines)} lines have no heights, and the heights of "
-                f"{model.name} are along {model.up.round(6).tolist()}, not along the file's z; give x, y and z of each vertex"
+                f"{model.name} are along {model.up.round(6).tolist()}, not along the file's z; give x, y and z of each "
+                "vertex"
             )
         # all are gone along in the one direction that does not depend on how they are listed
         self.turned = np.array([is_turned(line) for line in source.lines])

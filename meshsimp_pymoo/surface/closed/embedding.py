@@ -95,7 +95,7 @@ def embed(points: FloatArray, faces: IntArray, part: IntArray) -> Embedding:
     whole = np.ones(len(points), bool)
     whole[fans] = False
     whole_faces = whole[faces].all(axis=1)
-    side = 2 ** int(np.ceil(0.5 * np.log2(n_parts)))
+    side = _cells_a_side(n_parts)
     xy, poles, place = np.empty((len(points), 2)), np.empty((n_parts, 3), np.int64), np.empty(len(points), np.int64)
     for k, (rows, own) in enumerate(zip(_by_number(part), _by_number(part[faces[:, 0]]), strict=True)):
         place[rows] = np.arange(len(rows))
@@ -105,6 +105,17 @@ def embed(points: FloatArray, faces: IntArray, part: IntArray) -> Embedding:
         xy[rows] = (np.array(divmod(k, side)) + found) / side + 1.0 - 1.0  # rounded as all images are
         poles[k] = rows[pole]
     return Embedding(xy[:n], poles, *faults(xy, faces, poles))
+
+
+def _cells_a_side(n_parts: int) -> int:
+    return int(2 ** int(np.ceil(0.5 * np.log2(n_parts))))
+
+
+def cell_of(xy: FloatArray, n_parts: int) -> IntArray:
+    """Return the number of the cell that each image (N, 2) lies in: the same for those of one part alone."""
+    side = _cells_a_side(n_parts)
+    column, row = (xy * side).astype(np.int64).T
+    return np.asarray(column * side + row)
 
 
 def _by_number(number: IntArray) -> list[IntArray]:

@@ -55,9 +55,10 @@ class ClosedSurface(ModelSurface):
 
     def __init__(self, model: ClosedModel, rules: Rules = DEFAULT) -> None:
         _refuse_rules(model.name, rules)
-        self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        bare = model if rules.break_lines is None else model.without_lines()
+        self.model = bare if rules.weights is None else bare.with_weights(rules.weights)
         if rules.break_lines is not None:
-            self.model = lined_closed_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
+            self.model = lined_closed_model(self.model, rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = named_vertices(self.model, rules.pin)
         self.pinned[self.model.poles] = True
