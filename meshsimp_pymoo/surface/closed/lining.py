@@ -25,6 +25,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.plane.segments import enclosed_points, meeting_segments, points_on
 from meshsimp_pymoo.surface.closed.model import ClosedModel, count, vector_order
+from meshsimp_pymoo.surface.closed.nearest import distances_to_line
 from meshsimp_pymoo.surface.closed.tracing import Traced, Tracer, near_in_space
 from meshsimp_pymoo.surface.given_lines import lines_in_file_frame, lines_of_word
 from meshsimp_pymoo.surface.line_thinning import Chords, thinned_runs
@@ -103,17 +104,15 @@ class _Lining:
         lines = lines_of_word(self.model, word)
         self.what, self.names = f"break_lines={word!r}", tuple(f"line {k + 1}" for k in range(len(lines)))
         self.found |= {"lines": len(lines), "line_vertices": sum(map(len, lines))}
-        return self._lined(lines, np.arange(len(lines)))
+        return self._lined(lines, [self.points[line] for line in lines], np.arange(len(lines)))
 
     def of_lines(self, break_lines: Any) -> ClosedModel:
         given, line = self._read(break_lines)
         points = self._snapped(self.model.to_local(given))
         lines = self._distinct(points, line)
-        if not any(len(rows) for rows in lines):
-            raise ModelError(f"{self.what}: holds no line of two places; give one or more")
-        found, of = self._traced(points, given, lines)
+        found, originals, of = self._traced(points, given, lines)
         self._refuse_crossing(found, of)
-        return self._lined(found, of)
+        return self._lined(found, originals, of)
 
     def _read(self, break_lines: Any) -> tuple[FloatArray, IntArray]:
         """Return the vertices (M, 3) of lines [file units], and which line each is of."""
@@ -121,8 +120,8 @@ class _Lining:
         n_flat = sum(line.shape[1] == 2 for line in source.lines)
         if n_flat:
             raise ModelError(
-                f"{source.name}: {n_flat} of {count(len(source.lines), 'line')} have x and y only, and "
-                f"{self.model.name} is a closed surface, where these are no place; give x, y and z of each vertex"
+                f"{source.name}: {count(n_flat, 'line has', 'lines have')} x and y only, and {self.model.name} "
+                "is a closed surface, where these are no place; give x, y and z of each vertex"
             )
         self.what, self.names = source.name, source.names
         lengths = [len(line) for line in source.lines]
@@ -146,6 +145,8 @@ class _Lining:
         same = np.zeros(len(line), bool)
         same[1:] = (line[1:] == line[:-1]) & (points[1:] == points[:-1]).all(axis=1)
         left = np.bincount(line[~same], minlength=len(self.names))
+        if (left < 2).all():
+            raise ModelError(f"{self.what}: holds no line of two places; give one or more")
         n_places = int((left < 2).sum())
         self.found |= {"repeated_vertices": int(same.sum()), "lines_of_one_place": n_places}
         said = [f"{count(int(same.sum()), 'vertex repeats', 'vertices repeat')} the one before"] if same.any() else []
@@ -155,8 +156,10 @@ class _Lining:
         rows = np.split(np.flatnonzero(~same), np.cumsum(left)[:-1])
         return [row if len(row) > 1 else row[:0] for row in rows]
 
-    def _traced(self, points: FloatArray, given: FloatArray, lines: list[IntArray]) -> tuple[list[IntArray], IntArray]:
-        """Return lines along the surface as vertices of the model and new ones, and which was given as each is part of.
+    def _traced(
+        self, points: FloatArray, given: FloatArray, lines: list[IntArray]
+    ) -> tuple[list[IntArray], list[FloatArray], IntArray]:
+        """Return lines along the surface: as vertices, the model's and new ones, and as points; and which each is of.
 
         ``points`` and ``given`` (M, 3) are their vertices in the frames of the model and the file.
         """
@@ -184,38 +187,50 @@ class _Lining:
         own = np.full(len(traced.points), -1)
         own[: len(used)] = row[used]
         taken = (traced.pole >= 0) & (own < 0)
-        self._say_taken(traced.points[taken], traced.pole[taken])
+        self.found["vertices_at_the_pole"] = int(taken.sum())
         own = np.where(taken, traced.pole, own)
         in_file = model.to_file(traced.points)
         in_file[: len(used)] = file_ends[used]
-        place = self._with_places(traced.points, traced.xy, in_file, own, tracer.faces[traced.face])
+        new = np.flatnonzero((own < 0) & traced.is_passed)
+        middle = model.xy[tracer.faces[traced.face[new]]].mean(axis=1)
+        place = own.copy()
+        place[new] = self._with_places(traced.points[new], traced.xy[new], in_file[new], middle)
         found: list[IntArray] = []
+        originals: list[FloatArray] = []
         of: list[int] = []
-        cut, kept, whole = np.zeros(len(nodes), bool), 0.0, 0.0
+        cut, kept, whole, aside = np.zeros(len(nodes), bool), 0.0, 0.0, 0.0
         for k, line in enumerate(nodes):
             part, joined = _along(np.searchsorted(used, line), local, traced)
             length = np.linalg.norm(np.diff(traced.points[part], axis=0), axis=1)
             whole += float(length.sum())
             kept += float(length[joined].sum())
             cut[k] = not joined.all()
-            for some in np.split(place[part], np.flatnonzero(~joined) + 1):
-                vertices = some[np.append(True, some[1:] != some[:-1])]
+            for some in np.split(part, np.flatnonzero(~joined) + 1):
+                vertices = place[some][np.append(True, np.diff(place[some]) != 0)]
                 if len(vertices) > 1:
                     found.append(vertices)
+                    originals.append(traced.points[some])
                     of.append(k)
+                    aside = max([aside, *distances_to_line(traced.points[some[taken[some]]], self.points[vertices])[0]])
         on = np.isin(np.arange(len(nodes)), of)
         self._say_cut(points, on, on & cut, ~on & np.array([len(line) > 0 for line in nodes]), 1.0 - kept / whole)
-        return found, np.array(of)
+        if aside > self.tolerance:
+            warn_of(
+                f"{self.what}: lines pass a face of {model.name} that is the outside of the plane, and go through its "
+                f"corners there, up to {aside:.4g} aside"
+            )
+        return found, originals, np.array(of)
 
     def _with_places(
-        self, points: FloatArray, xy: FloatArray, file_points: FloatArray, own: IntArray, corners: IntArray
+        self, points: FloatArray, images: FloatArray, file_points: FloatArray, middle: FloatArray
     ) -> IntArray:
-        """Return which vertex each point is, the model's own or a new one, whose image is that of no other."""
+        """Return as which new vertices points count, whose images are those of none of the model's.
+
+        Where these would coincide, they are moved towards the middle (n, 2) of the face, by as little as there is.
+        """
         model = self.model
-        new = np.flatnonzero(own < 0)
         n = model.n_vertices
         taken = np.sort(place_keys(model.xy))
-        images, middle = xy[new], model.xy[corners[new]].mean(axis=1)
         step = 1.0
         while True:
             keys = place_keys(images)
@@ -227,22 +242,17 @@ class _Lining:
         _, first, number = np.unique(keys, return_index=True, return_inverse=True)
         number = number.ravel()
         self.places = np.concatenate([model.xy, images[first]])
-        self.points = np.concatenate([model.points, points[new][first]])
-        self.file_points = np.concatenate([model.file_points, file_points[new][first]])
-        found = own.copy()
-        found[new] = n + number
-        return found
-
-    def _say_taken(self, points: FloatArray, pole: IntArray) -> None:
-        """Warn of what is moved to a corner of the face at the pole by more than the tolerance."""
-        away = np.linalg.norm(points - self.model.points[pole], axis=1)
-        n_far = int((away > self.tolerance).sum())
-        self.found["vertices_at_the_pole"] = len(points)
-        if n_far:
+        self.points = np.concatenate([model.points, points[first]])
+        self.file_points = np.concatenate([model.file_points, file_points[first]])
+        away = np.linalg.norm(points - self.points[n + number], axis=1)
+        n_merged = int((away > max(self.tolerance, self.reach)).sum())
+        if n_merged:
+            self.found["places_of_several_points"] = n_merged
             warn_of(
-                f"{self.what}: lines pass the one face of {self.model.name} that is the outside of its plane, and go "
-                f"through its corners there, up to {away.max():.4g} aside"
+                f"{self.what}: {count(n_merged, 'point')} of lines lie above others, up to {away.max():.4g} from them; "
+                "the first of a place counts"
             )
+        return np.asarray(n + number)
 
     def _say_cut(self, points: FloatArray, on: BoolArray, cut: BoolArray, left_out: BoolArray, share: float) -> None:
         """Warn of what is not on the surface; refuse lines of which nothing is."""
@@ -282,7 +292,7 @@ class _Lining:
             "or leave one of them out"
         )
 
-    def _lined(self, lines: list[IntArray], of: IntArray) -> ClosedModel:
+    def _lined(self, lines: list[IntArray], originals: list[FloatArray], of: IntArray) -> ClosedModel:
         """Thin lines of vertices, add those of them that are none of the model's and put it in order."""
         model = self.model
         runs = cut_into_runs(lines, model.poles.ravel())
@@ -304,7 +314,7 @@ class _Lining:
             "added_line_vertices": len(new),
         }
         made = ModelLines(
-            originals=tuple(self.points[line] for line in lines),
+            originals=tuple(originals),
             chains=tuple(row[chain] for chain in chains),
             names=tuple(self.names[k] for k in of),
             tolerance=self.tolerance,

@@ -50,6 +50,19 @@ def distances_to_mesh(
     return np.sqrt(squares), order[nearest]
 
 
+def distances_to_line(points: FloatArray, line: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return how far points (N, 3) are from a polyline (n, 3), and the piece that each is nearest to (N,).
+
+    Examples
+    --------
+    >>> line = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    >>> [found.tolist() for found in distances_to_line(np.array([[0.5, 0.0, 2.0], [3.0, 0.5, 0.0]]), line)]
+    [[2.0, 2.0], [0, 1]]
+    """
+    k = np.arange(len(line) - 1)
+    return distances_to_mesh(points, line, np.column_stack([k, k + 1, k + 1]))  # triangles without an area
+
+
 def _morton_keys(points: FloatArray) -> IntArray:
     """Return the place of points (n, 3) along a curve that fills their box."""
     low, extent = points.min(axis=0), np.ptp(points, axis=0).max()

@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
-from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
+from meshsimp_pymoo.surface.closed.nearest import distances_to_line, distances_to_mesh
 from meshsimp_pymoo.surface.closed.refit import Held, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
@@ -288,8 +288,7 @@ class ClosedSurface(ModelSurface):
         kept[rows] = True
         ends = []
         for line, chain in zip(lines.originals, self.line_chains(kept), strict=True):
-            k = np.arange(len(chain) - 1)
-            _, nearest = distances_to_mesh(line, self.points[chain], np.column_stack([k, k + 1, k + 1]))
+            _, nearest = distances_to_line(line, self.points[chain])
             at = np.searchsorted(rows, chain)
             ends.append(np.column_stack([at[nearest], at[nearest + 1]]))
         return Held(np.concatenate(lines.originals), np.concatenate(ends), lines.tolerance)

@@ -1,8 +1,8 @@
 """Where polylines in space lie on a closed surface: points along them, and the images of these in the plane.
 
-Between two of its vertices a line follows the surface: it goes to the nearest points of those of the straight piece,
-as far off them as its ends are. It has points on both sides of where it passes from one original face to another, so
-that between these its image is straight.
+Between two of its vertices on the surface a line follows it: it goes to the nearest points of those of the straight
+piece, as far off them as its ends are. It has points on both sides of where it passes from one original face to
+another, so that between these its image is straight.
 """
 
 from __future__ import annotations
@@ -80,6 +80,15 @@ class Traced(NamedTuple):
     pole: IntArray
     chains: list[IntArray]
     joined: list[BoolArray]
+
+    @property
+    def is_passed(self) -> BoolArray:
+        """Which points (M,) a line along the surface leads to, or from."""
+        found = np.zeros(len(self.points), bool)
+        for chain, joined in zip(self.chains, self.joined, strict=True):
+            found[chain[1:][joined]] = True
+            found[chain[:-1][joined]] = True
+        return found
 
 
 def near_in_space(points: FloatArray, ends: IntArray, reach: float) -> tuple[IntArray, IntArray, FloatArray]:
@@ -172,20 +181,23 @@ class Tracer:
         # of each part: its piece, where on it it begins, its ends; and of each point how far the line is off its foot
         piece, start, step = np.arange(len(pieces)), np.zeros(len(pieces)), np.ones(len(pieces))
         a, b = pieces[:, 0].copy(), pieces[:, 1].copy()
-        off, whole = ends - feet.foot, on[pieces].all(axis=1)
+        off, whole = ends - feet.foot, np.asarray(on[pieces].all(axis=1))
         done: list[tuple[IntArray, FloatArray, IntArray, IntArray]] = []
         for _ in range(HALVINGS):
             ready = self._are_straight(feet, on, a, b)
             done.append((piece[ready], start[ready], a[ready], b[ready]))
-            piece, a, b = piece[~ready], a[~ready], b[~ready]
-            start, step = start[~ready], step[~ready]
+            open_ones = np.flatnonzero(~ready)
+            piece, a, b = piece[open_ones], a[open_ones], b[open_ones]
+            start, step = start[open_ones], step[open_ones]
             if len(piece) == 0:
                 break
             middle = self.feet(0.5 * (feet.points[a] + feet.points[b]))
             m = len(feet.points) + np.arange(len(piece))
-            # what is between two ends on the surface follows it, however far the straight piece is from it
+            # what is between two ends on the surface follows it, however far the straight piece is from it; what leads
+            # away from it ends where it leaves it
             between = np.where(whole[piece, None], 0.5 * (off[a] + off[b]), middle.points - middle.foot)
-            near = np.linalg.norm(between, axis=1) <= self.most
+            most = np.where(whole[piece], self.most, max(self.tolerance, ON_SIDE * self.model.diagonal))
+            near = np.linalg.norm(between, axis=1) <= most
             feet, on = feet.joined(middle), np.concatenate([on, near & ~middle.beyond])
             off = np.concatenate([off, between])
             step = 0.5 * step
