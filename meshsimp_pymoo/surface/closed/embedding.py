@@ -101,7 +101,7 @@ def embed(points: FloatArray, faces: IntArray, part: IntArray) -> Embedding:
     part = np.concatenate([part, part[discs.rim_vertex]])
     at_holes = np.unique(discs.faces[discs.faces < len(points)])
     away = _away_from(at_holes, points, faces)[faces].min(axis=1)
-    side = 2 ** int(np.ceil(0.5 * np.log2(n_parts)))
+    side = _cells_a_side(n_parts)
     xy, poles, place = np.empty((len(part), 2)), np.empty((n_parts, 3), np.int64), np.empty(len(part), np.int64)
     for k, (rows, own) in enumerate(zip(_by_number(part), _by_number(part[closed[:, 0]]), strict=True)):
         place[rows] = np.arange(len(rows))
@@ -123,6 +123,17 @@ def _away_from(sources: IntArray, points: FloatArray, faces: IntArray) -> FloatA
     graph = sparse.csr_matrix((np.maximum(length, 1e-300), ends.T), (len(points), len(points)))
     found = csgraph.dijkstra(graph, directed=False, indices=sources, min_only=True)
     return np.where(np.isfinite(found), found, 0.0)
+
+
+def _cells_a_side(n_parts: int) -> int:
+    return int(2 ** int(np.ceil(0.5 * np.log2(n_parts))))
+
+
+def cell_of(xy: FloatArray, n_parts: int) -> IntArray:
+    """Return the number of the cell that each image (N, 2) lies in: the same for those of one part alone."""
+    side = _cells_a_side(n_parts)
+    column, row = (xy * side).astype(np.int64).T
+    return np.asarray(column * side + row)
 
 
 def _by_number(number: IntArray) -> list[IntArray]:
