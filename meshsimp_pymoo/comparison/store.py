@@ -301,7 +301,7 @@ def write_model(out: Path, model: Model) -> str:
     content = io.BytesIO()
     parts = {name: getattr(model, name) for name in _stored_fields(type(model))}
     stored: dict[str, Any] = {name: np.asarray(part) for name, part in parts.items() if part is not None}
-    if isinstance(model, OpenModel) and model.lines is not None:
+    if model.lines is not None:
         stored |= {LINES + name: part for name, part in model.lines.arrays().items()}
     np.savez_compressed(content, **stored)
     _put(out / relative, content.getvalue())

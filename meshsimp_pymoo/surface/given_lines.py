@@ -16,7 +16,7 @@ from meshsimp_pymoo.formats.source.metric import systems_differ
 from meshsimp_pymoo.formats.table import read_lines
 from meshsimp_pymoo.plane.chains import chains
 from meshsimp_pymoo.plane.faces import edge_table
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.model import Mesh, OpenModel
 from meshsimp_pymoo.surface.orient import area_vectors
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.rules import OUTLINE, SHARP, meant_word_for_lines
@@ -68,10 +68,11 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
     return given
 
 
-def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:
+def lines_of_word(model: Mesh, word: str) -> list[IntArray]:
     """Return lines of the model's own vertices, as rows, that a word names: its outline, or its sharp edges.
 
-    Where several vertices share a place, the highest stands for them.
+    The outline is the rims of holes, where there is nothing else. Where several vertices share a place, the highest
+    stands for them.
 
     Raises
     ------
@@ -81,7 +82,10 @@ def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:
     if word == OUTLINE:
         rows = chains(_border(model))
         if not rows:
-            raise ModelError(f"{model.name}: has no outline to take for break lines; leave break_lines={word!r} out")
+            raise ModelError(
+                f"{model.name}: has no outline and no holes whose rims could be break lines; leave "
+                f"break_lines={word!r} (--break-lines {word}) out"
+            )
         return rows
     try:
         degrees = float(word.removeprefix(SHARP))
@@ -97,17 +101,17 @@ def lines_of_word(model: OpenModel, word: str) -> list[IntArray]:
     return rows
 
 
-def _border(model: OpenModel) -> IntArray:
+def _border(model: Mesh) -> IntArray:
     """Return the edges (E, 2) of one face only, as seen from above."""
     faces = highest(model.xy)[model.faces]
     table = edge_table(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
     return table.ends[table.n_triangles == 1]
 
 
-def sharp_edges(model: OpenModel, degrees: float) -> IntArray:
+def sharp_edges(model: Mesh, degrees: float) -> IntArray:
     """Return the edges (E, 2) of two original faces whose normals differ by more than so many degrees.
 
-    Those that are upright are a place in the plane, and left out.
+    Those that are a place in the plane, as upright ones of height surfaces, are left out.
     """
     table = edge_table(model.faces)
     pairs = table.first[table.n_triangles == 2]

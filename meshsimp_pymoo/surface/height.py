@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -180,18 +179,9 @@ class HeightSurface(ModelSurface):
         lines = self.model.lines
         if lines is None:
             return ()
-        first, along = self._ground.lines.start, self._ground.lines.along
         is_site = np.zeros(self.n_vertices, bool)
         is_site[self.sites(kept | self.pinned, self.pinned)] = True
-        between = {}
-        for s, (a, b) in enumerate(lines.segments.tolist()):
-            on = along[first[s] : first[s + 1]].astype(np.int64)
-            between[a, b] = on[is_site[on]]
-            between[b, a] = between[a, b][::-1]
-        return tuple(
-            np.concatenate([chain[:1], *(between[pair][1:] for pair in itertools.pairwise(chain.tolist()))])
-            for chain in lines.chains
-        )
+        return lines.chains_through(self._ground.lines, is_site)
 
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.plane.constraints import Constraints
 from meshsimp_pymoo.reprs import brief
 
 
@@ -60,6 +62,27 @@ class ModelLines:
         halves = [np.linalg.norm(np.diff(line, axis=0), axis=1) / 2.0 for line in self.originals]
         length = np.concatenate([np.r_[half, 0.0] + np.r_[0.0, half] for half in halves])
         return np.asarray(length / length.sum())
+
+    def errors(self, away: FloatArray) -> dict[str, float]:
+        """Return what is said of the lines where each vertex of the originals, joined, is so far from a mesh."""
+        return {"line_max_error": float(away.max()), "line_mean_error": float((self.shares * away).sum())}
+
+    def chains_through(self, forced: Constraints, is_site: BoolArray) -> tuple[IntArray, ...]:
+        """Return each line as the chain of edges, rows in order, that it is where these vertices (N,) are sites.
+
+        ``forced`` are forced edges, of which those of the lines are the last.
+        """
+        segments = self.segments
+        first = forced.start[len(forced.start) - 1 - len(segments) :]
+        between = {}
+        for s, (a, b) in enumerate(segments.tolist()):
+            on = forced.along[first[s] : first[s + 1]].astype(np.int64)
+            between[a, b] = on[is_site[on]]
+            between[b, a] = between[a, b][::-1]
+        return tuple(
+            np.concatenate([chain[:1], *(between[pair][1:] for pair in itertools.pairwise(chain.tolist()))])
+            for chain in self.chains
+        )
 
     def with_rows(self, place: IntArray) -> ModelLines:
         """Return the same lines of a model whose vertex i has become vertex ``place[i]``."""

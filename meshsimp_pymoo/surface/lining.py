@@ -30,13 +30,14 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import InputError, ModelError, warn_of
 from meshsimp_pymoo.plane.emission import SLIVER_HEIGHT
 from meshsimp_pymoo.plane.order import vector_order
-from meshsimp_pymoo.plane.segments import along_faces, enclosed_points, meeting_segments, points_on
+from meshsimp_pymoo.plane.segments import along_faces, meeting_segments, points_on
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.given_lines import lines_in_file_frame, lines_of_word
+from meshsimp_pymoo.surface.line_thinning import Chords, thinned_runs
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import OpenModel
 from meshsimp_pymoo.surface.places import highest
-from meshsimp_pymoo.surface.polylines import Runs, cut_into_runs, farthest_between, thinned
+from meshsimp_pymoo.surface.polylines import Runs, cut_into_runs
 from meshsimp_pymoo.surface.rules import OUTLINE, is_word_for_lines
 
 # What is so near to each other is at one place, as a share of the model's diagonal in the plane; and at one height, as
@@ -530,39 +531,18 @@ class _Lining:
         ``own`` says which places have a height so far from that of the model's vertex there that both cannot stand for
         each other.
         """
-        along = [points[run] for run in runs.runs]
-        kept: list[IntArray] = [np.flatnonzero(stays) for stays in thinned(along, self.height_tolerance)]
-        n_put_back = 0
-        while True:
-            run = np.repeat(np.arange(len(kept)), [len(at) - 1 for at in kept])
-            low = np.concatenate([at[:-1] for at in kept])
-            high = np.concatenate([at[1:] for at in kept])
-            ends = np.array([(runs.runs[k][a], runs.runs[k][b]) for k, a, b in zip(run, low, high, strict=True)])
-            longer = np.flatnonzero(high - low > 1)
+
+        def over(chords: Chords) -> set[tuple[int, int]]:
             back: set[tuple[int, int]] = set()
-            pairs = meeting_segments(places, ends)
-            if len(pairs) == 0:
-                rings = [runs.runs[run[s]][low[s] : high[s] + 1] for s in longer]
-                passed = enclosed_points(places, np.unique(ends), rings)
-                pairs = np.unique(longer[passed[:, 1]])[:, None]
-            for segments in pairs:
-                # one of them is longer, as pieces of the lines themselves do not cross
-                far = [
-                    (*farthest_between(along[run[s]], low[s], high[s]), run[s])
-                    for s in segments[high[segments] - low[segments] > 1]
-                ]
-                most = max(away for _, away, _ in far)
-                back |= {(k, at) for at, away, k in far if away == most}
-            if len(pairs) == 0 and own.any():
-                for p, s in points_on(places, ends, self.reach):
-                    between = runs.runs[run[s]][low[s] + 1 : high[s]]
-                    back |= {(run[s], low[s] + 1 + at) for at in np.flatnonzero(between == p) if own[p]}
-            if not back:
-                break
-            for k, at in back:
-                kept[k] = np.sort(np.append(kept[k], at))
-            n_put_back += len(back)
-        self.found["put_back_line_vertices"] = n_put_back
+            for p, s in points_on(places, chords.ends, self.reach):
+                between = chords.between(runs, s)[1:-1]
+                back |= {(chords.run[s], chords.low[s] + 1 + at) for at in np.flatnonzero(between == p) if own[p]}
+            return back
+
+        tolerance = self.height_tolerance
+        kept, self.found["put_back_line_vertices"] = thinned_runs(
+            runs, places, points, tolerance, farthest_in=points, also=over if own.any() else None
+        )
         return kept
 
     def _with_vertices(

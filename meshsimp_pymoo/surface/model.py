@@ -58,6 +58,7 @@ class Mesh:
     rotation: FloatArray
     pivot: FloatArray
     offset: FloatArray
+    xy: FloatArray
     weights: FloatArray | None
     repeats: IntArray
     scale: FloatArray

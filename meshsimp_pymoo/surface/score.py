@@ -179,7 +179,7 @@ def line_errors(
     places = np.concatenate(lines.originals)
     samples = ground._replace(xy=np.ascontiguousarray(places[:, :2] / ground.unit).ravel(), z=places[:, 2].copy())
     deviation, _ = mesh_deviation(samples, vertices, faces, planar=planar)
-    return {"line_max_error": float(deviation.max()), "line_mean_error": float((lines.shares * deviation).sum())}
+    return lines.errors(deviation)
 
 
 # Faces thinner than this (area over the squared extent of the model) cover nothing: they stand upright or are

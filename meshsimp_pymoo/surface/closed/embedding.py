@@ -5,10 +5,10 @@ flatten the rest.
 
 One original face of each part, its *pole*, is the outside: its vertices are the corners of a triangle that holds all
 other images. They are part of every mesh, so it is a face at the sharpest corner, which every mesh wants, if there is a
-sharp one and nothing gets too small as seen from there; else one at the trunk, from where limbs shrink least. Each of
-the others is the weighted mean of those of its neighbours. With positive weights no face flips (Tutte [1]_); these are the
-cotangent weights, which make angles in the plane like those on the surface (Pinkall and Polthier [2]_), bounded from
-below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
+sharp one and nothing gets too small as seen from there; else one at the trunk, from where limbs shrink least. It is
+none near a hole, from where the hole would be most of the plane. Each of the others is the weighted mean of those of
+its neighbours. With positive weights no face flips (Tutte [1]_); these are the cotangent weights, which make angles in
+the plane like those on the surface (Pinkall and Polthier [2]_), bounded from below and above. What is left of the shearing by the outer triangle is taken away by one affine map.
 
 Seen from the top of a sphere that the plane touches below, these are images on the sphere (stereographically); the
 Delaunay triangulation of any of them with the outside as one more triangle is the convex hull there.

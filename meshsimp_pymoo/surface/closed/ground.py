@@ -81,7 +81,7 @@ def _enter_distances(xyz: np.ndarray, poles: np.ndarray, part: np.ndarray, far: 
 
 
 def _forced_edges(model: ClosedModel) -> Constraints:
-    """Return the edges that keep parts apart, and those of break lines."""
+    """Return the edges that keep parts apart, then those of break lines."""
     segments = [np.empty((0, 2), np.int64)] if model.lines is None else [model.lines.segments]
     n_between = 0
     if model.n_parts > 1:

@@ -115,6 +115,7 @@ def _fans(faces: IntArray, first: IntArray, second: IntArray) -> int:
 
 
 def count(n: int, what: str, many: str | None = None) -> str:
+    """Return a number of things in words: "1 hole", "2 holes"."""
     return f"{n:,} {what if n == 1 else many or what + 's'}"
 
 
@@ -240,6 +241,10 @@ class ClosedModel(Mesh):
         lines = None if self.lines is None else self.lines.with_rows(place).hash.encode()
         parts = self.points[order], canonical_faces(place[self.faces]), self.source_index[order], weights, lines
         return checksum(*parts)
+
+    def without_lines(self) -> ClosedModel:
+        """Return the model as it was before it had break lines."""
+        return self if self.lines is None else replace(self, lines=None)
 
     def with_images(self, xy: FloatArray, source_index: IntArray) -> ClosedModel:
         """Return the model with images (N, 2) that were stored, and in the vector order of the rows stored with them.

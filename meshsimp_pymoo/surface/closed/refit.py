@@ -36,6 +36,8 @@ PULL = 0.01
 # Conjugate gradients end where so much of the residual is left, or after so many steps: rounds go on from there.
 CLOSE = 1e-6
 MOST_STEPS = 200
+# So often the way of a vertex of a break line is halved until its edges are near enough to the line; then it is none.
+TRIES = 4
 
 
 class Samples(NamedTuple):
@@ -95,8 +97,34 @@ class _Rim(NamedTuple):
         return np.where(near, away, 0.0), np.where(near, edge, -1)
 
 
+class Held(NamedTuple):
+    """What moved vertices may not leave: break lines.
+
+    Attributes
+    ----------
+    points : (L, 3) float array
+        Points of the lines as they were given.
+    ends : (L, 2) int array
+        The vertices of the mesh whose edge stands for each of them.
+    tolerance : float
+        How far a point may be from its edge, if it was not farther at the start.
+    """
+
+    points: FloatArray
+    ends: IntArray
+    tolerance: float
+
+    def left(self, vertices: FloatArray) -> IntArray:
+        """Return the ends of edges that are too far from what they stand for."""
+        a, b = vertices[self.ends[:, 0]], vertices[self.ends[:, 1]]
+        u, p = b - a, self.points - a
+        t = np.clip((p * u).sum(axis=1) / np.maximum((u * u).sum(axis=1), 1e-300), 0.0, 1.0)
+        far = ((p - t[:, None] * u) ** 2).sum(axis=1) > self.tolerance**2
+        return np.unique(self.ends[far])
+
+
 def rounds_of_refit(
-    vertices: FloatArray, faces: IntArray, samples: Samples, *, until: float | None = None
+    vertices: FloatArray, faces: IntArray, samples: Samples, *, held: Held | None = None, until: float | None = None
 ) -> Iterator[Round]:
     """Yield where the vertices are: at the start, and after each round.
 
@@ -107,6 +135,8 @@ def rounds_of_refit(
     faces : (M, 3) int array
     samples : Samples
         Of the original.
+    held : Held, optional
+        Break lines: where an edge would leave them, its ends stay where they are at the start.
     until : float, optional
         ``perf_counter()`` after which no round begins.
     """
@@ -120,7 +150,7 @@ def rounds_of_refit(
         if until is not None and time.perf_counter() >= until:
             return
         rows = [_on_planes(vertices, faces, samples, nearest), _on_rims(vertices, faces, rim, samples, edge)]
-        vertices = _unturned(_fitted(vertices, rows, pull), start, faces)
+        vertices = _unturned(_fitted(vertices, rows, pull), start, faces, held)
         distances, nearest = distances_to_mesh(samples.points, vertices, faces, nearest)
         beside, edge = rim.nearest(vertices, samples.rim)
         yield Round(vertices, distances, beside)
@@ -147,7 +177,8 @@ class _Rows(NamedTuple):
     def matrix(self, n_vertices: int) -> sparse.csr_matrix:
         """Return the matrix (n, 3 V), each row times the root of its weight."""
         n, k = self.corners.shape
-        values = (self.shares[:, :, None] * self.normal[:, None, :]).reshape(-1) * np.repeat(np.sqrt(self.weights), 3 * k)
+        values = (self.shares[:, :, None] * self.normal[:, None, :]).reshape(-1)
+        values *= np.repeat(np.sqrt(self.weights), 3 * k)
         columns = (3 * self.corners[:, :, None] + np.arange(3)).reshape(-1)
         return sparse.csr_matrix((values, columns, np.arange(0, 3 * k * n + 1, 3 * k)), shape=(n, 3 * n_vertices))
 
@@ -197,16 +228,25 @@ def _fitted(vertices: FloatArray, rows: list[_Rows], pull: float) -> FloatArray:
     return np.asarray(start + step).reshape(-1, 3)
 
 
-def _unturned(vertices: FloatArray, start: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the vertices, but those of triangles that have turned over since the start where they were then."""
-    before = _normals(start, faces)
-    vertices = vertices.copy()
+def _unturned(vertices: FloatArray, start: FloatArray, faces: IntArray, held: Held | None) -> FloatArray:
+    """Return the vertices, but some where they were at the start.
+
+    These are those of triangles that have turned over since, and of edges that have left the lines they stand for.
+    """
+    before, wanted, vertices = _normals(start, faces), vertices, vertices.copy()
+    tries = np.zeros(len(vertices), np.int64)
     while True:  # each time more of them are back
-        turned = np.unique(faces[(_normals(vertices, faces) * before).sum(axis=1) < 0.0])
-        turned = turned[(vertices[turned] != start[turned]).any(axis=1)]
-        if len(turned) == 0:
+        back = np.unique(faces[(_normals(vertices, faces) * before).sum(axis=1) < 0.0])
+        tries[back] = TRIES
+        if held is not None:
+            left = held.left(vertices)
+            back = np.union1d(back, left)
+            tries[left] += 1
+        back = back[(vertices[back] != start[back]).any(axis=1)]
+        if len(back) == 0:
             return vertices
-        vertices[turned] = start[turned]
+        share = np.where(tries[back] < TRIES, 0.5 ** tries[back], 0.0)[:, None]
+        vertices[back] = np.where(share > 0.0, start[back] + share * (wanted[back] - start[back]), start[back])
 
 
 def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

@@ -17,10 +17,11 @@ from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.closed.books import ClosedLive, make_live, with_peaks
 from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspace, triangulate_closed
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
+from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
-from meshsimp_pymoo.surface.closed.refit import Samples, rounds_of_refit
+from meshsimp_pymoo.surface.closed.refit import Held, Samples, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
 from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
@@ -57,6 +58,8 @@ class ClosedSurface(ModelSurface):
     def __init__(self, model: ClosedModel, rules: Rules = DEFAULT) -> None:
         _refuse_rules(model.name, rules)
         self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        if rules.break_lines is not None:
+            self.model = lined_closed_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = named_vertices(self.model, rules.pin)
         self.pinned[self.model.poles] = True
@@ -144,6 +147,14 @@ class ClosedSurface(ModelSurface):
             build(ground, live, np.flatnonzero(kept), self.model.name)
             yield live
 
+    def line_chains(self, kept: BoolArray) -> tuple[IntArray, ...]:
+        """Return each break line as the chain of edges that it is in the mesh of a subset (N,): rows, in order.
+
+        Beside the vertices that thinning left these are the kept ones whose images lie exactly on the line.
+        """
+        lines = self.model.lines
+        return () if lines is None else lines.chains_through(self._ground.lines, kept | self.pinned)
+
     def triangles(self, kept: BoolArray) -> IntArray:
         """Return the triangles (M, 3) of one subset (N,)."""
         return self._triangulated(kept)[0]
@@ -183,8 +194,8 @@ class ClosedSurface(ModelSurface):
         found = triangulate_closed(self._ground, self._workspaces, row)
         if found[1][TRIANGLES] == 0:
             raise ValueError(
-                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4 of each part, "
-                "those that are pinned among them"
+                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4 of each "
+                "part, those that are pinned among them"
             )
         return found
 
@@ -192,7 +203,12 @@ class ClosedSurface(ModelSurface):
         """Return what is said of a mesh of vertices (V, 3) in the frame of the points beside the deviations."""
         centres, share = self._between
         away, _ = distances_to_mesh(centres, vertices, faces)
-        return {"surface_error": float((share * away).sum())} | measured_angles(vertices, faces)
+        said = {"surface_error": float((share * away).sum())} | measured_angles(vertices, faces)
+        lines = self.model.lines
+        if lines is not None:
+            away, _ = distances_to_mesh(np.concatenate(lines.originals), vertices, faces)
+            said |= lines.errors(away)
+        return said
 
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Measure a mesh of the model's own vertices with any edges, by true distance; see :meth:`score`."""
@@ -254,7 +270,7 @@ class ClosedSurface(ModelSurface):
         weights = np.ones(n) if self.model.weights is None else self.model.weights
         best, least, error = self.points[rows], np.inf, before
         samples = self._samples(weights)
-        for vertices, away, beside in rounds_of_refit(best, compact, samples, until=until):
+        for vertices, away, beside in rounds_of_refit(best, compact, samples, held=self._held(rows), until=until):
             there = float((weights * away[:n]).sum())
             # where there are rims they decide too, but the error is never above what it was
             rated = there + float((samples.rim_weights * beside).sum())
@@ -273,6 +289,21 @@ class ClosedSurface(ModelSurface):
         points = np.concatenate([self.points, centres])
         return Samples(points, np.concatenate([weights, share * weights.sum()]), rim, of_rim)
 
+    def _held(self, rows: IntArray) -> Held | None:
+        """Return what break lines ask of the vertices of a mesh, rows of the model, that are moved."""
+        lines = self.model.lines
+        if lines is None:
+            return None
+        kept = np.zeros(self.n_vertices, bool)
+        kept[rows] = True
+        ends = []
+        for line, chain in zip(lines.originals, self.line_chains(kept), strict=True):
+            k = np.arange(len(chain) - 1)
+            _, nearest = distances_to_mesh(line, self.points[chain], np.column_stack([k, k + 1, k + 1]))
+            at = np.searchsorted(rows, chain)
+            ends.append(np.column_stack([at[nearest], at[nearest + 1]]))
+        return Held(np.concatenate(lines.originals), np.concatenate(ends), lines.tolerance)
+
     def __deepcopy__(self, memo: dict[int, Any]) -> ClosedSurface:
         return self
 
@@ -289,8 +320,3 @@ def _refuse_rules(name: str, rules: Rules) -> None:
                 f"{name}: {what}={value!r} (--{what} {value}) describes height surfaces, and this is a closed one, "
                 "whose meshes cover all of it; leave it out"
             )
-    if rules.break_lines is not None:
-        raise ModelError(
-            f"{name}: break lines are for height surfaces, and this is a closed one; leave break_lines "
-            "(--break-lines) out"
-        )
