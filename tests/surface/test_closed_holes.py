@@ -72,6 +72,13 @@ def winds_around(polygon, point):
     return round(angles.sum() / (2.0 * np.pi))
 
 
+def is_over(loops, triangle):
+    """Whether one of four points of a triangle lies in a hole."""
+    centroid = triangle.mean(axis=0)
+    asked = [centroid, *(0.5 * (centroid + corner) for corner in triangle)]
+    return any(winds_around(loop, point) for loop in loops for point in asked)
+
+
 def twin(surface, kept):
     """Return the faces and d_p of all vertices, by another Delaunay triangulation, angles and every triangle asked."""
     model = surface.model
@@ -82,7 +89,7 @@ def twin(surface, kept):
         rows = own[kept[own]]
         plane = Delaunay(model.xy[rows])
         corners, beside = rows[plane.simplices], plane.neighbors
-        shown = [all(winds_around(loop, model.xy[face].mean(axis=0)) == 0 for loop in loops) for face in corners]
+        shown = [not is_over(loops, model.xy[face]) for face in corners]
         corners = np.concatenate([corners, pole[None]])  # the last, which -1 means too
         shown = np.array([*shown, True])
         faces.append(corners[shown])

@@ -41,6 +41,8 @@ LEAST_SHARE = 1e-3
 # Faces whose images are sheared more than this (the sum of both squared stretches over the area's) say nothing of the
 # affine map: they lie where the triangle is cut off by the outside.
 MOST_SHEAR = 50.0
+# Rounds of the mean that is taken where nearly all faces are such: each is nearer by half.
+ROBUST_ROUNDS = 50
 # A corner is sharp if the angles of its faces lack so much of a full turn: those of a cube lack pi / 2, of an
 # icosahedron pi / 3 [radians]. Seen from there no image may be closer to its neighbour than this.
 SHARP, LEAST_EDGE = 1.0, 2.0**-30
@@ -293,9 +295,36 @@ def _unsheared(points: FloatArray, faces: IntArray, xy: FloatArray, pole: IntArr
     J = np.stack([first[fair], second[fair]], axis=2)
     shear = (J @ J.transpose(0, 2, 1)) / determinant[fair][:, None, None]
     area = (length * height)[solid][fair]
-    usual = np.trace(shear, axis1=1, axis2=2) < MOST_SHEAR
+    first_map = np.eye(2)
+    if area[_is_usual(shear)].sum() < 0.5 * area.sum():
+        # seen from a narrow pole all of the surface is sheared, and its mean would be that of the odd faces that are not
+        first_map = _without_shear(_robust_mean(shear, area))
+        shear = first_map @ shear @ first_map
+    usual = _is_usual(shear)
     if not usual.any():
-        return np.eye(2)
-    mean = (area[usual][:, None, None] * shear[usual]).sum(axis=0)
+        return first_map
+    return first_map @ _without_shear((area[usual][:, None, None] * shear[usual]).sum(axis=0))
+
+
+def _is_usual(shear: FloatArray) -> BoolArray:
+    """Tell which of these matrices (n, 2, 2) of determinant 1 are those of faces that say something of all."""
+    return np.asarray(np.trace(shear, axis1=1, axis2=2) < MOST_SHEAR)
+
+
+def _without_shear(mean: FloatArray) -> FloatArray:
+    """Return the symmetric matrix of determinant 1 that makes a shear (2, 2) the identity, but for its size."""
     values, vectors = np.linalg.eigh(mean)
     return np.asarray(vectors @ np.diag((values / np.sqrt(values.prod())) ** -0.5) @ vectors.T)
+
+
+def _robust_mean(shear: FloatArray, area: FloatArray) -> FloatArray:
+    """Return a mean of matrices (n, 2, 2) that counts each by how it looks beside the mean, not by its size.
+
+    D. E. Tyler, "A distribution-free M-estimator of multivariate scatter", Annals of Statistics 15, 1987.
+    """
+    mean = np.eye(2)
+    for _ in range(ROBUST_ROUNDS):
+        beside = np.einsum("ij,kji->k", np.linalg.inv(mean), shear)
+        mean = ((area / beside)[:, None, None] * shear).sum(axis=0)
+        mean /= np.sqrt(np.linalg.det(mean))
+    return mean
