@@ -311,7 +311,7 @@ PAIRS = {
     ("--pin", "corners"): r"pin='corners' .* closed",
     ("--pin", "hull"): r"pin='hull' .* closed",
     ("--pin", "border"): r"pin='border' .* closed",
-    ("--break-lines", "sharp:30"): r"break lines .* closed .*--break-lines",
+    ("--break-lines", "outline"): r"no outline and no holes .*--break-lines outline",
     ("--format", "landxml"): r"--format landxml .*--surface closed",
     ("--free",): r"--free .*--surface closed",
     ("--max-edge", "3"): r"max_edge .*point clouds",

@@ -60,6 +60,7 @@ class Mesh:
     offset: FloatArray
     xy: FloatArray
     weights: FloatArray | None
+    georeference: dict[str, Any]
     repeats: IntArray
     scale: FloatArray
     # rows (C, 2) that no file has, of vertices at the place of another one, and the rows of those

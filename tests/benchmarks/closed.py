@@ -64,7 +64,7 @@ GROUPS = {
         f"whole:{name}"
         for name in (
             *("m1_laurana", "m2_demosthenes", "m3_nefertiti", "m4_skull", "m5_celticskull"),
-            *("l_laurana_front", "f_mask_holes"),
+            "l_laurana_front",
         )
     ),
     "parts": ("pebbles", "pebbles:12000,parts=5,seed=4"),

@@ -115,7 +115,8 @@ def test_what_keeps_a_border_is_compared_on_what_has_holes(name):
     try:
         (mesh,) = baseline_meshes(PARTS, name, [200])
     except ToolUnavailable as reason:
-        assert "no border" not in str(reason)
+        if "no border" in str(reason):
+            raise
         pytest.skip(str(reason))
     assert mesh.triangles <= 200
     assert np.isfinite(mesh.quality.error)

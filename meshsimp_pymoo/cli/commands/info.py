@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.formats.source import SourceMesh
     from meshsimp_pymoo.opening import Judged
     from meshsimp_pymoo.surface.closed.model import Topology
+    from meshsimp_pymoo.surface.kinds import OfModel
     from meshsimp_pymoo.surface.rules import Rules
 
 # What is said of a model whatever it is taken for; None where it is not known, or there is none.
@@ -156,8 +157,6 @@ def _as_height(
     from meshsimp_pymoo.surface.model import build_model
     from meshsimp_pymoo.surface.orient import upright_rotation
     from meshsimp_pymoo.surface.places import count_places
-    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
-    from meshsimp_pymoo.surface.units import length_unit
 
     measured, refusal = source.measured, judged.refusal
     if judged.seen is not None:
@@ -179,10 +178,7 @@ def _as_height(
             "folded over": f"{'' if facts.complete else 'at least '}{facts.n_folded:,} faces ({facts.fold_share:.2%})",
         }
     if rules.break_lines is not None and not refusal:
-        lined = HeightSurface(build_model(source, seen=judged.seen), rules)
-        assert lined.model.lines is not None
-        content["lines"] = facts_of_lines(lined, lined.model.lines)
-        rows["break lines"] = lines_in_words(content["lines"], length_unit(source.georeference))
+        _add_lines(HeightSurface(build_model(source, seen=judged.seen), rules), content, rows)
     why_not: str | None = f"is a {source.sort}"
     if source.sort == "mesh":
         what = topology(source.faces)
@@ -216,7 +212,7 @@ def _as_closed(
     rows["no height field"] = f"it {fault}" if fault else "it could be taken as one (--surface height)"
     try:
         model = closed_model(source)
-        ClosedSurface(model, rules)
+        surface = ClosedSurface(model, rules)
     except ModelError as problem:
         content["not_closed"] = rows["not closed"] = what.refusal or str(problem).removeprefix(f"{source.name}: ")
         return str(problem)
@@ -228,7 +224,18 @@ def _as_closed(
     least = shortest_edge(model.xy, model.faces)
     content |= {"caps": model.n_holes, "least_image_edge": least} | left
     rows["flattened"] = f"the shortest edge is {least:.3g} of the plane's side"
+    _add_lines(surface, content, rows)
     return None
+
+
+def _add_lines(surface: OfModel, content: dict[str, Any], rows: dict[str, str]) -> None:
+    """Add what break lines are and ask of every mesh, if there are any."""
+    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
+    from meshsimp_pymoo.surface.units import length_unit
+
+    if surface.model.lines is not None:
+        content["lines"] = facts_of_lines(surface, surface.model.lines)
+        rows["break lines"] = lines_in_words(content["lines"], length_unit(surface.model.georeference))
 
 
 def _facts_of(what: Topology) -> dict[str, Any]:

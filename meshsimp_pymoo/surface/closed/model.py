@@ -16,7 +16,7 @@ from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint, rim_footprint
 from meshsimp_pymoo.plane.hilbert import HILBERT_BITS, hilbert_keys
-from meshsimp_pymoo.surface.closed.embedding import embed, faults
+from meshsimp_pymoo.surface.closed.embedding import cell_of, embed, faults
 from meshsimp_pymoo.surface.edges import Edges, border_loops, components, next_corner
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.model import Mesh, checksum
@@ -311,7 +311,13 @@ class ClosedModel(Mesh):
     @cached_property
     def part(self) -> IntArray:
         """Which part each vertex belongs to (N,): 0, 1, ... in the order of the poles."""
-        return _parts(self.faces, self.poles, self.n_vertices)
+        found = _parts(self.faces, self.poles, self.n_vertices)
+        if self.lines is not None and len(self.lines.added):  # which are in the cell of their part, and in no face
+            own = cell_of(self.xy, self.n_parts)
+            part_in = np.empty(int(own.max()) + 1, np.int64)
+            part_in[own[self.poles[:, 0]]] = np.arange(self.n_parts)
+            found[self.lines.added] = part_in[own[self.lines.added]]
+        return found
 
     @cached_property
     def rim(self) -> IntArray:
@@ -359,8 +365,25 @@ class ClosedModel(Mesh):
         return checksum(*parts)
 
     def without_lines(self) -> ClosedModel:
-        """Return the model as it was before it had break lines."""
-        return self if self.lines is None else replace(self, lines=None)
+        """Return the model as it was before it had break lines: without them and the vertices that they brought."""
+        if self.lines is None or len(self.lines.added) == 0:
+            return self if self.lines is None else replace(self, lines=None)
+        own = np.ones(self.n_vertices, bool)
+        own[self.lines.added] = False
+        place = np.cumsum(own) - 1
+        weights = None if self.weights is None else self.weights[own]
+        return replace(
+            self,
+            points=self.points[own],
+            faces=place[self.faces].astype(self.faces.dtype),
+            xy=self.xy[own],
+            poles=place[self.poles],
+            source_index=self.source_index[own],
+            file_points=self.file_points[own],
+            attributes={name: values[own] for name, values in self.attributes.items()},
+            weights=None if weights is None or (weights == 1.0).all() else weights,
+            lines=None,
+        )
 
     def with_images(self, xy: FloatArray, source_index: IntArray) -> ClosedModel:
         """Return the model with images (N, 2) that were stored, and in the vector order of the rows stored with them.
@@ -521,11 +544,11 @@ def closed_model(source: SourceMesh) -> ClosedModel:
         scale=source.scale,
         material=source.material,
     )
-    order = _vector_order(found.xy)
+    order = vector_order(found.xy)
     return model._reordered(order, np.ascontiguousarray(found.xy[order]))
 
 
-def _vector_order(xy: FloatArray) -> IntArray:
+def vector_order(xy: FloatArray) -> IntArray:
     """Return the order of images along a Hilbert curve, and within its cells along others: limbs are tiny there."""
     cells = np.floor(xy * 2.0**HILBERT_BITS)
     within = np.ascontiguousarray(xy * 2.0**HILBERT_BITS - cells)

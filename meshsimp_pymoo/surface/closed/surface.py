@@ -20,7 +20,7 @@ from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
 from meshsimp_pymoo.surface.closed.model import LEAST_VERTICES, ClosedModel
-from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
+from meshsimp_pymoo.surface.closed.nearest import distances_to_line, distances_to_mesh
 from meshsimp_pymoo.surface.closed.refit import Held, Samples, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
@@ -58,9 +58,10 @@ class ClosedSurface(ModelSurface):
 
     def __init__(self, model: ClosedModel, rules: Rules = DEFAULT) -> None:
         _refuse_rules(model.name, rules)
-        self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        bare = model if rules.break_lines is None else model.without_lines()
+        self.model = bare if rules.weights is None else bare.with_weights(rules.weights)
         if rules.break_lines is not None:
-            self.model = lined_closed_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
+            self.model = lined_closed_model(self.model, rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = named_vertices(self.model, rules.pin)
         self.pinned[self.model.poles] = True
@@ -310,8 +311,7 @@ class ClosedSurface(ModelSurface):
         kept[rows] = True
         ends = []
         for line, chain in zip(lines.originals, self.line_chains(kept), strict=True):
-            k = np.arange(len(chain) - 1)
-            _, nearest = distances_to_mesh(line, self.points[chain], np.column_stack([k, k + 1, k + 1]))
+            _, nearest = distances_to_line(line, self.points[chain])
             at = np.searchsorted(rows, chain)
             ends.append(np.column_stack([at[nearest], at[nearest + 1]]))
         return Held(np.concatenate(lines.originals), np.concatenate(ends), lines.tolerance)
