@@ -15,7 +15,7 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import InputError, ModelError, ModelWarning
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.surface.closed.lining import _Lining
-from meshsimp_pymoo.surface.closed.model import closed_model
+from meshsimp_pymoo.surface.closed.model import ClosedModel, closed_model
 from meshsimp_pymoo.surface.closed.nearest import distances_to_line
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.closed.tracing import Tracer, near_in_space
@@ -265,6 +265,76 @@ def test_lines_that_are_not_on_the_surface_are_refused(lines, says):
 def test_lines_of_users_need_a_tolerance():
     with pytest.raises(InputError, match="need line_tolerance"):
         lined("cube:9", [[[0, 0, 1], [0.5, 0, 1]]])
+
+
+def test_a_line_that_turns_back_on_itself_is_gone_along_twice():
+    a, b, c = [-0.75, -0.5, 1.0], [0.5, -0.4, 1.0], [0.6, 0.6, 1.0]
+    surface = lined("cube:9", [[a, b, a, b, c]], 0.01)
+    (chain,) = surface.model.lines.chains
+    once = lined("cube:9", [[a, b, c]], 0.01).model.lines.chains[0]
+    assert np.array_equal(chain[-len(once) :], once)
+    assert steps(chain) == steps(once)
+
+
+def random_lines(model: ClosedModel, seed: int) -> list[FloatArray]:
+    """Return up to three lines: far over the body, through vertices, or from vertex to neighbour and a little aside."""
+    rng = np.random.default_rng(seed)
+    lines = []
+    for _ in range(rng.integers(1, 4)):
+        kind, n = rng.integers(3), int(rng.integers(2, 6))
+        if kind == 0:
+            corners = model.file_points[model.faces[rng.integers(len(model.faces), size=n)]]
+            line = (corners * rng.dirichlet([1.0, 1.0, 1.0], n)[:, :, None]).sum(axis=1)
+        elif kind == 1:
+            line = model.file_points[rng.integers(model.n_vertices, size=n)]
+        else:
+            start, around = model.neighbours
+            path = [int(rng.integers(model.n_vertices))]
+            for _ in range(8):
+                path.append(int(rng.choice(around[start[path[-1]] : start[path[-1] + 1]])))
+            aside = rng.choice([0.0, 1e-10, 1e-3, 5e-3]) * model.diagonal
+            line = model.file_points[path] + aside * rng.normal(size=(9, 3))
+        lines.append(line)
+    return lines
+
+
+def check_random_lines(seeds: range) -> None:
+    n_lined = 0
+    for seed in seeds:
+        model = model_of(("sphere:600", "blob:900", "holed", "pair", "cube:9", "cylinder")[seed % 6])
+        tolerance = (0.0, 1e-3, 1e-2, 5e-2)[seed // 6 % 4] * model.diagonal
+        try:
+            surface = ClosedSurface(model, Rules(break_lines=random_lines(model, seed), line_tolerance=tolerance))
+        except ModelError as trouble:
+            if "cross" not in str(trouble):
+                raise
+            continue
+        n_lined += 1
+        lines = surface.model.lines
+        assert len(np.unique(surface.model.xy, axis=0)) == surface.n_vertices
+        for share in (0.0, 0.3):
+            kept = random_subset(surface, share, seed)
+            mesh = surface.simplify(kept)
+            there = edges(mesh.faces)
+            for chain, line in zip(surface.line_chains(kept), lines.originals, strict=True):
+                assert steps(chain) <= there
+                if "vertices_at_the_pole" not in lines.found:
+                    away, _ = distances_to_line(line, surface.points[chain])
+                    assert away.max() <= tolerance * (1.0 + 1e-9) + 2e-9 * surface.diagonal
+            if len(surface.model.rim) == 0:
+                assert mesh.quality.triangles == 2 * kept.sum() - 4 * surface.model.n_parts
+    assert n_lined > len(seeds) / 4
+
+
+@pytest.mark.filterwarnings("ignore:break_lines")
+def test_random_lines_are_refused_or_in_every_mesh_within_the_tolerance():
+    check_random_lines(range(24))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:break_lines")
+def test_many_random_lines_are_refused_or_in_every_mesh_within_the_tolerance():
+    check_random_lines(range(24, 1000))
 
 
 def test_what_leads_away_from_the_surface_is_cut_off_with_its_count():
