@@ -13,13 +13,15 @@ or in YAML::
 Two are real terrain from the sample data that matplotlib installs. The others are made here: surfaces whose
 whole front is known (``plane``, ``roof``, ``pyramid``), smooth and rough test surfaces, a synthetic scan of a
 face, outlines with a hole or a bay, an embankment with break lines (``load_lines``), and closed surfaces, with flat
-faces (``tetrahedron``, ``cube``, ``icosahedron``) or smooth (``sphere``, ``ellipsoid``, ``blob``). Everything is a pure
+faces (``tetrahedron``, ``cube``, ``icosahedron``), smooth (``sphere``, ``ellipsoid``, ``blob``), of several parts
+(``pebbles``) or with sharp edges (``bracket``); a ``blob`` with holes is a scan of a body. Everything is a pure
 function of the parameters, the scan noise included.
 """
 
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -504,27 +506,58 @@ def _scattered(
     if len(rim) > vertices:
         raise ValueError(f"vertices is {vertices}; the outline alone takes {len(rim)}")
 
-    low, extent = outlines[0].min(axis=0), np.ptp(outlines[0], axis=0)
-    start = rng.random(2)
+    box = outlines[0].min(axis=0), np.ptp(outlines[0], axis=0)
+    tries = 1.05 * vertices * float(box[1].prod()) / area
+    inner = _evenly_within(border, vertices - len(rim), gap, box, rng.random(2), tries)
+    inner = inner + rng.uniform(-0.12 * gap, 0.12 * gap, inner.shape)
+    xy = np.concatenate([rim, inner])
+    faces = _delaunay_within(xy, border)
+    z = height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, 1.0, len(xy)) * noise
+    return SourceMesh(np.column_stack([xy, z]), faces, {}, name="scattered", up="z")
+
+
+def _evenly_within(
+    border: list[FloatArray],
+    n: int,
+    gap: float,
+    box: tuple[FloatArray, FloatArray],
+    start: FloatArray,
+    tries: float,
+) -> FloatArray:
+    """Return n points inside closed polygons that keep away from them: the first ones of the R2 sequence that do.
+
+    Parameters
+    ----------
+    border : list of (k, 2) float arrays
+        The outline and the holes, of vertices about ``gap`` apart.
+    n : int
+    gap : float
+        How far the points are apart, about.
+    box : (2,) and (2,) float array
+        Lowest corner and extent of the outline.
+    start : (2,) float array
+        Where the sequence begins, in the unit square.
+    tries : float
+        Of how many terms of the sequence enough are taken, by estimate.
+    """
     inner = np.empty((0, 2))
-    tries = 1.05 * vertices * float(extent.prod()) / area
-    while len(inner) < vertices - len(rim):
+    while len(inner) < n:
         k = np.arange(1, int(tries) + 1)[:, None]
-        even = low + extent * np.mod(start + k / PLASTIC_NUMBER ** np.array([1.0, 2.0]), 1.0)
+        even = box[0] + box[1] * np.mod(start + k / PLASTIC_NUMBER ** np.array([1.0, 2.0]), 1.0)
         inner = even[_inside(even, border) & ~_near(even, border, 0.45 * gap)]
         tries *= 1.3
     # The first points of the sequence are as even as all of them, so that the count can be cut to the wanted
     # one.
-    inner = inner[: vertices - len(rim)]
-    inner = inner + rng.uniform(-0.12 * gap, 0.12 * gap, inner.shape)
-    xy = np.concatenate([rim, inner])
+    return inner[:n]
+
+
+def _delaunay_within(xy: FloatArray, border: list[FloatArray]) -> IntArray:
+    """Return the Delaunay triangles (T, 3) inside closed polygons, whose vertices the points (n, 2) begin with."""
     faces = _delaunay(xy)
-    centre = xy[faces].mean(axis=1)
-    on_rim = (faces < len(rim)).all(axis=1)
+    on_rim = (faces < sum(len(line) for line in border)).all(axis=1)
     outside = np.zeros(len(faces), dtype=bool)
-    outside[on_rim] = ~_inside(centre[on_rim], border)
-    z = height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, 1.0, len(xy)) * noise
-    return SourceMesh(np.column_stack([xy, z]), faces[~outside], {}, name="scattered", up="z")
+    outside[on_rim] = ~_inside(xy[faces[on_rim]].mean(axis=1), border)
+    return faces[~outside]
 
 
 def _evenly_along(polygon: FloatArray, gap: float, rng: np.random.Generator) -> FloatArray:
@@ -669,23 +702,33 @@ def _ellipsoid(vertices: int = 1000, a: float = 3.0, b: float = 2.0, c: float = 
     return _closed(directions * [a, b, c], faces)
 
 
-def _blob(vertices: int = 2000, seed: int = 1, bumps: float = 0.25, stretch: float = 1.0) -> SourceMesh:
-    """Return a smooth closed blob with bumps of that standard deviation, stretched along x, any number of vertices."""
-    if not 0.0 <= bumps <= 0.5:
-        raise ValueError(f"bumps is {bumps:g}; it must be 0 to 0.5 [mean radii]")
+def _blob(vertices: int = 2000, seed: int = 1, bumps: float = 0.25, stretch: float = 1.0, holes: int = 0) -> SourceMesh:
+    """Return a smooth closed blob, its bumps of that deviation, stretched along x; with holes, a scan of it."""
     if not 0.0 < stretch < math.inf:
         raise ValueError(f"stretch is {stretch:g}; it must be more than 0")
     directions, faces = _on_sphere(vertices, seed)
+    points = _bumpy(directions, seed, bumps) * [stretch, 1.0, 1.0]
+    if not holes:
+        return _closed(points, faces)
+    faces = _with_holes(directions, faces, holes, seed)
+    used, corners = np.unique(faces, return_inverse=True)
+    return SourceMesh(points[used], corners.reshape(-1, 3), {}, name="scan")
+
+
+def _bumpy(directions: FloatArray, seed: int, bumps: float) -> FloatArray:
+    """Return the points (n, 3) of a blob of mean radius 1 in these directions."""
+    if not 0.0 <= bumps <= 0.5:
+        raise ValueError(f"bumps is {bumps:g}; it must be 0 to 0.5 [mean radii]")
     # plane waves in all directions, the shorter the lower
     rng = np.random.default_rng(seed + 1)
-    height, square = np.zeros(vertices), 0.0
+    height, square = np.zeros(len(directions)), 0.0
     for length in np.geomspace(*BLOB_WAVES, 32):
         wave = rng.normal(size=3)
         wave *= 2.0 * math.pi / (length * np.linalg.norm(wave))
         height += length * np.cos(directions @ wave + rng.uniform(0.0, 2.0 * math.pi))
         square += 0.5 * length**2
     radius = np.exp(bumps * height / math.sqrt(square))
-    return _closed(directions * radius[:, None] * [stretch, 1.0, 1.0], faces)
+    return directions * radius[:, None]
 
 
 # The longest and the shortest wave on a blob [mean radii].
@@ -703,14 +746,68 @@ def _on_sphere(vertices: int, seed: int) -> tuple[FloatArray, IntArray]:
     turn = math.pi * (math.sqrt(5.0) - 1.0) * k + rng.uniform(0.0, 2.0 * math.pi)
     out = np.sqrt(1.0 - z**2)
     points = np.column_stack([out * np.cos(turn), out * np.sin(turn), z])
-    gap = math.sqrt(8.0 * math.pi / math.sqrt(3.0) / vertices)  # edge of the equilateral triangles that would fill it
+    gap = _gap_on_sphere(vertices)
     points += rng.uniform(-0.12 * gap, 0.12 * gap, points.shape)
     points /= np.linalg.norm(points, axis=1)[:, None]
     return points, _outwards(points, ConvexHull(points).simplices)
 
 
+def _gap_on_sphere(vertices: int) -> float:
+    """Return the edge of the equilateral triangles that would fill the unit sphere."""
+    return math.sqrt(8.0 * math.pi / math.sqrt(3.0) / vertices)
+
+
 # Vertices on a sphere: so many that its centre is within.
 LEAST_ON_SPHERE = 12
+
+# Radii of the first and of the last of several holes, the others between them in equal ratios [radians]; how far a rim
+# is off its circle, as a share of its radius, and from one face to the next [edges of faces]. A hole is so many edges
+# wide at least, and so many stay between two.
+HOLE_RADII, HOLE_WAVE, HOLE_RAGS = (0.4, 0.15), 0.15, 0.5
+LEAST_HOLE, MOST_HOLES, BETWEEN_HOLES = 3.0, 12, 2.0
+
+
+def _with_holes(directions: FloatArray, faces: IntArray, holes: int, seed: int) -> IntArray:
+    """Cut discs of different sizes out of the faces (F, 3) of a sphere; their rims are ragged, as scans have them."""
+    from meshsimp_pymoo.surface.edges import Edges, components
+
+    _check_range("holes", holes, 0, MOST_HOLES)
+    gap = _gap_on_sphere(len(directions))
+    radii = np.geomspace(HOLE_RADII[0], max(HOLE_RADII[1], 0.5 * LEAST_HOLE * gap), holes)
+    rng = np.random.default_rng(seed + 2)
+    centre = directions[faces].mean(axis=1)
+    centre /= np.linalg.norm(centre, axis=1)[:, None]
+    # each is put where it is farthest from those before it, from rim to rim
+    tries = rng.normal(size=(1000, 3))
+    tries /= np.linalg.norm(tries, axis=1)[:, None]
+    apart = np.full(len(tries), np.pi)
+    cut = np.zeros(len(faces), bool)
+    for radius in radii:
+        outer = (1.0 + HOLE_WAVE) * radius
+        middle = tries[np.argmax(apart)]
+        if apart.max() < outer + BETWEEN_HOLES * gap:
+            raise ValueError(f"holes is {holes}; so many do not fit among {len(directions)} vertices")
+        apart = np.minimum(apart, np.arccos(np.clip(tries @ middle, -1.0, 1.0)) - outer)
+        right = np.cross(middle, np.eye(3)[np.argmin(np.abs(middle))])
+        turn = np.arctan2(centre @ np.cross(middle, right), centre @ right)
+        phase = rng.uniform(0.0, 2.0 * math.pi, 2)
+        wave = 0.5 * HOLE_WAVE * (np.sin(3.0 * turn + phase[0]) + np.sin(5.0 * turn + phase[1]))
+        rags = HOLE_RAGS * gap * rng.uniform(-1.0, 1.0, len(faces))
+        cut |= np.arccos(np.clip(centre @ middle, -1.0, 1.0)) < radius * (1.0 + wave) + rags
+    # faces by themselves are no holes, and the model is one part that hangs together in edges
+    first, second = Edges.of(faces[cut]).pairs
+    part = components(int(cut.sum()), first // 3, second // 3)
+    cut[cut] = np.isin(part, np.argsort(-np.bincount(part), kind="stable")[:holes])
+    left = faces[~cut]
+    while True:
+        edges = Edges.of(left)
+        first, second = edges.pairs
+        part = components(len(left), first // 3, second // 3)
+        starts = np.bincount(edges.ends(edges.border)[:, 0], minlength=len(directions))
+        sound = (part == np.argmax(np.bincount(part))) & (starts[left] < 2).all(axis=1)
+        if sound.all():
+            return left
+        left = left[sound]
 
 
 def _outwards(points: FloatArray, faces: npt.NDArray[Any]) -> IntArray:
@@ -724,6 +821,226 @@ def _outwards(points: FloatArray, faces: npt.NDArray[Any]) -> IntArray:
 
 def _closed(points: FloatArray, faces: IntArray) -> SourceMesh:
     return SourceMesh(points, faces, {}, name="closed", is_closed=True)
+
+
+# ------------------------------------------------------------------------------------------- several parts, sharp edges
+
+# Radius of a pebble over that of the one before it, and the space between them [radii of the first].
+PEBBLE_SHRINKS, PEBBLE_SPACE, MOST_PARTS = 0.75, 0.1, 12
+
+
+def _pebbles(vertices: int = 4000, parts: int = 2, seed: int = 1, bumps: float = 0.15) -> SourceMesh:
+    """Return closed pebbles in a row, each smaller than the one before: a model of several parts."""
+    _check_range("parts", parts, 1, MOST_PARTS)
+    _check_range("vertices", vertices, parts * LEAST_ON_SPHERE, MAX_SCATTERED)
+    radii = PEBBLE_SHRINKS ** np.arange(parts)
+    counts = LEAST_ON_SPHERE + _shared_out(vertices - parts * LEAST_ON_SPHERE, radii**2)
+    points = np.empty((0, 3))
+    faces = np.empty((0, 3), np.int64)
+    for k, (radius, n) in enumerate(zip(radii, counts.tolist(), strict=True)):
+        directions, own = _on_sphere(n, seed + k)
+        stone = radius * _bumpy(directions, seed + k, bumps)
+        stone[:, 0] -= stone[:, 0].min()
+        if k:
+            stone[:, 0] += points[:, 0].max() + PEBBLE_SPACE
+        faces = np.concatenate([faces, own + len(points)])
+        points = np.concatenate([points, stone])
+    return _closed(points, faces)
+
+
+def _shared_out(n: int, shares: npt.ArrayLike) -> IntArray:
+    """Divide n things in proportion to shares (k,), the largest remainders rounded up."""
+    exact = n * np.asarray(shares, float) / np.sum(shares)
+    counts = np.floor(exact).astype(np.int64)
+    counts[np.argsort(counts - exact, kind="stable")[: n - counts.sum()]] += 1
+    return counts
+
+
+# Sizes of the bracket [mm]: length of its foot, height of its back, how thick and how wide both are, the radius of the
+# fillet between them, by how much the back is crowned; of the boss on the foot and of the pocket, a blind hole, in the
+# back how far their middles are from the edge, radius, and height or depth; the chamfer and the dish of the boss.
+FOOT, BACK, THICK, WIDE, FILLET, CROWN = 80.0, 60.0, 10.0, 60.0, 25.0, 6.0
+BOSS_AT, BOSS_RADIUS, BOSS_HEIGHT, CHAMFER, DISH = 28.0, 14.0, 12.0, 2.0, 2.0
+POCKET_AT, POCKET_RADIUS, POCKET_DEPTH = 14.0, 8.0, 5.0
+# So many vertices at least, that no round side turns by 30 degrees from one face to the next; so many around a circle.
+LEAST_ON_BRACKET, LEAST_AROUND = 1000, 24
+# The bracket's inner side, flattened, goes along the foot, around the fillet and up the back.
+BEND, TURN = FOOT - THICK - FILLET, 0.5 * math.pi * FILLET
+INNER = BEND + TURN + BACK - THICK - FILLET
+
+# A flat piece of a surface, as its outline and holes, each (k, 2), and how it lies in space.
+Panel = tuple[list[FloatArray], Callable[[FloatArray], FloatArray]]
+
+
+def _bracket(vertices: int = 5000) -> SourceMesh:
+    """Return a closed bracket in millimetres, as from CAD: flat and round sides, a boss, a blind hole, sharp edges."""
+    _check_range("vertices", vertices, LEAST_ON_BRACKET, MAX_SCATTERED)
+    profile = FOOT * THICK + (BACK - THICK) * THICK + (1.0 - 0.25 * math.pi) * FILLET**2
+    area = 2.0 * profile + WIDE * (FOOT + BACK + 2.0 * THICK + INNER)
+    area += 2.0 * math.pi * (BOSS_RADIUS * BOSS_HEIGHT + POCKET_RADIUS * POCKET_DEPTH)
+    gap = math.sqrt(area * 2.0 / math.sqrt(3.0) / vertices)  # edge of the equilateral triangles that would cover it
+
+    boss, boss_top, boss_points, boss_faces = _turned(
+        (BOSS_AT, BOSS_RADIUS),
+        [(BOSS_RADIUS, 0.0), (BOSS_RADIUS, BOSS_HEIGHT - CHAMFER), (BOSS_RADIUS - CHAMFER, BOSS_HEIGHT)],
+        (0.0, 0.0, 1.0),
+        DISH,
+        gap,
+    )
+    pocket, pocket_end, pocket_points, pocket_faces = _turned(
+        (INNER - POCKET_AT, POCKET_RADIUS),
+        [(POCKET_RADIUS, 0.0), (POCKET_RADIUS, POCKET_DEPTH)],
+        (-1.0, 0.0, 0.0),
+        0.0,
+        gap,
+    )
+    side = _side_of_bracket(gap)
+    bottom, top = _rectangle(WIDE, FOOT, gap)[:, ::-1], _rectangle(THICK, WIDE, gap)
+    for edge in (bottom, top):  # of the back, which is crowned
+        edge[edge[:, 0] == 0.0, 0] = _crown(edge[edge[:, 0] == 0.0, 1])
+    panels: list[Panel] = [
+        ([bottom[:, ::-1]], lambda flat: np.insert(flat[:, ::-1], 2, 0.0, axis=1)),
+        ([_rectangle(BACK, WIDE, gap)], lambda flat: np.column_stack([_crown(flat[:, 1]), flat[:, ::-1]])),
+        ([top], lambda flat: np.insert(flat, 2, BACK, axis=1)),
+        ([_rectangle(WIDE, THICK, gap)], lambda flat: np.insert(flat, 0, FOOT, axis=1)),
+        ([_rectangle(WIDE, INNER, gap), boss, pocket], _inner_side),
+        ([side], lambda flat: np.insert(flat, 1, 0.0, axis=1)),
+        ([side[:, ::-1]], lambda flat: np.insert(flat[:, ::-1], 1, WIDE, axis=1)),
+        boss_top,
+        pocket_end,
+    ]
+    return _closed(*_sewn(panels, [(boss_points, boss_faces), (pocket_points, pocket_faces)], vertices, gap))
+
+
+def _crown(across: FloatArray) -> FloatArray:
+    """Return where the bracket's back is along its foot."""
+    return CROWN * ((2.0 * across / WIDE - 1.0) ** 2 - 1.0)
+
+
+def _inner_side(flat: FloatArray) -> FloatArray:
+    """Return where points of the bracket's inner side are in space, given across and along it."""
+    across, along = flat.T
+    angle = np.clip((along - BEND) / FILLET, 0.0, 0.5 * math.pi)
+    up = along >= BEND + TURN
+    x = np.where(up, THICK, FOOT - np.minimum(along, BEND) - FILLET * np.sin(angle))
+    z = np.where(up, BACK - (INNER - along), THICK + FILLET * (1.0 - np.cos(angle)))
+    return np.column_stack([x, across, z])
+
+
+def _side_of_bracket(gap: float) -> FloatArray:
+    """Return the outline (k, 2) of the bracket seen from its side, anticlockwise from the heel, in x and z."""
+    foot, end, back = (_steps(size, gap) for size in (FOOT, THICK, BACK))
+    inner = _inner_side(np.insert(_steps(INNER, gap)[:, None], 0, 0.0, axis=1))[:, ::2]
+    lines = [
+        np.insert(foot[:, None], 1, 0.0, axis=1),
+        np.insert(end[:, None], 0, FOOT, axis=1),
+        inner,
+        np.insert(end[::-1, None], 1, BACK, axis=1),
+        np.insert(back[::-1, None], 0, 0.0, axis=1),
+    ]
+    return np.concatenate([line[:-1] for line in lines])
+
+
+def _steps(length: float, gap: float) -> FloatArray:
+    """Return places along an edge, both its ends among them, about a gap apart."""
+    return np.linspace(0.0, length, max(1, round(length / gap)) + 1)
+
+
+def _rectangle(width: float, height: float, gap: float) -> FloatArray:
+    """Return the outline (k, 2) of a rectangle, anticlockwise."""
+    across, up = _steps(width, gap), _steps(height, gap)
+    lines = [(across, 0.0, 1), (up, width, 0), (across[::-1], height, 1), (up[::-1], 0.0, 0)]
+    return np.concatenate([np.insert(at[:-1, None], axis, level, axis=1) for at, level, axis in lines])
+
+
+def _turned(
+    place: tuple[float, float],
+    profile: list[tuple[float, float]],
+    axis: tuple[float, float, float],
+    dish: float,
+    gap: float,
+) -> tuple[FloatArray, Panel, FloatArray, IntArray]:
+    """Make a round thing on the inner side of the bracket of rings of vertices, each turned by half a step.
+
+    Parameters
+    ----------
+    place : (float, float)
+        How far along the side its middle is, and its radius there.
+    profile : list of (float, float)
+        Radius and height of the circles that are its edges, from the side on.
+    axis : (float, float, float)
+        Which way its height goes.
+    dish : float
+        How deep the middle of its end is below the last circle.
+    gap : float
+        How far vertices are apart, about.
+
+    Returns
+    -------
+    rim : (k, 2) float array
+        The outline that it has on the side.
+    end : Panel
+        The disc that it ends with.
+    points : (n, 3) float array
+    faces : (F, 3) int array
+        All but the disc, seen from outside.
+    """
+    along, radius = place
+    around = max(LEAST_AROUND, round(2.0 * math.pi * radius / gap))
+    stations = np.array(profile[:1])
+    for start, stop in itertools.pairwise(profile):
+        n_strips = max(1, round(math.dist(start, stop) / gap))
+        stations = np.concatenate([stations, np.linspace(start, stop, n_strips + 1)[1:]])
+    flat = []
+    for k, (width, _) in enumerate(stations):
+        angle = 2.0 * math.pi * (np.arange(around) + 0.5 * k) / around
+        flat.append([0.5 * WIDE, along] + width * np.column_stack([np.cos(angle), np.sin(angle)]))
+    points = [_inner_side(ring) + height * np.array(axis) for ring, (_, height) in zip(flat, stations, strict=True)]
+    here = np.arange(around)
+    there = np.roll(here, -1)
+    strip = np.concatenate([[here, there, here + around], [there, there + around, here + around]], axis=1).T
+    faces = np.concatenate([strip + k * around for k in range(len(stations) - 1)])
+
+    def end(disc: FloatArray) -> FloatArray:
+        out = np.minimum(np.hypot(*(disc - [0.5 * WIDE, along]).T) / profile[-1][0], 1.0)
+        out[:around] = 1.0  # the rim
+        return _inner_side(disc) + (profile[-1][1] - dish * (1.0 - out**2))[:, None] * np.array(axis)
+
+    return flat[0], ([flat[-1]], end), np.concatenate(points), faces
+
+
+def _sewn(
+    panels: list[Panel], pieces: list[tuple[FloatArray, IntArray]], vertices: int, gap: float
+) -> tuple[FloatArray, IntArray]:
+    """Fill panels with vertices, exactly so many in all, and join them and what is made already along common edges.
+
+    Parameters
+    ----------
+    panels : list of Panel
+    pieces : list of (n, 3) float and (F, 3) int arrays
+        Points and faces.
+    vertices : int
+        In all, each counted once where several panels and pieces have it.
+    gap : float
+        How far they are apart, about.
+    """
+    rims = [lift(np.concatenate(outlines)) for outlines, lift in panels]
+    n_given = len(np.unique(np.concatenate([*rims, *(points for points, _ in pieces)]), axis=0))
+    sizes = []
+    for outlines, _ in panels:
+        length = sum(np.hypot(*(line - np.roll(line, 1, axis=0)).T).sum() for line in outlines)
+        sizes.append(_signed_area(outlines[0]) - sum(map(_signed_area, outlines[1:])) - 0.5 * gap * length)
+    places, faces = [points for points, _ in pieces], [corners for _, corners in pieces]
+    for (outlines, lift), n in zip(panels, _shared_out(vertices - n_given, np.abs(sizes)).tolist(), strict=True):
+        box = outlines[0].min(axis=0), np.ptp(outlines[0], axis=0)
+        tries = 1.5 * n * float(box[1].prod()) / abs(_signed_area(outlines[0]))
+        flat = np.concatenate([*outlines, _evenly_within(outlines, n, gap, box, np.full(2, 0.5), tries)])
+        places.append(lift(flat))
+        faces.append(_delaunay_within(flat, outlines))
+    before = np.cumsum([0, *map(len, places[:-1])])
+    joined = np.concatenate([corners + n for corners, n in zip(faces, before, strict=True)])
+    place, row = np.unique(np.concatenate(places), axis=0, return_inverse=True)
+    return place, row.ravel()[joined]
 
 
 # ------------------------------------------------------------------------------------------------ names and parameters
@@ -748,6 +1065,8 @@ _MODELS: dict[str, Callable[..., SourceMesh]] = {
     "sphere": _sphere,
     "ellipsoid": _ellipsoid,
     "blob": _blob,
+    "pebbles": _pebbles,
+    "bracket": _bracket,
 }
 # The break lines of those that have any; their parameters are the models'.
 _LINES: dict[str, Callable[..., SourceLines]] = {"embankment": _embankment_lines}

@@ -110,8 +110,10 @@ def coloured(source: SourceMesh) -> SourceMesh:
     return dataclasses.replace(source, attributes=attributes)
 
 
-# Built-in models that are closed surfaces; all others are height fields.
+# Built-in models that are one closed surface around their origin, all of which is seen from there; with those that are
+# not so simple, the bodies. All others are height fields.
 CLOSED = ("tetrahedron", "cube", "icosahedron", "sphere", "ellipsoid", "blob")
+BODIES = (*CLOSED, "pebbles", "bracket")
 
 # Models so small that every triangle can look at every vertex: known ridges, holes, bays, and a scan's outline.
 SMALL = {

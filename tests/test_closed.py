@@ -179,19 +179,19 @@ def test_saved_twice_a_front_is_the_same_bytes(front, tmp_path):
 # ------------------------------------------------------------------------------------------- images of another version
 
 
-def last_bits(points, faces):
+def last_bits(points, faces, part):
     """Flatten as usual, and move images in their last bits as other libraries would."""
-    found = embedding.embed(points, faces)
+    found = embedding.embed(points, faces, part)
     moved = found.xy + 2.0**-52 * np.random.default_rng(1).integers(-3, 4, found.xy.shape)
     moved[found.poles] = found.xy[found.poles]
     return found._replace(xy=moved)
 
 
-def another_pole(points, faces):
+def another_pole(points, faces, part):
     """Flatten from within another face, as where several are equally near to the middle but for rounding."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(embedding, "_trunk_face", lambda *_: 7)
-        return embedding.embed(points, faces)
+        return embedding.embed(points, faces, part)
 
 
 OTHERS = [last_bits, another_pole]
@@ -210,7 +210,7 @@ def test_a_front_made_with_other_images_is_read_back_as_it_was_made(ball, tmp_pa
     assert usual.hash == problem.model.hash
     for given in (None, ball, usual, surface_of(usual, made.surface.rules)):
         read = Front.load(tmp_path / "out", model=given)
-        for name in ("xy", "pole", "faces", "points", "source_index", "weights"):
+        for name in ("xy", "poles", "faces", "points", "source_index", "weights"):
             assert np.array_equal(getattr(read.model, name), getattr(problem.model, name)), name
         for one, same in zip(made, read, strict=True):
             assert np.array_equal(one.faces, same.faces)
@@ -319,8 +319,8 @@ PAIRS = {
     ("--tile", "64"): r"closed surface.*tiles",
     ("--up", "z", *CLOSED): r"--up z .*--surface closed",
     ("--patch", "front", *CLOSED): r"--patch front .*--surface closed",
-    ("--up", "z"): r"--surface closed .*--patch front",
-    ("--surface", "height"): r"--patch front",
+    ("--up", "z"): r"--patch front.* leave --up z out",
+    ("--surface", "height"): r"--patch front.* leave --surface height out",
     ("--triangles", "3"): r"--triangles 3 is impossible: .* 4 to 320 triangles",
 }
 
@@ -409,22 +409,23 @@ def test_info_says_what_a_closed_model_is(ball, folder, capsys):
     for label, text in {"surface": "closed", "genus": "0", "parts": "1", "holes": "0"}.items():
         assert re.search(rf"^  {label} +{text}$", out, re.MULTILINE)
     assert out.endswith("  verdict         usable: a closed surface of genus 0\n")
-    assert re.search(r"^  no height field faces all ways alike", out, re.MULTILINE)
+    assert re.search(r"^  no height field it has no border$", out, re.MULTILINE)
     assert run("info", ball, "--json") == 0
     said = json.loads(capsys.readouterr().out)
-    known = {"surface": "closed", "components": 1, "genus": 0, "loops": 0, "caps": 0, "flips": 0, "refusal": None}
+    known = {"surface": "closed", "components": 1, "genus": 0, "loops": 0, "rim_edges": 0, "caps": 0, "refusal": None}
     assert {name: said[name] for name in known} == known
+    assert (said["copied"], said["small_parts_left_out"]) == (0, 0)
     model = open_model(ball)
     ends = model.xy[model.faces[:, [0, 1, 2, 0]]]
     assert said["least_image_edge"] == pytest.approx(np.linalg.norm(np.diff(ends, axis=1), axis=2).min(), rel=1e-12)
-    assert "faces all ways alike" in said["not_height"]
+    assert said["not_height"] == "has no border"
     assert said["not_closed"] is None
 
 
 def test_info_says_why_a_model_is_neither_or_could_be_the_other(ball, folder, capsys):
     assert run("info", folder / "ring.ply", "--json") == 2
     said = json.loads(capsys.readouterr().out)
-    assert (said["surface"], said["genus"], said["flips"]) == (None, 1, None)
+    assert (said["surface"], said["genus"], said["caps"]) == (None, 1, None)
     assert said["not_closed"].startswith("has genus 1")
     assert "has genus 1" in said["refusal"]
     assert run("info", ball, "--up", "z") == 2

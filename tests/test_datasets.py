@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import matplotlib.cbook
 import numpy as np
 import pytest
 import trimesh
-from samples import CLOSED
+from samples import BODIES, CLOSED
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.datasets import describe, load, names
@@ -34,7 +36,7 @@ def subset(model, *positions):
 CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 
-@pytest.mark.parametrize("name", [name for name in names() if name not in CLOSED])
+@pytest.mark.parametrize("name", [name for name in names() if name not in BODIES])
 def test_every_other_built_in_is_an_open_height_field_that_can_be_simplified(name):
     model = build_model(load(SMALL.get(name, name)))
     assert model.up.tolist() == [0, 0, 1]
@@ -88,6 +90,77 @@ def test_a_sphere_an_ellipsoid_and_a_blob_without_bumps_are_those():
     assert np.array_equal(load("blob:3000,bumps=0,stretch=4").points[:, 0], 4.0 * sphere.points[:, 0])
     radius = np.log(np.linalg.norm(load("blob:3000").points, axis=1))
     assert 0.1 < radius.std() < 0.4
+
+
+# How long the bracket's sharp edges are [mm]: from side to side, two of them crowned by 6 on 60, around both sides,
+# around the boss and the hole.
+CROWNED = 2.0 * np.hypot(1.0, 24.0 / 60.0 * np.linspace(0.0, 1.0, 10_001)).mean() * 30.0
+SIDE = 80.0 + 10.0 + (45.0 + 12.5 * np.pi + 25.0) + 10.0 + 60.0
+SHARP = 3 * 60.0 + 2 * CROWNED + 2 * SIDE + 2 * np.pi * (14.0 + 14.0 + 12.0 + 8.0 + 8.0)
+
+
+@pytest.mark.parametrize("vertices", [1000, 1001, 3333, 12_000])
+def test_a_bracket_is_one_closed_part_of_known_volume_and_known_sharp_edges(vertices):
+    source = load("bracket", vertices=vertices)
+    assert len(source.points) == len(np.unique(source.points, axis=0)) == vertices
+    assert topology(source.faces).is_sphere
+    part = trimesh.Trimesh(source.points, source.faces, process=False)
+    boss = np.pi * (14.0**2 * 10.0 + (14.0**2 + 14.0 * 12.0 + 12.0**2) * 2.0 / 3.0 - 12.0**2 * 2.0 / 2.0)
+    prism = 60.0 * (80.0 * 10.0 + 50.0 * 10.0 + (1.0 - np.pi / 4) * 25.0**2 + 6.0 * 2.0 / 3.0 * 60.0)
+    assert part.volume == pytest.approx(prism + boss - np.pi * 8.0**2 * 5.0, rel=2e-3)
+    ends = source.points[part.face_adjacency_edges[part.face_adjacency_angles > np.radians(30.0)]]
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(SHARP, rel=2e-3)
+    flat = part.face_adjacency_angles < 1e-6
+    assert flat.mean() > 0.5  # so that there is something to take away
+    assert part.face_adjacency_angles[part.face_adjacency_angles < np.radians(30.0)].max() < np.radians(20.0)
+
+
+@pytest.mark.parametrize(("vertices", "parts"), [(36, 3), (4001, 2), (4000, 7)])
+def test_pebbles_are_so_many_closed_parts_each_smaller_than_the_one_before_and_apart(vertices, parts):
+    source = load("pebbles", vertices=vertices, parts=parts)
+    what = topology(source.faces)
+    assert (what.components, what.loops, what.genus, len(source.points)) == (parts, 0, 0, vertices)
+    stones = trimesh.Trimesh(source.points, source.faces, process=False).split()
+    assert all(stone.is_watertight and stone.volume > 0 for stone in stones)
+    stones = sorted(stones, key=lambda stone: stone.bounds[0, 0])
+    for one, two in itertools.pairwise(stones):
+        assert two.bounds[0, 0] - one.bounds[1, 0] == pytest.approx(0.1)
+        assert len(two.vertices) <= len(one.vertices)
+    one, blob = load("pebbles:500,parts=1,bumps=0.25"), load("blob:500")
+    assert np.array_equal(one.faces, blob.faces)
+    np.testing.assert_allclose(np.ptp(one.points, axis=0), np.ptp(blob.points, axis=0), rtol=1e-14)
+
+
+def _rims(faces):
+    """Return the vertices of each closed row of edges that have one face, one after the other."""
+    ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).tolist()
+    both = {tuple(pair) for pair in ends}
+    after = {a: b for a, b in ends if (b, a) not in both}
+    rims = []
+    while after:
+        rims.append([next(iter(after))])
+        while rims[-1][-1] in after:
+            rims[-1].append(after.pop(rims[-1][-1]))
+        assert rims[-1].pop() == rims[-1][0]
+    return rims
+
+
+@pytest.mark.parametrize(
+    ("name", "holes"), [("blob:500,holes=1", 1), ("blob:3000,holes=5", 5), ("blob:3000,holes=12", 12)]
+)
+def test_a_scan_of_a_blob_has_its_holes_of_different_sizes_with_ragged_rims_and_no_other_fault(name, holes):
+    source, whole = load(name), load(name, holes=0)
+    what = topology(source.faces)
+    assert (what.components, what.loops, what.crowded, what.touching, what.mismatched) == (1, holes, 0, 0, 0)
+    scan = trimesh.Trimesh(source.points, source.faces, process=False)
+    assert scan.euler_number == 2 - holes  # no handle
+    assert {tuple(point) for point in source.points.tolist()} < {tuple(point) for point in whole.points.tolist()}
+    assert not source.is_closed
+    rims = _rims(source.faces)
+    assert [len(rims), len({vertex for rim in rims for vertex in rim})] == [holes, sum(map(len, rims))]
+    if holes > 1:
+        lengths = [np.linalg.norm(np.diff(source.points[[*rim, rim[0]]], axis=0), axis=1).sum() for rim in rims]
+        assert max(lengths) > 1.5 * min(lengths)
 
 
 @pytest.mark.parametrize("name", names())
@@ -238,6 +311,13 @@ def test_parameters_by_keyword_win_over_spelled_ones():
         ("ellipsoid:99,b=0", r"b is 0; a semi-axis must be more than 0"),
         ("blob:99,bumps=1", r"bumps is 1; it must be 0 to 0.5"),
         ("blob:99,stretch=-1", r"stretch is -1; it must be more than 0"),
+        ("blob:99,holes=13", r"holes is 13; it must be 0 to 12"),
+        ("blob:99,holes=-1", r"holes is -1; it must be 0 to 12"),
+        ("blob:99,holes=9", r"holes is 9; so many do not fit among 99 vertices"),
+        ("pebbles:23", r"vertices is 23; it must be 24 to 2000000"),
+        ("pebbles:99,parts=0", r"parts is 0; it must be 1 to 12"),
+        ("pebbles:99,bumps=-1", r"bumps is -1; it must be 0 to 0.5"),
+        ("bracket:999", r"vertices is 999; it must be 1000 to 2000000"),
         ("jacksboro:11,vertices=5000", r"vertices is 5000; it must be 4 to 1184"),
     ],
 )

@@ -67,7 +67,8 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
-from meshsimp_pymoo.surface.closed.model import LEAST_TRIANGLES, ClosedModel
+from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.kinds import OfModel, as_stored, stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import MEASURES
@@ -228,7 +229,9 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
             raise UsageError(said)
         if not quiet:
             say(f"{said}; looking for one all the same, as open bays may allow it")
-    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles or LEAST_TRIANGLES
+    surface = problem.surface
+    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles
+    least = surface.least_triangles if isinstance(surface, ClosedSurface) else least
     if wish.triangles is not None and wish.triangles < least:
         raise UsageError(
             f"--triangles {wish.triangles} is impossible: {problem.model.name} has {least} to "

@@ -144,7 +144,7 @@ class Rules:
 
     @property
     def spares_uncovered(self) -> bool:
-        """Whether a vertex that no triangle covers costs nothing; on a closed surface there is none."""
+        """Whether a vertex that no triangle covers costs nothing; of a closed surface it costs its distance."""
         return self.outside == "ignore"
 
     @property

@@ -144,8 +144,8 @@ def test_a_model_turned_shifted_scaled_and_listed_otherwise_has_the_same_errors(
     one, other = (ClosedSurface(closed_model(mesh)) for mesh in (source, moved))
     for share in (0.02, 0.2, 0.6):
         in_file = rng.random(len(source.points)) < share
-        in_file[one.model.source_index[one.model.poles]] = True
-        assert set(listed[other.model.source_index[other.model.poles]]) <= set(np.flatnonzero(in_file))
+        in_file[one.model.source_index[one.model.poles[0]]] = True
+        assert set(listed[other.model.source_index[other.model.poles[0]]]) <= set(np.flatnonzero(in_file))
         first = one.simplify(in_file[one.model.source_index])
         second = other.simplify(in_file[listed][other.model.source_index])
         assert second.quality.triangles == first.quality.triangles
@@ -240,31 +240,11 @@ def torus() -> SourceMesh:
     return SourceMesh(np.array(ring.vertices), np.array(ring.faces, np.int64), {}, "torus")
 
 
-def two_spheres() -> SourceMesh:
-    one = load("sphere:60")
-    return SourceMesh(
-        np.concatenate([one.points, one.points + 5]), np.concatenate([one.faces, one.faces + 60]), {}, "two"
-    )
-
-
-def holed() -> SourceMesh:
-    one = load("sphere:60")
-    return SourceMesh(one.points, one.faces[1:], {}, "holed")
-
-
 def finned() -> SourceMesh:
     one = load("sphere:60")
     a, b = one.faces[0][:2]
     points = np.concatenate([one.points, [[3.0, 0.0, 0.0]]])
     return SourceMesh(points, np.concatenate([one.faces, [[a, b, 60]]]), {}, "finned")
-
-
-def touching() -> SourceMesh:
-    """Return a sphere, two opposite vertices of which are one."""
-    one = load("sphere:60")
-    far = int(np.argmin(one.points @ one.points[0]))
-    faces = np.where(one.faces == far, 0, one.faces - (one.faces > far))
-    return SourceMesh(np.delete(one.points, far, axis=0), faces, {}, "touching")
 
 
 def wound_against(face: int) -> SourceMesh:
@@ -292,10 +272,7 @@ def smaller(by: float) -> SourceMesh:
     ("make", "says"),
     [
         (torus, "torus: has genus 1"),
-        (two_spheres, "two: has 2 parts"),
-        (holed, "holed: has 1 hole"),
-        (finned, r"finned: is not manifold \(1 edge of more than two faces\)"),
-        (touching, r"touching: is not manifold \(1 vertex in which several fans of faces meet"),
+        (finned, r"finned: is not manifold \(1 edge of more than two faces\), first at \("),
         (lambda: tube(100), "tube: cannot be flattened: .* coincide and .* flipped"),
         (lambda: wound_against(3), "against: is not wound alike, or has one side only .3 edges between"),
         (lambda: dataclasses.replace(load("roof:3"), name="roof"), "roof: is a grid, which has one height .* leave"),
@@ -329,10 +306,9 @@ def test_a_limb_of_60_radii_can_be_flattened_from_its_middle():
     assert mesh.quality.triangles == len(surface.faces)
 
 
-@pytest.mark.parametrize("make", [torus, two_spheres, holed])
-def test_without_a_word_about_its_kind_it_is_refused_in_one_line_too(make):
+def test_without_a_word_about_its_kind_it_is_refused_in_one_line_too():
     with pytest.raises(ModelError, match="closed surface") as caught:
-        open_model(make())
+        open_model(torus())
     assert "\n" not in str(caught.value)
 
 

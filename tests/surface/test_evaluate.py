@@ -10,7 +10,7 @@ import pytest
 from delaunay import faces_of
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from samples import CLOSED, SMALL, stepped_model, subset, surface
+from samples import BODIES, SMALL, stepped_model, subset, surface
 
 from meshsimp_pymoo.datasets import load, names
 from meshsimp_pymoo.errors import ModelWarning
@@ -374,7 +374,7 @@ def assert_referee_agrees(referee, model, shares, rules=RULES):
             assert (~covered).sum() == bare
 
 
-@pytest.mark.parametrize("name", [n for n in names() if n not in ("jacksboro", "topobathy", *CLOSED)])
+@pytest.mark.parametrize("name", [n for n in names() if n not in ("jacksboro", "topobathy", *BODIES)])
 def test_the_referee_agrees_on_built_in_models(referee, name):
     assert_referee_agrees(referee, build_model(load(name)), [0.03, 0.5])
 

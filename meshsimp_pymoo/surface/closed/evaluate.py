@@ -7,8 +7,10 @@ ones are hardly ever nearer, so that d_p is at least the true distance, and as a
 belongs to the triangle on the left of the edge from its first to its second vertex, so that no walk decides.
 
 Where there are several parts, the edges of their poles are forced, and what lies between them is outside. Where there
-are holes, a triangle whose centroid lies in one is no part of the mesh. If none of the four triangles is, d_p is the
-distance to the pole, which every mesh has; and so it is for a kept vertex that no triangle of the mesh uses.
+are holes, a triangle is no part of the mesh if its centroid lies in one, or a point halfway from there to a corner: no
+vertex is where a triangle hangs over a hole, so that it costs nothing, and by the centroid alone half of it would. If
+none of the four triangles is part of the mesh, d_p is the distance to the pole, which every mesh has; and so it is for
+a kept vertex that no triangle of the mesh uses.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from meshsimp_pymoo.plane.borrow import borrowed
 from meshsimp_pymoo.plane.constraints import constrain, holds_line, place_of
 from meshsimp_pymoo.plane.emission import is_in_faces
 from meshsimp_pymoo.plane.faces import canonical_faces
+from meshsimp_pymoo.plane.footprint import inside
 from meshsimp_pymoo.plane.predicates import orient_sign
 from meshsimp_pymoo.plane.triangulation import (
     LAST_INDEX,
@@ -87,13 +90,27 @@ def is_outside(part: np.ndarray, a: int, b: int, c: int) -> bool:
     return len(part) > 0 and (part[a] != part[b] or part[a] != part[c])
 
 
+@inner
+def _is_over_hole(ground: ClosedGround, a: int, b: int, c: int) -> bool:
+    """Whether the centroid of (a, b, c), or a point halfway from there to a corner, lies in a hole."""
+    xy = ground.xy
+    if not is_in_faces(xy, ground.footprint, xy, a, b, c):
+        return True
+    for _ in range(3):
+        x3 = 0.5 * (4.0 * xy[2 * a] + (xy[2 * b] + xy[2 * c]))
+        y3 = 0.5 * (4.0 * xy[2 * a + 1] + (xy[2 * b + 1] + xy[2 * c + 1]))
+        if not inside(xy, ground.footprint, x3, y3):
+            return True
+        a, b, c = b, c, a
+    return False
+
+
 @inner(inline=True)
 def is_hole(ground: ClosedGround, a: int, b: int, c: int) -> bool:
-    """Whether triangle (a, b, c) of vertices of one part lies in a hole, and holds no break line in the mesh."""
+    """Whether triangle (a, b, c) of vertices of one part lies over a hole, and holds no break line in the mesh."""
     if ground.footprint.side == 0:
         return False
-    xy = ground.xy
-    return not is_in_faces(xy, ground.footprint, xy, a, b, c) and not holds_line(xy, ground.lines, a, b, c)
+    return _is_over_hole(ground, a, b, c) and not holds_line(ground.xy, ground.lines, a, b, c)
 
 
 @inner(inline=True)

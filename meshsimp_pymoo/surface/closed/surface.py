@@ -1,4 +1,4 @@
-"""The closed surface: a mesh of genus 0 without a border, where a subset means the convex hull of its images."""
+"""The closed surface: parts of genus 0, with holes or without, where a subset means the convex hulls of its images."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspa
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
-from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.closed.model import LEAST_VERTICES, ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import distances_to_line, distances_to_mesh
-from meshsimp_pymoo.surface.closed.refit import Held, rounds_of_refit
+from meshsimp_pymoo.surface.closed.refit import Held, Samples, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
 from meshsimp_pymoo.surface.rules import DEFAULT, OF_HEIGHTS, Rules
@@ -29,6 +29,8 @@ from meshsimp_pymoo.surface.score import measured_angles, mesh_quality
 from meshsimp_pymoo.surface.surface import ModelSurface, Refitted, Scored, Simplified, View, checked_faces
 from meshsimp_pymoo.workers import Reserve
 
+# What a sample of a rim counts where vertices are moved, as a share of what a vertex does.
+RIM_WEIGHT = 0.25
 # From so many vertices on, books and workspaces that are not used are given back: hundreds of bytes a vertex each.
 LARGE = 300_000
 
@@ -36,9 +38,10 @@ LARGE = 300_000
 class ClosedSurface(ModelSurface):
     """A closed model and the rules for it; see `Surface` for what its attributes are.
 
-    The mesh of a subset is the Delaunay triangulation of its images and the outside as one more triangle: it is
-    watertight, of genus 0, uses all n vertices and has 2 n - 4 triangles. The deviation d_p of a vertex is its distance
-    in space to the triangle that holds its image and to those across its edges.
+    The mesh of a subset is the Delaunay triangulation of its images and the outside of each part as one more triangle,
+    without what lies in holes. Without holes each part is watertight, of genus 0, uses all n vertices and has 2 n - 4
+    triangles. The deviation d_p of a vertex is its distance in space to the triangle that holds its image and to those
+    across its edges, as far as they are in the mesh.
 
     Parameters
     ----------
@@ -79,6 +82,17 @@ class ClosedSurface(ModelSurface):
     def border(self) -> IntArray:
         """The vertices at the rims of holes."""
         return self.model.border
+
+    @property
+    def least_triangles(self) -> int:
+        """No mesh has fewer triangles: each part has its pole, and without holes two for each vertex but four.
+
+        With holes more vertices can be fewer triangles.
+        """
+        if len(self.model.rim):
+            return self.model.n_parts
+        pinned = np.bincount(self.model.part[self.pinned], minlength=self.model.n_parts)
+        return int((2 * np.maximum(pinned, LEAST_VERTICES) - 4).sum())
 
     @property
     def places(self) -> FloatArray:
@@ -193,8 +207,8 @@ class ClosedSurface(ModelSurface):
         found = triangulate_closed(self._ground, self._workspaces, row)
         if found[1][TRIANGLES] == 0:
             raise ValueError(
-                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4 of each part, "
-                "those that are pinned among them"
+                f"{int(row.sum())} kept vertices of {self.model.name} are no closed mesh; keep at least 4 of each "
+                "part, those that are pinned among them"
             )
         return found
 
@@ -267,17 +281,26 @@ class ClosedSurface(ModelSurface):
         if before == 0.0:
             return Refitted(mesh.faces, rows, self.model.file_points[rows], before, before, before)
         weights = np.ones(n) if self.model.weights is None else self.model.weights
-        centres, share = self._between
-        samples = np.concatenate([self.points, centres])
-        counts = np.concatenate([weights, share * weights.sum()])
-        best, error = self.points[rows], np.inf
-        for vertices, away in rounds_of_refit(best, compact, samples, counts, held=self._held(rows), until=until):
+        best, least, error = self.points[rows], np.inf, before
+        samples = self._samples(weights)
+        for vertices, away, beside in rounds_of_refit(best, compact, samples, held=self._held(rows), until=until):
             there = float((weights * away[:n]).sum())
-            if there < error:
-                best, error = vertices, there
+            # where there are rims they decide too, but the error is never above what it was
+            rated = there + float((samples.rim_weights * beside).sum())
+            if rated < least and there <= before:
+                best, least, error = vertices, rated, there
         moved = (best != self.points[rows]).any(axis=1)
         found = np.where(moved[:, None], self.model.to_file(best), self.model.file_points[rows])
-        return Refitted(mesh.faces, rows, found, min(error, before), before, 0.0)
+        return Refitted(mesh.faces, rows, found, error, before, 0.0)
+
+    def _samples(self, weights: FloatArray) -> Samples:
+        """Return the vertices, the centres of the faces, and on rims their vertices and the middles of their edges."""
+        centres, share = self._between
+        ends = self.model.rim
+        rim = np.concatenate([self.points[self.model.border], self.points[ends].mean(axis=1)])
+        of_rim = np.full(len(rim), RIM_WEIGHT * weights.mean())
+        points = np.concatenate([self.points, centres])
+        return Samples(points, np.concatenate([weights, share * weights.sum()]), rim, of_rim)
 
     def _held(self, rows: IntArray) -> Held | None:
         """Return what break lines ask of the vertices of a mesh, rows of the model, that are moved."""
@@ -307,5 +330,5 @@ def _refuse_rules(name: str, rules: Rules) -> None:
         if (value := getattr(rules, what)) is not None:
             raise ModelError(
                 f"{name}: {what}={value!r} (--{what} {value}) describes height surfaces, and this is a closed one, "
-                "whose meshes cover all of it; leave it out"
+                "whose holes stay open and whose uncovered vertices cost their distance; leave it out"
             )
