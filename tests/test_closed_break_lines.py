@@ -23,7 +23,7 @@ from meshsimp_pymoo.storage import FRONT_COLUMNS, LINES
 from meshsimp_pymoo.surface.measures import OF_LINES
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import smallest_mesh, tolerance_for
-from meshsimp_pymoo.warming import CLOSED_LINED, CLOSED_WISH
+from meshsimp_pymoo.warming import CLOSED_WISH
 
 pytestmark = [
     pytest.mark.usefixtures("sketched"),
@@ -130,7 +130,7 @@ def test_what_lines_of_closed_surfaces_need_is_compiled():
     rules = Rules(break_lines="sharp:30")
     options = Options(surface="closed")
     request = Request("m.ply", options, rules, Search(), Wish({"triangles": 9}), Free(), Output(folder="."), Tiling())
-    assert searching._parts(request) == [*CLOSED_WISH, *CLOSED_LINED]
+    assert searching._parts(request) == [*CLOSED_WISH, "break lines"]
 
 
 def test_sharp_edges_of_two_parts_go_through_a_search_and_its_folder(tmp_path, capsys):
