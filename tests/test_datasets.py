@@ -146,7 +146,14 @@ def _rims(faces):
 
 
 @pytest.mark.parametrize(
-    ("name", "holes"), [("blob:500,holes=1", 1), ("blob:3000,holes=5", 5), ("blob:3000,holes=12", 12)]
+    ("name", "holes"),
+    [
+        ("blob:500,holes=1", 1),
+        ("blob:3000,holes=5", 5),
+        ("blob:3000,holes=12", 12),
+        ("blob:1000,seed=10,holes=1", 1),  # a face apart from the disc would be cut out too
+        ("blob:200,seed=23,holes=1", 1),  # a face would hang in one vertex
+    ],
 )
 def test_a_scan_of_a_blob_has_its_holes_of_different_sizes_with_ragged_rims_and_no_other_fault(name, holes):
     source, whole = load(name), load(name, holes=0)
