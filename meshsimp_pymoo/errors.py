@@ -26,6 +26,10 @@ class NoHeightGrid(ModelError):
     """The model is no grid of heights along its axes, which can be cut into tiles."""
 
 
+class FacesAllWays(ModelError):
+    """No direction is preferred to see the surface from, as of a closed one."""
+
+
 class ResultError(InputError):
     """An output folder cannot be used or does not hold what it should: one line with the way out."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray, are_distinct
 from meshsimp_pymoo.datasets import load
-from meshsimp_pymoo.errors import ModelError, ModelWarning, NoHeightGrid, warn_of
+from meshsimp_pymoo.errors import FacesAllWays, ModelError, ModelWarning, NoHeightGrid, warn_of
 from meshsimp_pymoo.files import is_there
 from meshsimp_pymoo.formats.options import DEFAULT, Options, Window
 from meshsimp_pymoo.formats.source import SourceMesh
@@ -32,11 +32,11 @@ from meshsimp_pymoo.formats.table import (
 )
 from meshsimp_pymoo.plane.lattice import cells
 from meshsimp_pymoo.settings import by_name, settings_of, taken
-from meshsimp_pymoo.surface.closed.model import ClosedModel, closed_model, topology
+from meshsimp_pymoo.surface.closed.model import ClosedModel, Topology, closed_model, has_border, topology
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.kinds import Model
 from meshsimp_pymoo.surface.model import Mesh, OpenModel, build_model
-from meshsimp_pymoo.surface.orient import Up, front_patch
+from meshsimp_pymoo.surface.orient import SurfaceFacts, Up, front_patch, seen_upright
 from meshsimp_pymoo.surface.repair import Mended, mend
 
 if TYPE_CHECKING:
@@ -88,36 +88,98 @@ def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
             )
         return model
     source, mended = mended_source(model, options)
+    judged = judge(source, options)
+    if judged.refusal is not None:
+        raise ModelError(judged.refusal)
     built: Model
-    if kind_of(source, options) == "closed":
-        built = closed_model(source)
-        if options.surface == "auto" and not source.is_closed:
-            warn_of(
-                f"{source.name}: is no height field but a closed surface, and is taken as one (--surface closed "
-                "(surface='closed') says so; --patch front (patch='front') takes one side of it)"
-            )
+    if judged.kind == "height":
+        built = build_model(source, seen=judged.seen)
     else:
         try:
-            built = build_model(source, up=options.up)
+            built = closed_model(source)
         except ModelError as trouble:
-            raise ModelError(f"{trouble}{not_closed_either(source, options)}") from None
+            raise ModelError(f"{trouble}{judged.no_height_field}") from None
+        if options.surface == "auto" and not source.is_closed:
+            warn_of(
+                f"{source.name}: is no height field but a closed surface{built.parts_and_holes}, and is taken as one"
+                f"{judged.reason} (--surface closed (surface='closed') says so; --patch front (patch='front') takes one"
+                " side of it)"
+            )
     if mended != Mended():
         warn_of(f"{source.name}: {mended} (--repair none (repair='none') leaves them)")
         built = replace(built, found=built.found | {f"faces_{what}": n for what, n in vars(mended).items() if n})
     return built
 
 
-def kind_of(source: SourceMesh, options: Options = DEFAULT) -> str:
-    """Return what a mesh is taken for, "height" or "closed": what the options say, else what it passes for.
+@dataclass(frozen=True)
+class Judged:
+    """What a mesh is taken for.
 
-    A mesh that passes for neither is a height field, whose refusal says why.
+    Attributes
+    ----------
+    kind : {"height", "closed"}
+        What the options say, else the first that it passes for.
+    seen : (direction, SurfaceFacts), optional
+        From where it is seen, and what it is from there, if it was looked at as a height field.
+    fault : str, optional
+        Why it is no height field, in few words, if that was looked at: "has no border".
+    refusal : str, optional
+        Why it cannot be used, in one line with the ways out; None if it can, as far as is known without flattening it.
     """
-    if options.surface != "auto":
-        return options.surface
-    if not _can_be_closed(source, options):
-        return "height"
-    # what has no border is no height field from any side
-    return "closed" if source.is_closed or topology(source.faces).is_sphere else "height"
+
+    kind: str
+    seen: tuple[FloatArray, SurfaceFacts] | None = None
+    fault: str | None = None
+    refusal: str | None = None
+
+    @property
+    def reason(self) -> str:
+        """Why it is no height field, for behind that it is not; what has no border needs no reason."""
+        return f", since it {self.fault}" if self.fault is not None and self.fault != NO_BORDER else ""
+
+    @property
+    def no_height_field(self) -> str:
+        """Why it is no height field, for behind the reason why it is no closed surface."""
+        return f"; nor is it a height field{self.reason}" if self.reason else ""
+
+
+NO_BORDER = "has no border"
+
+
+def judge(source: SourceMesh, options: Options = DEFAULT) -> Judged:
+    """Find out what a mesh is taken for: what the options say, else what it passes for.
+
+    What has no border is no height field from any side, and what passes for one is not looked at otherwise.
+    """
+    is_open_question = options.surface == "auto" and _can_be_closed(source, options)
+    if options.surface == "closed" or (is_open_question and source.is_closed):
+        return Judged("closed")
+    if is_open_question and not has_border(source.faces):
+        return Judged("closed", fault=NO_BORDER)
+    seen, fault, refusal = None, "faces all ways alike", None
+    try:
+        seen = seen_upright(source.measured, options.up)
+    except FacesAllWays as trouble:
+        refusal = str(trouble)
+    else:
+        if (refusal := seen[1].refusal) is None:
+            return Judged("height", seen)
+        fault = str(seen[1].fault)
+    what = topology(source.faces) if source.sort == "mesh" else None
+    if is_open_question and what is not None and what.refusal is None:
+        return Judged("closed", seen, fault)
+    return Judged("height", seen, fault, refusal + _otherwise(what, options))
+
+
+def _otherwise(what: Topology | None, options: Options) -> str:
+    """Return what can be done with a mesh that is no height field as a closed surface, or why nothing can."""
+    if what is None or what.crowded:  # which stands in the way of both
+        return ""
+    if what.refusal is not None:
+        return f"; as a closed surface it is refused too: it {what.refusal}"
+    given = [(name, getattr(options, name)) for name in ("surface", "patch", "up")]
+    said = [f"--{name} {value} ({name}={value!r})" for name, value in given if value != getattr(DEFAULT, name)]
+    return f"; or leave {listed(said)} out to have all of it, as a closed surface" if said else ""
 
 
 def _can_be_closed(source: SourceMesh, options: Options) -> bool:
@@ -139,15 +201,6 @@ def _refuse_side(name: str, options: Options) -> None:
             f"{name}: --{side} {value} ({side}={value!r}) describes height surfaces, and --surface closed "
             f"(surface='closed') a closed one; leave one of them out"
         )
-
-
-def not_closed_either(source: SourceMesh, options: Options) -> str:
-    """Return why a mesh without a border, which is refused as a height field, is no closed surface; for behind that."""
-    if options.surface != "auto" or not _can_be_closed(source, options):
-        return ""
-    what = topology(source.faces)
-    has_border = what.loops or what.crowded
-    return "" if what.refusal is None or has_border else f"; as a closed surface it is refused too: it {what.refusal}"
 
 
 def open_source(model: Source, options: Options = DEFAULT) -> SourceMesh:

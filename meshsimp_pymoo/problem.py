@@ -92,10 +92,10 @@ class MeshProblem(ElementwiseProblem):
     """Choose the vertices of a mesh to keep: minimise (error, triangles), or other measures of the error.
 
     A solution is a bool vector over the vertices in vector order (see :class:`OpenModel`); its mesh is what the
-    problem's surface makes of it: of an open model the Delaunay triangulation of the kept vertices in the plane, of a
-    closed one the convex hull of their images on a sphere. Pinned
-    vertices belong to every mesh, whether or not the chromosome says so; with ``repair=PinnedCorners()`` it does, which
-    keeps duplicates recognisable.
+    problem's surface makes of it: of an open model the Delaunay triangulation of the kept vertices in the plane, of
+    each part of a closed one the convex hull of their images on a sphere, without what lies in holes. Pinned vertices
+    belong to every mesh, whether or not the chromosome says so; with ``repair=PinnedCorners()`` it does, which keeps
+    duplicates recognisable.
 
     Parameters
     ----------

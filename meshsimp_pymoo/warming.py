@@ -316,8 +316,9 @@ SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
 CLOSED_SEARCH = ("closed surfaces", "their meshes", "their thinning", "their moves")
 #: What free meshes need besides.
 FREE = ("free meshes",)
-#: What break lines need besides: their errors are measured as scores are.
+#: What break lines need besides: their errors are measured as scores are, of a closed surface as its own are.
 LINED = ("break lines", "scores")
+CLOSED_LINED = ("break lines",)
 #: What a search for one mesh needs: its first answer is inserted.
 WISH = (*SEARCH, "insertion")
 CLOSED_WISH = (*CLOSED_SEARCH, "their insertion")

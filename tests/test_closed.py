@@ -311,7 +311,7 @@ PAIRS = {
     ("--pin", "corners"): r"pin='corners' .* closed",
     ("--pin", "hull"): r"pin='hull' .* closed",
     ("--pin", "border"): r"pin='border' .* closed",
-    ("--break-lines", "sharp:30"): r"break lines .* closed .*--break-lines",
+    ("--break-lines", "outline"): r"no outline and no holes .*--break-lines outline",
     ("--format", "landxml"): r"--format landxml .*--surface closed",
     ("--free",): r"--free .*--surface closed",
     ("--max-edge", "3"): r"max_edge .*point clouds",
@@ -319,8 +319,8 @@ PAIRS = {
     ("--tile", "64"): r"closed surface.*tiles",
     ("--up", "z", *CLOSED): r"--up z .*--surface closed",
     ("--patch", "front", *CLOSED): r"--patch front .*--surface closed",
-    ("--up", "z"): r"--surface closed .*--patch front",
-    ("--surface", "height"): r"--patch front",
+    ("--up", "z"): r"--patch front.* leave --up z out",
+    ("--surface", "height"): r"--patch front.* leave --surface height out",
     ("--triangles", "3"): r"--triangles 3 is impossible: .* 4 to 320 triangles",
 }
 
@@ -409,22 +409,23 @@ def test_info_says_what_a_closed_model_is(ball, folder, capsys):
     for label, text in {"surface": "closed", "genus": "0", "parts": "1", "holes": "0"}.items():
         assert re.search(rf"^  {label} +{text}$", out, re.MULTILINE)
     assert out.endswith("  verdict         usable: a closed surface of genus 0\n")
-    assert re.search(r"^  no height field faces all ways alike", out, re.MULTILINE)
+    assert re.search(r"^  no height field it has no border$", out, re.MULTILINE)
     assert run("info", ball, "--json") == 0
     said = json.loads(capsys.readouterr().out)
-    known = {"surface": "closed", "components": 1, "genus": 0, "loops": 0, "caps": 0, "flips": 0, "refusal": None}
+    known = {"surface": "closed", "components": 1, "genus": 0, "loops": 0, "rim_edges": 0, "caps": 0, "refusal": None}
     assert {name: said[name] for name in known} == known
+    assert (said["copied"], said["small_parts_left_out"]) == (0, 0)
     model = open_model(ball)
     ends = model.xy[model.faces[:, [0, 1, 2, 0]]]
     assert said["least_image_edge"] == pytest.approx(np.linalg.norm(np.diff(ends, axis=1), axis=2).min(), rel=1e-12)
-    assert "faces all ways alike" in said["not_height"]
+    assert said["not_height"] == "has no border"
     assert said["not_closed"] is None
 
 
 def test_info_says_why_a_model_is_neither_or_could_be_the_other(ball, folder, capsys):
     assert run("info", folder / "ring.ply", "--json") == 2
     said = json.loads(capsys.readouterr().out)
-    assert (said["surface"], said["genus"], said["flips"]) == (None, 1, None)
+    assert (said["surface"], said["genus"], said["caps"]) == (None, 1, None)
     assert said["not_closed"].startswith("has genus 1")
     assert "has genus 1" in said["refusal"]
     assert run("info", ball, "--up", "z") == 2

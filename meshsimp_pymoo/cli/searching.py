@@ -67,15 +67,15 @@ from meshsimp_pymoo.storage import (
     now,
     package_versions,
 )
-from meshsimp_pymoo.surface.closed.model import LEAST_TRIANGLES, ClosedModel
-from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.kinds import as_stored, stored_arrays
+from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.closed.surface import ClosedSurface
+from meshsimp_pymoo.surface.kinds import OfModel, as_stored, stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.smallest import tolerance_for
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.tiles.front import TILE
-from meshsimp_pymoo.warming import CLOSED_SEARCH, CLOSED_WISH, FREE, LINED, SEARCH, WISH, missing
+from meshsimp_pymoo.warming import CLOSED_LINED, CLOSED_SEARCH, CLOSED_WISH, FREE, LINED, SEARCH, WISH, missing
 
 # Seconds that freeing a front is thought to take where nobody says how long.
 FREEING_SECONDS = 15.0
@@ -179,12 +179,13 @@ def _guessed(request: Request) -> Request:
 
 def _parts(request: Request) -> list[str]:
     """Return what has to be compiled for a request of a model of a kind that is known."""
+    lined = request.rules.break_lines is not None
     if request.options.surface == "closed":
-        return list(CLOSED_WISH if request.is_targeted else CLOSED_SEARCH)
+        return [*(CLOSED_WISH if request.is_targeted else CLOSED_SEARCH), *(CLOSED_LINED if lined else ())]
     parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
     if request.output.refit or request.free.no_centroids:
         parts.append("scores")
-    if request.rules.break_lines is not None:
+    if lined:
         parts.extend(LINED)
     return parts
 
@@ -228,7 +229,9 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
             raise UsageError(said)
         if not quiet:
             say(f"{said}; looking for one all the same, as open bays may allow it")
-    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles or LEAST_TRIANGLES
+    surface = problem.surface
+    least = max(1, min(bare.triangles, 2)) if bays else bare.triangles
+    least = surface.least_triangles if isinstance(surface, ClosedSurface) else least
     if wish.triangles is not None and wish.triangles < least:
         raise UsageError(
             f"--triangles {wish.triangles} is impossible: {problem.model.name} has {least} to "
@@ -245,7 +248,7 @@ def _refuse_impossible(problem: MeshProblem, wish: Wish, *, quiet: bool) -> None
 def _below_lines(problem: MeshProblem, wished: int, smallest: int) -> str:
     """Return that a mesh is wished for that is smaller than break lines allow, and which tolerance would allow it."""
     surface, lines = problem.surface, _lines_of(problem)
-    assert isinstance(surface, HeightSurface)
+    assert isinstance(surface, OfModel)
     assert lines is not None
     tolerance = tolerance_for(surface, wished) if surface.rules.break_lines is not None else None
     way_out = f"no tolerance allows {wished:,}: leave some of the lines out"
@@ -258,9 +261,9 @@ def _below_lines(problem: MeshProblem, wished: int, smallest: int) -> str:
 
 
 def _lines_of(problem: MeshProblem) -> ModelLines | None:
-    """Return the break lines, which height surfaces can have."""
+    """Return the break lines, which surfaces of a mesh can have."""
     surface = problem.surface
-    return surface.model.lines if isinstance(surface, HeightSurface) else None
+    return surface.model.lines if isinstance(surface, OfModel) else None
 
 
 # ----------------------------------------------------------------------------------------------------------- the search

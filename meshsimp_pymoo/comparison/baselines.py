@@ -104,7 +104,7 @@ class Baseline:
     in_paper : bool
         Whether the paper compares with it.
     at_borders : bool
-        Whether it is another method at the border only, so that there is nothing of its own on closed surfaces.
+        Whether it is another method at the border only, so that there is nothing of its own on surfaces without one.
     """
 
     label: str
@@ -239,8 +239,8 @@ def baseline_meshes(surface: Surface, method: str, triangles: Iterable[int]) -> 
         if not 1 <= number <= most:
             raise ValueError(f"{number} triangles were asked for, but the model has {most}: ask for 1 to {most}")
     known = BASELINES[method]
-    if known.at_borders and surface.view.is_closed:
-        raise ToolUnavailable("a closed surface has no border that could be kept; what does not keep it is compared")
+    if known.at_borders and surface.view.is_closed and not len(surface.border):
+        raise ToolUnavailable("a surface without holes has no border that could be kept; what keeps none is compared")
     tool: Any = known.tool
     simplify = tool(surface.model)
     none = quality_of((name, 0 if name in COUNTED else np.inf) for name, row in MEASURES.items() if row.of is not None)

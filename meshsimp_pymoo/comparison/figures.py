@@ -403,19 +403,20 @@ def meshes_figure(study: Study, case: Case) -> Figure:
         for row, view in enumerate((FRONT, SIDE)):
             panel = panels[row, column]
             shape = (mesh.points, mesh.faces)
-            plot_mesh(shape, panel, view=view, exaggeration=exaggeration, edges=column > 0)
+            look: dict[str, Any] = {"view": view, "exaggeration": exaggeration, "is_body": surface.view.is_closed}
+            plot_mesh(shape, panel, edges=column > 0, **look)
             panel.set(xlim=panels[row, 0].get_xlim(), ylim=panels[row, 0].get_ylim())
         panels[0, column].set_title(mesh.title, fontsize=8.5)
         below = panels[2, column]
         below.axis("off")
         below.set_aspect("equal")
         if column == 0:
-            text = "error at every\nvertex of the original\n\n"
-            text += (
-                "seen from the front\nand from the back"
-                if surface.view.is_closed
-                else "blue: vertices that\nno triangle covers"
-            )
+            says = [
+                "error at every\nvertex of the original",
+                "seen from the front\nand from the back" * surface.view.is_closed,
+                "blue: vertices that\nno triangle covers" * _can_uncover(surface),
+            ]
+            text = "\n\n".join(filter(None, says))
             below.text(0.5, 0.5, text, ha="center", va="center", fontsize=9, transform=below.transAxes)
             continue
         plot_error(surface, mesh.deviation, below, covered=mesh.covered, largest=end, bar=False)
@@ -466,13 +467,18 @@ def _subset_shown(surface: OfModel, method: str, run: StoredRun, row: int) -> _S
     return _Shown(title, surface.points, mesh.faces, deviation, mesh.covered)
 
 
+def _can_uncover(surface: OfModel) -> bool:
+    """Tell whether a mesh of a surface can leave vertices uncovered: it has a border."""
+    return not surface.view.is_closed or len(surface.border) > 0
+
+
 def _mesh_title(
     surface: OfModel, method: str, triangles: int, deviation: FloatArray, covered: npt.NDArray[np.bool_]
 ) -> str:
     """Say what a mesh is: its method, its size, its mean error, and how many vertices it abandons, if it can."""
     mean = np.average(deviation, weights=surface.model.weights)
     title = f"{_short(method)}\n{triangles:,} triangles, mean {mean:.3g}"
-    if surface.view.is_closed:
+    if not _can_uncover(surface):
         return title
     return f"{title}\n{len(covered) - np.count_nonzero(covered):,} vertices uncovered"
 

@@ -45,10 +45,10 @@ class Options:
         "auto",
         kind=Choice(("auto", "height", "closed")),
         accepts='"auto", "height" or "closed"',
-        doc="What the model is: a height field seen from one side, or a closed surface of genus 0. By default the "
-        "first of both that it passes for.",
-        help="what the model is: a height field, seen from one side, or a closed surface, like a sphere (default: the "
-        "first of both that it passes for)",
+        doc="What the model is: a height field seen from one side, or a closed surface: parts of genus 0, with holes "
+        "or without. By default the first of both that it passes for.",
+        help="what the model is: a height field, seen from one side, or a closed surface: parts like spheres, with "
+        "holes or without (default: the first of both that it passes for)",
     )
     up: Any = setting(
         "auto",

@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import printable
 from meshsimp_pymoo.plane.faces import edge_table, used_rows
 from meshsimp_pymoo.report.depth import Seen, seen
+from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, mesh_lines, require_rules
 from meshsimp_pymoo.surface.units import length_unit, reference_system
@@ -56,6 +57,9 @@ VIEWS = {
 LIGHT = (-0.5, 0.6, 0.75)  # to the light, in the frame of the picture: from the upper left, in front of it
 AMBIENT = 0.22  # brightness of what faces away from the light
 CLAY = (0.90, 0.84, 0.77)  # colour of a mesh that has none of its own
+# Of what has holes: the inside, and their rims, told from break lines whatever colours people see.
+INSIDE = (0.55, 0.60, 0.68)
+RIM = "#8a3b12"
 LINE, MARK = "#2b5c8a", "#c8452f"
 BESIDE, BESIDE_LINES = "#8b9099", ("-", "--", ":", "-.")  # other fronts, behind the one that counts
 BREAK_LINE = "#00574b"  # dark on clay and on the pale end of the error, whatever colours people see
@@ -66,6 +70,7 @@ LONGEST_NAME = 40  # characters of a model's name in a title: a longer one would
 PANEL_SHARES = (0.5, 0.7, 0.9)
 MOST_DRAWN = 500_000
 BODY_PIXELS, SAMPLES = 600, 2  # of the picture of a body, its longer side; each is the mean of so many squared
+LINE_SLACK = 0.01  # share of a body's extent that a line on it may lie below what is drawn, and is seen
 OUTLINE = 1.1  # half the width of its edges, in samples
 ERROR_SHADE = 0.62  # the darkest shade on a body whose colours are to be read
 # The colours of errors, from none to the largest.
@@ -211,8 +216,9 @@ def plot_mesh(
     edges: bool | None = None,
     exaggeration: float = 1.0,
     lines: bool | Sequence[npt.ArrayLike] = True,
+    is_body: bool | None = None,
 ) -> Axes:
-    """Draw a mesh as a shaded relief, its break lines on it; or as the body that it is, if it has no border.
+    """Draw a mesh as a shaded relief, its break lines on it; or as a body, with the rims of its holes.
 
     Parameters
     ----------
@@ -235,7 +241,10 @@ def plot_mesh(
         Factor on the heights.
     lines : bool or sequence of (n, 3) arrays
         Whether to draw the break lines that a problem, a surface, a model or a solution has; or the lines to draw, in
-        the frame of the points. They are drawn in front of everything.
+        the frame of the points. They are drawn in front of everything, on a body where it does not hide them.
+    is_body : bool, optional
+        Whether it is a body: by default what is of a closed surface, and any other mesh that has no border. A body
+        with holes shows its inside in another tone.
 
     Returns
     -------
@@ -243,7 +252,8 @@ def plot_mesh(
         The axes.
     """
     drawn = _lines_of(mesh, kept) if lines is True else lines or ()
-    points, faces, own, is_body = _shape(mesh, kept)
+    points, faces, own, found = _shape(mesh, kept)
+    is_body = found if is_body is None else is_body
     used, compact = np.unique(faces, return_inverse=True)
     points, faces = points[used], compact.reshape(-1, 3)
     colour = own if colour is None else np.asarray(colour)
@@ -262,13 +272,17 @@ def plot_mesh(
             if colour.ndim == 1
             else colour[faces, :3].mean(axis=1) / (255.0 if colour.dtype.kind == "u" else 1.0)
         )
-    rgb = base * shade[:, None]
     outlined = len(faces) <= OUTLINED_TRIANGLES if edges is None else edges
+    seen_lines = [turned(np.asarray(line) * [1.0, 1.0, exaggeration]) for line in drawn]
     if is_body:
-        _draw_body(ax, placed, faces, lambda shown: rgb[shown.triangle], outlined=outlined)
+        base = np.where(_shows_inside(placed, faces)[:, None], INSIDE, base)
+        rgb = base * shade[:, None]
+        depth = _draw_body(ax, placed, faces, lambda shown: rgb[shown.triangle], outlined=outlined)
+        _draw_lines(ax, depth.in_sight(_rims(placed, faces)), colour=RIM)
+        seen_lines = depth.in_sight(seen_lines)
     else:
-        _draw_relief(ax, triangles, rgb, outlined=outlined)
-    _draw_lines(ax, [turned(np.asarray(line) * [1.0, 1.0, exaggeration]) for line in drawn])
+        _draw_relief(ax, triangles, base * shade[:, None], outlined=outlined)
+    _draw_lines(ax, seen_lines)
     _frame(ax, placed)
     return ax
 
@@ -344,22 +358,30 @@ def _error_map(ax: Axes, surface: Surface, size: FloatArray, end: float, covered
 
 
 def _error_of_body(ax: Axes, surface: Surface, size: FloatArray, end: float, covered: npt.ArrayLike | None) -> Any:
-    """Draw errors (N,) on a body from both sides; see :func:`_error_map`. Every vertex of one is covered."""
+    """Draw errors (N,) on a body from both sides; see :func:`_error_map`. Its inside has none."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import Normalize, to_rgb
 
     colours, faces = ScalarMappable(Normalize(0.0, end), ERROR_COLOURS), np.asarray(surface.faces)
+    bare = np.zeros(len(size)) if covered is None else 1.0 - np.asarray(covered, dtype=bool)
     beside, corners = np.zeros(2), []
     for side in ("front", "back"):
         points = _turned(surface.points, side, is_body=True)
+        shift = np.append(beside - points[:, :2].min(axis=0), 0.0)
+        points += shift
         shade = ERROR_SHADE + (1.0 - ERROR_SHADE) * hillshade(points[faces])
+        inside = _shows_inside(points, faces)
 
-        def coloured(shown: Seen, shade: FloatArray = shade) -> FloatArray:
-            values = (shown.shares * size[faces[shown.triangle]]).sum(axis=2)
-            return colours.to_rgba(values)[..., :3] * shade[shown.triangle][..., None]
+        def coloured(shown: Seen, shade: FloatArray = shade, inside: BoolArray = inside) -> FloatArray:
+            at, corners = shown.triangle, faces[shown.triangle]
+            rgb = colours.to_rgba((shown.shares * size[corners]).sum(axis=2))[..., :3]
+            rgb = np.where(((shown.shares * bare[corners]).sum(axis=2) > 0.5)[..., None], to_rgb(UNCOVERED), rgb)
+            return np.where(inside[at][..., None], INSIDE, rgb) * shade[at][..., None]
 
-        points[:, :2] -= points[:, :2].min(axis=0) - beside
-        _draw_body(ax, points, faces, coloured)
+        depth = _draw_body(ax, points, faces, coloured)
+        _draw_lines(ax, depth.in_sight(_rims(points, faces)), colour=RIM)
+        lines = [_turned(line, side, is_body=True) + shift for line in _lines_of(surface)]
+        _draw_lines(ax, depth.in_sight(lines), halo=True)
         corners += [points[:, :2].min(axis=0), points[:, :2].max(axis=0)]
         beside[0] = 1.04 * corners[-1][0]
     _frame(ax, np.array(corners))
@@ -591,7 +613,8 @@ def _shape(mesh: Any, kept: npt.ArrayLike | None) -> tuple[FloatArray, IntArray,
     if hasattr(mesh, "front"):  # a solution of one
         return *_rows_of(mesh.front.surface, mesh.faces), mesh.front.surface.view.is_closed
     if hasattr(mesh, "points") and hasattr(mesh, "faces"):  # a model
-        return mesh.points, mesh.faces, mesh.attributes.get("color"), _has_no_border(mesh.faces)
+        is_body = isinstance(mesh, ClosedModel) or _has_no_border(mesh.faces)
+        return mesh.points, mesh.faces, mesh.attributes.get("color"), is_body
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         visual: Any = getattr(mesh, "visual", None)
         own = np.asarray(visual.vertex_colors) if getattr(visual, "kind", None) == "vertex" else None
@@ -609,7 +632,73 @@ def _has_no_border(faces: IntArray) -> bool:
 
 def _plot_rows(surface: Surface, faces: IntArray, ax: Axes, lines: Sequence[npt.ArrayLike]) -> None:
     points, faces, colour = _rows_of(surface, faces)
-    plot_mesh((points, faces), ax, colour=colour, exaggeration=surface.view.exaggeration, lines=lines)
+    view = surface.view
+    plot_mesh((points, faces), ax, colour=colour, exaggeration=view.exaggeration, lines=lines, is_body=view.is_closed)
+
+
+def winding(points: FloatArray, faces: IntArray) -> int:
+    """Return 1 where triangles (M, 3) are counter-clockwise as seen from outside, -1 where from inside.
+
+    What outside is the vertices (V, 3) tell: away from the centroid of most of the surface.
+    """
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1)
+    away = (a + b + c) / 3.0
+    away -= (area[:, None] * away).sum(axis=0) / max(float(area.sum()), 1e-300)
+    return 1 if (normal * away).sum() >= 0.0 else -1
+
+
+def _shows_inside(points: FloatArray, faces: IntArray) -> BoolArray:
+    """Tell which triangles (M, 3) of a body with holes show their inside, of vertices (V, 3) as they are seen."""
+    if _has_no_border(faces):  # nobody can look in
+        return np.zeros(len(faces), bool)
+    a, b, c = (points[faces[:, k], :2] for k in range(3))
+    turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    return np.asarray(winding(points, faces) * turned < 0.0)
+
+
+def _rims(points: FloatArray, faces: IntArray) -> list[FloatArray]:
+    """Return the edges (2, 3) at the rims of holes, of vertices (V, 3)."""
+    table = edge_table(faces)
+    return list(points[table.ends[table.n_triangles == 1]])
+
+
+class _Depth(NamedTuple):
+    """How near what is seen of a body is to the viewer.
+
+    Attributes
+    ----------
+    z : (height, width) float array
+        At each pixel; -inf where nothing is.
+    low : (2,) float array
+        The lower left corner [units of the body].
+    size : float
+        The side of a pixel.
+    slack : float
+        What lies no deeper below lies on it.
+    """
+
+    z: FloatArray
+    low: FloatArray
+    size: float
+    slack: float
+
+    def in_sight(self, lines: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return the pieces (n, 2) of lines (n, 3) that the body does not hide."""
+        found = []
+        last = np.array(self.z.shape)[::-1] - 1
+        for line in lines:
+            steps = np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1) / (2.0 * self.size)
+            at = np.concatenate([k + np.arange(n) / n for k, n in enumerate(np.ceil(steps).astype(int)) if n])
+            at = np.append(at, len(line) - 1)
+            places = np.column_stack([np.interp(at, np.arange(len(line)), line[:, k]) for k in range(3)])
+            x, y = np.clip((places[:, :2] - self.low) / self.size, 0, last).astype(int).T
+            shows = self.z[y, x] <= places[:, 2] + self.slack
+            both = np.flatnonzero(shows[:-1] & shows[1:])
+            runs = np.split(both, np.flatnonzero(np.diff(both) > 1) + 1)
+            found += [places[run[0] : run[-1] + 2, :2] for run in runs if len(run)]
+        return found
 
 
 def _draw_relief(ax: Axes, triangles: Any, rgb: FloatArray, *, outlined: bool) -> None:
@@ -637,8 +726,8 @@ def _draw_body(
     coloured: Callable[[Seen], FloatArray],
     *,
     outlined: bool = False,
-) -> None:
-    """Draw what is seen of a body of vertices (V, 3) as they are seen, as an image.
+) -> _Depth:
+    """Draw what is seen of a body of vertices (V, 3) as they are seen, as an image, and return how near it is.
 
     ``coloured`` returns the colours (height, width, 3) of what is seen, whatever where nothing is.
     """
@@ -662,6 +751,8 @@ def _draw_body(
     left, bottom = low
     extent = (left, left + size * width, bottom, bottom + size * height)
     ax.imshow(rgba, extent=extent, origin="lower", aspect="equal")
+    z = (shown.shares * pixels[faces[shown.triangle], 2]).sum(axis=2)
+    return _Depth(np.where(hit, z, -np.inf), low, size / SAMPLES, LINE_SLACK * float(np.ptp(points, axis=0).max()))
 
 
 def _lines_of(mesh: Any, kept: npt.ArrayLike | None = None) -> list[FloatArray]:
@@ -676,7 +767,7 @@ def _lines_of(mesh: Any, kept: npt.ArrayLike | None = None) -> list[FloatArray]:
     return [] if found is None else list(found.originals)
 
 
-def _draw_lines(ax: Axes, lines: Sequence[FloatArray], *, halo: bool = False) -> None:
+def _draw_lines(ax: Axes, lines: Sequence[FloatArray], *, colour: str = BREAK_LINE, halo: bool = False) -> None:
     """Draw lines (n, 2) or more as seen; with a halo, where what is below may be as dark."""
     from matplotlib.collections import LineCollection
     from matplotlib.patheffects import Normal, Stroke
@@ -686,7 +777,7 @@ def _draw_lines(ax: Axes, lines: Sequence[FloatArray], *, halo: bool = False) ->
     around = [Stroke(linewidth=2.6, foreground="white"), Normal()] if halo else None
     seen = [line[:, :2] for line in lines]
     ax.add_collection(
-        LineCollection(seen, colors=BREAK_LINE, linewidths=1.1, capstyle="round", path_effects=around), autolim=False
+        LineCollection(seen, colors=colour, linewidths=1.1, capstyle="round", path_effects=around), autolim=False
     )
 
 

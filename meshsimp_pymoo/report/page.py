@@ -21,7 +21,7 @@ from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
-from meshsimp_pymoo.report.figures import UNCOVERED, VIEWS, original_mesh
+from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, original_mesh, winding
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
@@ -131,6 +131,7 @@ def simplification_page(
     """
     chosen, count = front.run.get("chosen"), len(kept)
     model, view = surface.model, surface.view
+    has_border = not view.is_closed or len(surface.border) > 0
     original = original_mesh(surface)
     whole = bool(original[0].all())  # else the largest mesh would take the place of many
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
@@ -149,12 +150,12 @@ def simplification_page(
         "stem": slug(PurePath(source).stem),
         "folder": printable(as_argument(folder)),
         "measure": measure,
-        "closed": _closed_look() if view.is_closed else None,
+        "closed": _closed_look(surface) if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [
             {"name": name, **spoken(measure, unit, closed=view.is_closed)}
             for name, measure in MEASURES.items()
-            if name in columns and not (view.is_closed and measure.of_heights)
+            if name in columns and (has_border or not measure.of_borders)
         ],
         "columns": columns,
         "meshes": _mesh_files(front, chosen),
@@ -197,6 +198,8 @@ def simplification_page(
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
         },
         painted=paint is not None,
+        covering=has_border,
+        holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",
         further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
         errors={
@@ -207,10 +210,17 @@ def simplification_page(
     )
 
 
-def _closed_look() -> dict[str, list[float]]:
-    """Return how a body is looked at: from where it is in the pictures, as azimuth and elevation [degrees]."""
+def _closed_look(surface: Surface) -> dict[str, Any]:
+    """Return how a body is looked at: from where it is in the pictures, as azimuth and elevation [degrees].
+
+    And where it has holes, the colours of its inside and of their rims, and how its faces are wound.
+    """
     elevation, turn = VIEWS["front"]
-    return {"front": [-turn, elevation]}
+    found: dict[str, Any] = {"front": [-turn, elevation], "open": None}
+    if len(surface.border):
+        colours = {"inside": f"rgb({', '.join(f'{round(255 * value)}' for value in INSIDE)})", "rim": RIM}
+        found["open"] = colours | {"winding": winding(np.asarray(surface.points), np.asarray(surface.faces))}
+    return found
 
 
 def _heights(exaggeration: float) -> dict[str, str]:

@@ -16,28 +16,27 @@ from meshsimp_pymoo.formats.source.metric import systems_differ
 from meshsimp_pymoo.formats.table import read_lines
 from meshsimp_pymoo.plane.chains import chains
 from meshsimp_pymoo.plane.faces import edge_table
-from meshsimp_pymoo.surface.model import Mesh, OpenModel
+from meshsimp_pymoo.surface.model import Mesh
 from meshsimp_pymoo.surface.orient import area_vectors
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.rules import OUTLINE, SHARP, meant_word_for_lines
 from meshsimp_pymoo.surface.units import reference_system
 
 
-def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
+def lines_in_file_frame(model: Mesh, given: Any) -> SourceLines:
     """Return lines of a file or of arrays, once it is clear that they are in the frame of the model's file.
 
     Where only one of both says which reference system it has, the lines are taken to have the model's.
 
     Parameters
     ----------
-    model : OpenModel
+    model : Mesh
     given : path, SourceLines, or list of (n, 2) or (n, 3) arrays
 
     Raises
     ------
     ModelError
-        If the file cannot be read, the reference systems or units differ, these are no lines, or the lines have no
-        heights and the model's are not along the file's z.
+        If the file cannot be read, the reference systems or units differ, or these are no lines.
     """
     if isinstance(given, (str, os.PathLike)):
         word = meant_word_for_lines(given)
@@ -58,12 +57,6 @@ def lines_in_file_frame(model: OpenModel, given: Any) -> SourceLines:
     if all(metres) and metres[0] != metres[1]:
         raise ModelError(
             f"{given.name}: is in {units[0]}, and {model.name} in {units[1]}; export the lines in the unit of the model"
-        )
-    n_soft = sum(line.shape[1] == 2 for line in given.lines)
-    if n_soft and not (model.rotation[2] == (0.0, 0.0, 1.0)).all():
-        raise ModelError(
-            f"{given.name}: {n_soft} of {len(given.lines)} lines have no heights, and the heights of {model.name} are "
-            f"along {model.up.round(6).tolist()}, not along the file's z; give x, y and z of each vertex"
         )
     return given
 

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from meshsimp_pymoo.arrays import AnyArray
+from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -56,4 +57,15 @@ def as_stored(surface: Surface, arrays: Mapping[str, AnyArray]) -> Surface:
     if all(np.array_equal(arrays[name], values) for name, values in own.items()):
         return surface
     assert isinstance(model, ClosedModel)
-    return ClosedSurface(model.with_images(arrays["xy"], arrays["source_index"]), surface.rules)
+    if surface.rules.break_lines is None:
+        return ClosedSurface(model.with_images(arrays["xy"], arrays["source_index"]), surface.rules)
+    # the lines are laid again on these images, as they were
+    bare = model.without_lines()
+    of_file = np.isin(arrays["source_index"], bare.source_index)
+    found = ClosedSurface(
+        bare.with_images(arrays["xy"][of_file], arrays["source_index"][of_file]),
+        surface.rules,
+    )
+    if not all(np.array_equal(arrays[name], values) for name, values in stored_arrays(found).items()):
+        raise ModelError(f"{model.name}: what was stored are images of other break lines")
+    return found

@@ -35,7 +35,7 @@ from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.given_lines import lines_in_file_frame, lines_of_word
 from meshsimp_pymoo.surface.line_thinning import Chords, thinned_runs
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.model import OpenModel
+from meshsimp_pymoo.surface.model import Mesh, OpenModel
 from meshsimp_pymoo.surface.places import highest
 from meshsimp_pymoo.surface.polylines import Runs, cut_into_runs
 from meshsimp_pymoo.surface.rules import OUTLINE, is_word_for_lines
@@ -111,7 +111,7 @@ class Polylines:
         inner = (t > 0.0) & (t < 1.0)
         near = piece + (t >= 1.0)
         xy = np.where(
-            inner[:, None], _rounded((1.0 - share) * self.xy[piece] + share * self.xy[piece + 1]), self.xy[near]
+            inner[:, None], rounded((1.0 - share) * self.xy[piece] + share * self.xy[piece + 1]), self.xy[near]
         )
         z = np.where(inner, (1.0 - t) * self.z[piece] + t * self.z[piece + 1], self.z[near])
         # the ends of a piece of a line are all given or none
@@ -177,13 +177,23 @@ def lined_model(model: OpenModel, break_lines: Any, tolerance: float | None) -> 
     >>> roof.points[roof.lines.chains[0]].tolist(), len(roof.lines.added)
     ([[1.0, 0.0, 1.0], [1.0, 2.0, 1.0]], 0)
     """
-    is_word = is_word_for_lines(break_lines)
-    if tolerance is None and is_word:
+    lining = _Lining(model, tolerance_of(model, break_lines, tolerance))
+    return lining.of_word(break_lines) if is_word_for_lines(break_lines) else lining.of_lines(break_lines)
+
+
+def tolerance_of(model: Mesh, break_lines: Any, tolerance: float | None) -> float:
+    """Return how far lines may move: what is said, else what is usual for lines that a word names.
+
+    Raises
+    ------
+    InputError
+        If it is missing or no number of at least 0.
+    """
+    if tolerance is None and is_word_for_lines(break_lines):
         tolerance = USUAL_TOLERANCE * model.diagonal
     if tolerance is None or not 0.0 <= tolerance < np.inf:
         raise InputError(f"line_tolerance is {tolerance}; give how far break lines may move in space, 0 or more")
-    lining = _Lining(model, float(tolerance))
-    return lining.of_word(break_lines) if is_word else lining.of_lines(break_lines)
+    return float(tolerance)
 
 
 class _Lining:
@@ -229,8 +239,15 @@ class _Lining:
         model = self.model
         source = lines_in_file_frame(model, break_lines)
         self.what, self.names = source.name, source.names
+        n_soft = sum(line.shape[1] == 2 for line in source.lines)
+        if n_soft and not (model.rotation[2] == (0.0, 0.0, 1.0)).all():
+            raise ModelError(
+                f"{source.name}: {n_soft} of {len(source.lines)} lines have no heights, and the heights of "
+                f"{model.name} are along {model.up.round(6).tolist()}, not along the file's z; give x, y and z of each "
+                "vertex"
+            )
         # all are gone along in the one direction that does not depend on how they are listed
-        self.turned = np.array([_is_turned(line) for line in source.lines])
+        self.turned = np.array([is_turned(line) for line in source.lines])
         along = [line[::-1] if turned else line for line, turned in zip(source.lines, self.turned, strict=True)]
         lengths = [len(line) for line in along]
         part = np.repeat(np.arange(len(lengths)), lengths)
@@ -242,7 +259,7 @@ class _Lining:
         local = model.to_local(np.where(np.isnan(given), 0.0, given))
         self.found |= {"lines": len(lengths), "line_vertices": len(part)}
         return Polylines(
-            _rounded(local[:, :2] / model.unit),
+            rounded(local[:, :2] / model.unit),
             np.where(hard, local[:, 2], np.nan),
             np.where(hard, GIVEN, DRAPED),
             given,
@@ -259,13 +276,8 @@ class _Lining:
         near = np.isfinite(away)
         xy[near] = self.places.data[place[near]]
         others = np.flatnonzero(~near)
-        places, number = _distinct_places(xy[others])
-        pairs = cKDTree(places).query_pairs(self.reach, output_type="ndarray") if len(places) > 1 else others[:0]
-        if len(pairs):
-            links = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
-            group = connected_components(links, directed=False)[1]
-            _, least = np.unique(group, return_index=True)  # places ascend, so the order of the lines is no matter
-            xy[others] = places[least[group[number]]]
+        places, number = distinct_places(xy[others])
+        xy[others] = places[first_near(places, self.reach)[number]]
         moved = (xy != lines.xy).any(axis=1)
         given = np.where(moved[:, None], np.nan, lines.given)
         return dataclasses.replace(lines, xy=xy, given=given)
@@ -356,13 +368,10 @@ class _Lining:
     def _nothing_inside(self, lines: Polylines) -> str:
         model = self.model
         at = self._in_file(np.column_stack([lines.xy * model.unit, np.nan_to_num(lines.z)]))
-        boxes = [
-            ", ".join(f"{axis} {low:.9g} to {high:.9g}" for axis, low, high in zip("xy", *box[:, :2], strict=False))
-            for box in (np.array([at.min(axis=0), at.max(axis=0)]), model.file_box)
-        ]
         return (
-            f"{self.what}: none of the {len(self.names)} lines lies in {model.name}: they span {boxes[0]}, the model "
-            f"{boxes[1]}; check that both have the same reference system and units"
+            f"{self.what}: none of the {len(self.names)} lines lies in {model.name}: they span "
+            f"{box_in_words('xy', np.array([at.min(axis=0), at.max(axis=0)]))}, the model "
+            f"{box_in_words('xy', model.file_box)}; check that both have the same reference system and units"
         )
 
     def _in_file(self, points: FloatArray) -> FloatArray:
@@ -375,7 +384,7 @@ class _Lining:
 
     def _over_samples(self, lines: Polylines) -> Polylines:
         """Give lines with heights a vertex wherever they pass far above or below a vertex of the model."""
-        places, node = _distinct_places(lines.xy)
+        places, node = distinct_places(lines.xy)
         pieces = lines.pieces
         pieces = pieces[lines.source[pieces] <= BETWEEN_GIVEN]
         if len(pieces) == 0:
@@ -391,7 +400,7 @@ class _Lining:
 
     def _met(self, lines: Polylines) -> Polylines:
         """Make vertices of one line on another vertices of both; refuse lines that cross otherwise."""
-        places, node = _distinct_places(lines.xy)
+        places, node = distinct_places(lines.xy)
         pieces, ends, number = _segments(lines, node)
         on = points_on(places, ends, self.reach)
         if len(on):
@@ -406,7 +415,7 @@ class _Lining:
             t = lines.shares_of(piece, xy)
             _, z, _ = lines.between(piece, t)
             lines = lines.with_vertices(piece, t, xy, z)
-            pieces, ends, number = _segments(lines, np.searchsorted(_keys(places), _keys(lines.xy)))
+            pieces, ends, number = _segments(lines, np.searchsorted(place_keys(places), place_keys(lines.xy)))
         pairs = meeting_segments(places, ends)
         if len(pairs):
             lines_of = np.full(len(ends), -1)
@@ -460,7 +469,7 @@ class _Lining:
     def _lined(self, lines: Polylines) -> OpenModel:
         """Thin the lines, add their vertices to the model and put it in order."""
         model = self.model
-        places, node = _distinct_places(lines.xy)
+        places, node = distinct_places(lines.xy)
         z, chosen = self._heights(lines, node, len(places))
         away, place = self.places.query(places, distance_upper_bound=self.reach)
         # the model's vertex at each place, -1 where there is none
@@ -580,26 +589,46 @@ class _Lining:
         return lined, row[n:], row[:n]
 
 
-def _is_turned(line: FloatArray) -> bool:
+def is_turned(line: FloatArray) -> bool:
     """Tell whether a line (n, 2 or 3) leads from its greater end to the lesser, or if closed, first to the greater."""
     ends = [(tuple(line[k]), tuple(line[step])) for k, step in ((0, 1), (-1, -2))]
     return ends[1] < ends[0]
 
 
-def _rounded(xy: FloatArray) -> FloatArray:
+def rounded(xy: FloatArray) -> FloatArray:
     """Round to multiples of 2**-52, as the model's places are."""
     return (xy + 1.0) - 1.0
 
 
-def _keys(xy: FloatArray) -> Any:
+def place_keys(xy: FloatArray) -> Any:
     """Return one number a place, ascending by x, then y."""
     return np.ascontiguousarray(xy + 0.0)[:, 0] + 1j * xy[:, 1]
 
 
-def _distinct_places(xy: FloatArray) -> tuple[FloatArray, IntArray]:
+def distinct_places(xy: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the different places (P, 2), by x, then y, and which of them each (M, 2) is."""
-    found, number = np.unique(_keys(xy), return_inverse=True)
+    found, number = np.unique(place_keys(xy), return_inverse=True)
     return np.column_stack([found.real, found.imag]), number.ravel()
+
+
+def first_near(places: FloatArray, reach: float) -> IntArray:
+    """Return for each place (P, D) the first of those that lead to it in steps of at most ``reach``: (P,) rows.
+
+    Where places ascend, the order of the lines that they are of is no matter.
+    """
+    pairs = cKDTree(places).query_pairs(reach, output_type="ndarray") if len(places) > 1 else np.empty((0, 2), int)
+    if len(pairs) == 0:
+        return np.arange(len(places))
+    links = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(places),) * 2)
+    group = connected_components(links, directed=False)[1]
+    return np.asarray(np.unique(group, return_index=True)[1][group])
+
+
+def box_in_words(axes: str, box: FloatArray) -> str:
+    """Return from where to where a box (2, 3), its lowest and highest corner, reaches along some of the axes."""
+    return ", ".join(
+        f"{axis} {low:.9g} to {high:.9g}" for axis, low, high in zip(axes, *box[:, : len(axes)], strict=True)
+    )
 
 
 def _segments(lines: Polylines, node: IntArray) -> tuple[IntArray, IntArray, IntArray]:

@@ -56,8 +56,8 @@ class Measure(NamedTuple):
         Whether people read it in per cent.
     of_lines : bool
         Whether only models with break lines have it.
-    of_heights : bool
-        Whether only height surfaces have it: of closed ones it is 0.
+    of_borders : bool
+        Whether only surfaces with a border have it: of a closed one without holes it is 0.
     of_closed : str
         What it is of a closed surface, if that differs.
     """
@@ -74,7 +74,7 @@ class Measure(NamedTuple):
     more_is_better: bool = False
     is_share: bool = False
     of_lines: bool = False
-    of_heights: bool = False
+    of_borders: bool = False
     of_closed: str = ""
 
     @property
@@ -120,7 +120,7 @@ class Quality:
     max_error : float
         Maximum of d_p over the original vertices whose weight is not 0 [model units].
     uncovered : int
-        Number of original vertices that no triangle covers.
+        Number of original vertices that no triangle covers; of a closed surface those whose image is in none.
     surface_error : float
         Mean of the deviation from the original surface between its vertices: at the centroids of the original faces,
         weighted by their area in the plane. Faces without one are left out; uncovered centroids cost what uncovered
@@ -185,7 +185,7 @@ class Quality:
         lambda table, weight: table[..., UNCOVERED],
         label="uncovered",
         meaning="original vertices that no triangle covers",
-        of_heights=True,
+        of_borders=True,
     )
     surface_error: float = _measure_of_mesh(
         label="surface error",

@@ -22,7 +22,7 @@ from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
 from meshsimp_pymoo.plane.outline import is_convex, on_hull, outline_edges
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.orient import Up, open_faces, seen_upright, upright_rotation
+from meshsimp_pymoo.surface.orient import SurfaceFacts, Up, open_faces, seen_upright, upright_rotation
 from meshsimp_pymoo.surface.places import below_others, feet, highest, warn_of_places
 from meshsimp_pymoo.surface.units import length_unit
 
@@ -60,8 +60,11 @@ class Mesh:
     offset: FloatArray
     xy: FloatArray
     weights: FloatArray | None
+    georeference: dict[str, Any]
     repeats: IntArray
     scale: FloatArray
+    # rows (C, 2) that no file has, of vertices at the place of another one, and the rows of those
+    copies: IntArray = np.empty((0, 2), np.int64)
 
     @property
     def n_vertices(self) -> int:
@@ -92,6 +95,15 @@ class Mesh:
     def weightless(self) -> IntArray:
         """Vertices that count in no error, whatever their weight."""
         return np.empty(0, np.int64)
+
+    @property
+    def file_rows(self) -> IntArray:
+        """Row (N,) in the file of each vertex, or of the one that it is a copy of."""
+        rows = self.source_index.copy()
+        copied = np.flatnonzero(np.isin(rows, self.copies[:, 0]))
+        if len(copied):  # their rows are numbered one by one
+            rows[copied] = self.copies[rows[copied] - self.copies[0, 0], 1]
+        return rows
 
     @property
     def area_shares(self) -> FloatArray:
@@ -146,7 +158,8 @@ class Mesh:
             if values.dtype.kind not in "biuf":
                 raise ModelError(f"{self.name}: {label} are of type {values.dtype}; give one number for each vertex")
             values = values.ravel()
-            n_rows = int(max(self.source_index.max(), self.repeats.max(initial=0))) + 1
+            of_vertex = self.file_rows
+            n_rows = int(max(of_vertex.max(), self.repeats.max(initial=0))) + 1
             if len(values) < n_rows:
                 raise ModelError(
                     f"{self.name}: there are {len(values)} {label} for {n_rows} rows of the file; give one for each row"
@@ -157,7 +170,7 @@ class Mesh:
                     f"{self.name}: {n_others} {label} of rows that repeat another vertex differ from its own, "
                     "which counts"
                 )
-            values = values[self.source_index]
+            values = values[of_vertex]
         values = np.ascontiguousarray(values, float)
         wrong = np.flatnonzero(~(np.isfinite(values) & (values >= 0)))
         if len(wrong):
@@ -407,8 +420,14 @@ def placed_model(
     return model
 
 
-def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
-    """Turn a source mesh upright, check that it is an open height field and put it in vector order."""
+def build_model(
+    source: SourceMesh, *, up: Up = "auto", seen: tuple[FloatArray, SurfaceFacts] | None = None
+) -> OpenModel:
+    """Turn a source mesh upright, check that it is an open height field and put it in vector order.
+
+    ``seen`` is what :func:`~meshsimp_pymoo.surface.orient.seen_upright` said of it in the metric frame, if that was
+    asked already.
+    """
     used = np.zeros(len(source.points), bool)
     used[source.faces] = True
     n_unused = len(used) - int(used.sum())
@@ -419,7 +438,7 @@ def build_model(source: SourceMesh, *, up: Up = "auto") -> OpenModel:
             stacklevel=3,
         )
     file_points, georeference, scale, source = source.points, source.georeference, source.scale, source.measured
-    direction, facts = seen_upright(source, up)
+    direction, facts = seen_upright(source, up) if seen is None else seen
     rotation = upright_rotation(direction)
     pivot = source.points[used].min(axis=0)
     upright = (source.points - pivot) @ rotation.T

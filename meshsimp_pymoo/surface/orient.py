@@ -18,7 +18,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
-from meshsimp_pymoo.errors import ModelError, ModelWarning, warn_of
+from meshsimp_pymoo.errors import FacesAllWays, ModelError, ModelWarning, warn_of
 from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.surface.edges import (
     Edges,
@@ -182,7 +182,7 @@ def seen_upright(source: SourceMesh, up: Up = "auto") -> tuple[FloatArray, Surfa
             tried.append((axis, facts))
     best = net()
     if best is None:
-        raise ModelError(
+        raise FacesAllWays(
             f"{source.name}: faces all ways alike (net projected area {length / max(area, 1e-300):.2g} of the area), "
             "like a closed surface; name the viewing side with --up z (up='z') and cut the patch that faces it with "
             "--patch front (patch='front')"
@@ -306,35 +306,41 @@ class SurfaceFacts:
     @property
     def refusal(self) -> str | None:
         """Why this cannot be used as an open model, with the way out; None if it can."""
-        if self.border_edges == 0 and self.nonmanifold_edges == 0:
-            return (
-                f"{self.name}: the surface is closed (no border edge among {self.n_faces} faces); {self._as_body}{CUT}"
-            )
-        if self.nonmanifold_example is not None and self.width_share > WIDTH_SHARE:
-            a, b, count = self.nonmanifold_example
-            return (
-                f"{self.name}: {self.nonmanifold_edges} edges belong to more than two faces (first: vertices "
-                f"{a} and {b}, {count} faces); repair them in a mesh editor or {CUT}"
-            )
-        return self.refusal_from_there
-
-    @property
-    def _as_body(self) -> str:
-        """The way out of a closed surface that is like a sphere; empty of others."""
-        is_like_a_sphere = self.components == 1 and 2 * self.n_vertices - self.n_faces == 4
-        return "take it as it is with --surface closed (surface='closed') and without --up, or " * is_like_a_sphere
+        return None if (fault := self._fault or self._fault_from_there) is None else f"{self.name}: {fault[1]}"
 
     @property
     def refusal_from_there(self) -> str | None:
         """Why this is no height field as seen from there; None if it is."""
+        return None if self._fault_from_there is None else f"{self.name}: {self._fault_from_there[1]}"
+
+    @property
+    def fault(self) -> str | None:
+        """Why this is no height field, in few words that continue "since it"; None if it is."""
+        return None if (fault := self._fault or self._fault_from_there) is None else fault[0]
+
+    @property
+    def _fault(self) -> tuple[str, str] | None:
+        """What is wrong wherever it is seen from: in few words, and with the way out."""
+        if self.border_edges == 0 and self.nonmanifold_edges == 0:
+            return "has no border", f"the surface is closed (no border edge among {self.n_faces} faces); {CUT}"
+        if self.nonmanifold_example is not None and self.width_share > WIDTH_SHARE:
+            a, b, count = self.nonmanifold_example
+            return "has edges of more than two faces", (
+                f"{self.nonmanifold_edges} edges belong to more than two faces (first: vertices "
+                f"{a} and {b}, {count} faces); repair them in a mesh editor or {CUT}"
+            )
+        return None
+
+    @property
+    def _fault_from_there(self) -> tuple[str, str] | None:
         if self.width_share <= WIDTH_SHARE:
-            return (
-                f"{self.name}: all {self.n_vertices} vertices lie on one line as seen from {self.seen_from} (width "
+            return "is a line as seen from there", (
+                f"all {self.n_vertices} vertices lie on one line as seen from {self.seen_from} (width "
                 f"{self.width_share:.2g} of the length); choose another viewing side with --up"
             )
         if self.vertical_faces == self.n_faces:
-            return (
-                f"{self.name}: all {self.n_faces} faces are seen edge-on from {self.seen_from}, so there is no height "
+            return "is seen edge-on from there", (
+                f"all {self.n_faces} faces are seen edge-on from {self.seen_from}, so there is no height "
                 "field; choose another viewing side with --up"
             )
         if self.fold_share > FOLD_SHARE:
@@ -343,7 +349,10 @@ class SurfaceFacts:
                 if self.inconsistent_edges
                 else "choose another viewing side with --up, or "
             )
-            return f"{self.name}: {self._folded}, more than {FOLD_SHARE:.0%}, so it is no height field; {rewind}{CUT}"
+            at_least = "" if self.complete else "at least "
+            return f"has {at_least}{self.fold_share:.2%} of its faces folded over from any side tried", (
+                f"{self._folded}, more than {FOLD_SHARE:.0%}, so it is no height field; {rewind}{CUT}"
+            )
         return None
 
     @property

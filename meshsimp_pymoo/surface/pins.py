@@ -57,7 +57,8 @@ def named_vertices(model: Mesh, pin: str | Sequence[Any] | AnyArray | None = Non
             )
         if part.ndim == 2 and part.shape[1] == 2:
             raise ModelError(f"{model.name}: pin holds positions [x, y] on a closed surface; give [x, y, z]")
-        pinned[_named(model, part)] = True
+        # copies of a vertex lie where it does
+        pinned |= np.isin(model.file_rows, model.file_rows[_named(model, part)])
     return pinned
 
 

@@ -177,7 +177,9 @@ def thinned(points: list[FloatArray], tolerance: float) -> list[BoolArray]:
 
 
 def farthest_between(points: FloatArray, a: int, b: int) -> tuple[int, float]:
-    """Return which vertex between two of a polyline (n, 2 or 3) is farthest from the segment that they end, and how far.
+    """Return which vertex between two of a polyline is farthest from the segment that they end, and how far.
+
+    The polyline has vertices (n, 2) or (n, 3).
 
     Examples
     --------

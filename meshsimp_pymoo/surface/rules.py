@@ -83,7 +83,8 @@ class Rules:
         kind=Lines(),
         accepts='path, "sharp:DEGREES", "outline", or a list of (n, 2) or (n, 3) arrays, optional',
         doc="Polylines that are chains of edges of every mesh, in the frame of the model's file: a file of them, or "
-        "arrays. Those with heights (x, y, z) bring their own, those without (x, y) take the surface's. "
+        "arrays. Those with heights (x, y, z) bring their own, those without (x, y) take the surface's; of a closed "
+        "surface all have x, y and z. "
         '``"sharp:30"`` takes the edges where two faces of the original meet at more than 30 degrees, ``"outline"`` '
         "its outline and the rims of its holes.",
         help="polylines that are chains of edges of every mesh: a file of them, or the edges where faces meet at more "
@@ -143,7 +144,7 @@ class Rules:
 
     @property
     def spares_uncovered(self) -> bool:
-        """Whether a vertex that no triangle covers costs nothing; on a closed surface there is none."""
+        """Whether a vertex that no triangle covers costs nothing; of a closed surface it costs its distance."""
         return self.outside == "ignore"
 
     @property

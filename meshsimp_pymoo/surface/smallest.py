@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
+from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import LENGTH, TRIANGLES
@@ -55,14 +56,14 @@ def lines_in_words(facts: Mapping[str, Any], unit: str = LENGTH) -> str:
     )
 
 
-def tolerance_for(surface: HeightSurface, triangles: int) -> float | None:
+def tolerance_for(surface: HeightSurface | ClosedSurface, triangles: int) -> float | None:
     """Return about the least tolerance of the break lines that allows a mesh of at most so many triangles.
 
     Each tolerance that is tried takes a thinning of the lines and one evaluation.
 
     Parameters
     ----------
-    surface : HeightSurface
+    surface : HeightSurface or ClosedSurface
         A model whose rules name break lines.
     triangles : int
         The most triangles.
@@ -82,13 +83,14 @@ def tolerance_for(surface: HeightSurface, triangles: int) -> float | None:
     >>> smallest_mesh(fine), tolerance_for(fine, 4)
     (10, 0.56)
     """
-    model, rules = surface.model.without_lines(), surface.rules
+    model: Any = surface.model.without_lines()
+    rules = surface.rules
 
     def allows(tolerance: float) -> bool:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ModelWarning)  # they were said of the tolerance that was asked for
             try:
-                tried = HeightSurface(model, replace(rules, weights=None, line_tolerance=tolerance))
+                tried = type(surface)(model, replace(rules, weights=None, line_tolerance=tolerance))
             except ModelError:  # nothing of a line is left
                 return False
         return 0 < smallest_mesh(tried) <= triangles

@@ -7,8 +7,10 @@ import pytest
 import trimesh
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from scans import bowl
 
 from meshsimp_pymoo.opening import open_model
+from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.problem import MeshProblem
 from meshsimp_pymoo.report import figures as figures_module
 from meshsimp_pymoo.report.figures import (
@@ -22,6 +24,7 @@ from meshsimp_pymoo.report.figures import (
     plot_error,
     plot_front,
     plot_mesh,
+    winding,
 )
 from meshsimp_pymoo.surface.height import HeightSurface
 
@@ -505,3 +508,48 @@ def test_the_front_of_a_body_stands_beside_its_meshes(tmp_path, blob):
     assert len({(panel.get_xlim(), panel.get_ylim()) for panel in panels}) == 1
     figure = error_figure(blob, simplified[0].deviation, simplified[0].covered, title="mine")
     assert figure.axes[0].get_title() == "mine"
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_body_with_holes_shows_its_inside_in_another_tone_however_it_is_wound():
+    shape = bowl()
+    points, faces = np.array(shape.vertices), np.array(shape.faces)
+    assert winding(points, faces) == 1
+    assert winding(points, faces[:, ::-1]) == -1
+    middle = []
+    for view in ((0, 0), (0, 180)):  # z is to the viewer: into the bowl, and at its back
+        for wound in (faces, faces[:, ::-1]):
+            drawn = image(plot_mesh((points, wound), Figure().subplots(), view=view, edges=False, is_body=True))
+            red, _, blue = drawn[drawn.shape[0] // 2, drawn.shape[1] // 2, :3]
+            middle.append(bool(blue > red))
+    assert middle == [True, True, False, False]
+
+
+@pytest.mark.usefixtures("coarse")
+def test_rims_are_drawn_where_the_body_does_not_hide_them():
+    shape = bowl()
+    mesh = (np.array(shape.vertices), np.array(shape.faces))
+    drawn = {}
+    for view in ((0, 0), (0, 180)):
+        panel = plot_mesh(mesh, Figure().subplots(), view=view, is_body=True)
+        segments = [part.get_segments() for part in panel.collections]
+        drawn[view] = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for part in segments for line in part)
+    table = edge_table(mesh[1])
+    ends = mesh[0][table.ends[table.n_triangles == 1]][..., :2]
+    whole = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).sum()
+    assert drawn[0, 0] == pytest.approx(whole, rel=0.02)  # all of them, from above the bowl
+    assert drawn[0, 180] < 0.5 * whole
+
+
+@pytest.mark.usefixtures("coarse")
+def test_uncovered_vertices_of_a_body_are_marked():
+    surface = MeshProblem(bowl(), surface="closed").surface
+    blue = []
+    for covered in (False, True):
+        panel = Figure().subplots()
+        plot_error(
+            surface, np.zeros(surface.n_vertices), panel, covered=np.full(surface.n_vertices, covered), bar=False
+        )
+        drawn = [np.asarray(part.get_array()) for part in panel.get_images()]
+        blue.append(sum((part[..., 2] > part[..., 0]).sum() for part in drawn))
+    assert blue[0] > 1.5 * blue[1]  # but for the inside

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from browser import Visit, launched
 from samples import freed
+from scans import bowl
 from scipy.spatial import Delaunay
 from sketching import sketch
 
@@ -1062,6 +1063,36 @@ def test_two_fingers_magnify_and_roll_a_closed_model(browser, closed_folder):
         # the fingers turned clockwise by a quarter, and so did the body: what was up in it points to the right
         assert abs(rolled @ up) < 0.05
         assert np.cross(rolled, arm) @ up > 0
+        visit.check()
+    finally:
+        visit.close()
+
+
+def test_the_page_of_what_has_holes_shows_its_inside_its_rims_and_what_is_uncovered(browser, tmp_path, monkeypatch):
+    monkeypatch.setattr(figures_module, "front_figure", sketch)
+    problem = MeshProblem(bowl(), surface="closed", n_threads=1)
+    kept = subsets(problem, 4, np.random.default_rng(5))
+    front = Front.from_subsets(problem, kept, ends=True).save(tmp_path / "out", meshes=0)
+    visit = Visit(browser, front / "report.html", viewport={"width": 1280, "height": 1000})
+    try:
+        page = visit.page
+        assert {"uncovered", "error"} <= set(page.locator("#numbers th").all_inner_texts())
+        assert page.locator("#inside-key").is_visible()
+        count = "state.viewer.original.rims.segments.geometry.getAttribute('position').count"
+        assert page.evaluate(count) == 2 * len(problem.model.rim)
+        opening = problem.model.rotation @ [0.0, 0.0, 1.0]
+        for side, is_inside in ((1.0, True), (-1.0, False)):
+            page.evaluate(
+                """([x, y, z]) => { const { camera } = state.viewer; camera.up.set(y, z, x);
+                state.viewer.stand(new THREE.Vector3(x, y, z).multiplyScalar(3)); }""",
+                (side * opening).tolist(),
+            )
+            for window in pixels(page):
+                red, _, blue = window[window.shape[0] // 2, window.shape[1] // 2]
+                assert (blue > red + 5) == is_inside
+                assert (red > blue + 5) != is_inside
+        page.check("input[value=error]", force=True)
+        assert page.locator("#uncovered-key").is_visible() == any(solution.uncovered for solution in Front.load(front))
         visit.check()
     finally:
         visit.close()

@@ -21,7 +21,9 @@ from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
 from meshsimp_pymoo.search.local_search import relocate
 from meshsimp_pymoo.surface import moves
-from meshsimp_pymoo.surface.closed.embedding import closed_holes, embed
+from meshsimp_pymoo.surface.closed import embedding
+from meshsimp_pymoo.surface.closed.embedding import are_poles, discs_in_holes, embed
+from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, SQUARES, TRIANGLES, UNCOVERED, VERTICES
 from meshsimp_pymoo.surface.rules import Rules
@@ -50,7 +52,7 @@ def subset(surface, share, seed):
     return kept
 
 
-# ---------------------------------------------------------------------------------------------------------------- a twin
+# --------------------------------------------------------------------------------------------------------------- a twin
 
 
 def loops_of(model):
@@ -125,7 +127,7 @@ def test_mesh_and_error_are_those_of_a_slow_twin(name, share, seed):
     assert not mesh.covered[kept & ~np.isin(np.arange(len(kept)), mesh.faces)].any()
 
 
-# ------------------------------------------------------------------------------------------------------------------ laws
+# ----------------------------------------------------------------------------------------------------------------- laws
 
 
 @pytest.mark.parametrize("name", MAKE)
@@ -210,7 +212,7 @@ def test_a_part_keeps_four_vertices_whatever_others_have():
     assert np.isfinite(grown.error[-1])
 
 
-# ----------------------------------------------------------------------------------------------------------------- moves
+# ---------------------------------------------------------------------------------------------------------------- moves
 
 
 def check_moves(name, measure, steps, every, *, weights=None):
@@ -272,17 +274,19 @@ def test_many_moves_change_what_they_were_tried_to_and_end_where_scratch_does(na
 
 def test_a_site_that_no_triangle_uses_costs_what_it_is_from_the_pole():
     """Else a search would keep vertices at rims that nobody sees, and call them met."""
-    surface = surface_of("bowl")
+    surface = ClosedSurface(open_model(without(bumpy(), [([1.0, 0.3, 0.1], 0.4), ([0.7, 0.85, 0.1], 0.4)]), CLOSED))
     ground = surface.ground()
     found = 0
     for seed in range(12):
-        kept = subset(surface, 0.7, seed)
+        kept = subset(surface, 0.1, seed)
+        kept[surface.border] = np.random.default_rng(seed).random(len(surface.border)) < 0.4
+        kept |= surface.pinned
         mesh = surface.simplify(kept)
         idle = kept & ~np.isin(np.arange(len(kept)), mesh.faces)
         found += int(idle.sum())
         assert (mesh.deviation[idle] == ground.far[idle]).all()
         assert mesh.quality.vertices == kept.sum() - idle.sum()
-    assert found > 3
+    assert found
 
 
 def test_relocation_lowers_the_error_of_a_mesh_with_holes_and_parts():
@@ -295,14 +299,14 @@ def test_relocation_lowers_the_error_of_a_mesh_with_holes_and_parts():
     assert surface.evaluate(moved)[0, ERROR] < 0.95 * surface.evaluate(kept)[0, ERROR]
 
 
-# ----------------------------------------------------------------------------------------------------------------- refit
+# ---------------------------------------------------------------------------------------------------------------- refit
 
 
 def to_rims(surface, faces, vertices):
     """Return the mean distance of the vertices of the original's rims from those of a mesh."""
     table = edge_table(faces)
     rim = table.ends[table.n_triangles == 1]
-    return distances(surface.points[surface.border], vertices, rim[:, [0, 1, 1]]).mean()
+    return distances_to_mesh(surface.points[surface.border], vertices, rim[:, [0, 1, 1]])[0].mean()
 
 
 def test_refit_moves_rims_to_where_those_of_the_original_are():
@@ -318,24 +322,63 @@ def test_refit_moves_rims_to_where_those_of_the_original_are():
     assert distances(surface.points, points, mesh.faces).sum() == pytest.approx(fitted.error, rel=1e-9)
 
 
-# ------------------------------------------------------------------------------------------------------------ flattening
+# ----------------------------------------------------------------------------------------------------------- flattening
 
 
-def test_holes_are_closed_by_one_virtual_vertex_each_amid_its_rim():
-    mesh = holed()
-    centres, fans = closed_holes(np.array(mesh.vertices), np.array(mesh.faces, np.int64))
-    whole = trimesh.Trimesh(np.concatenate([mesh.vertices, centres]), np.concatenate([mesh.faces, fans]), process=False)
-    assert len(centres) == 3
+@pytest.mark.parametrize("make", [holed, bowl, lambda: without(bumpy(1), [([0.9, 0.3, 0.1], 0.7)])])
+def test_holes_are_closed_by_discs_whose_circumference_is_the_rim(make):
+    mesh = make()
+    points, faces = np.array(mesh.vertices), np.array(mesh.faces, np.int64)
+    discs = discs_in_holes(points, faces)
+    whole = trimesh.Trimesh(
+        np.zeros((len(points) + len(discs.rim_vertex), 3)), np.concatenate([faces, discs.faces]), process=False
+    )
     assert whole.is_watertight
     assert whole.is_winding_consistent
     assert whole.euler_number == 2
+    assert np.array_equal(
+        np.unique(discs.faces[discs.faces >= len(points)]), len(points) + np.arange(len(discs.rim_vertex))
+    )
+    a, b, c = (discs.corners[:, k] for k in range(3))
+    areas = np.cross(b - a, c - a)[:, 2] / 2.0
+    assert (areas > 0.0).all()
+    assert areas.sum() < len(set(discs.rim_vertex.tolist())) * np.pi  # round ones of radius 1
+    # the shapes around a hole stay in the plane what they are, as they would not with one vertex amid it
+    model = open_model(mesh, CLOSED)
+    assert np.median(stretches(model)) < (1.35 if model.n_vertices > 100 else 2.0)
+
+
+def stretches(model):
+    """Return how many times longer each face of a model of one part has become along one direction than across."""
+    faces = model.faces[~are_poles(model.faces, model.poles)]
+    flat, solid = model.xy[faces], model.points[faces]
+    found = []
+    for p, q in zip(flat, solid, strict=True):
+        u, v = q[1] - q[0], q[2] - q[0]
+        x = u / np.linalg.norm(u)
+        y = v - (v @ x) * x
+        y /= np.linalg.norm(y)
+        in_plane = np.array([[u @ x, u @ y], [v @ x, v @ y]])
+        values = np.linalg.svd(np.linalg.solve(in_plane, np.array([p[1] - p[0], p[2] - p[0]])), compute_uv=False)
+        found.append(values[0] / values[1])
+    return found
+
+
+def test_a_plane_in_which_all_is_sheared_is_mended_by_a_robust_mean():
+    rng = np.random.default_rng(1)
+    corners = rng.normal(size=(300, 3, 3)) * [1.0, 1.0, 0.0]
+    images = corners[:, :, :2] @ np.array([[900.0, 0.0], [0.0, 1.0]])
+    turned = np.linalg.det(images[:, 1:] - images[:, :1]) < 0
+    corners, images = corners[~turned], images[~turned]
+    values = np.linalg.svd(np.diag([900.0, 1.0]) @ embedding._unsheared(corners, images), compute_uv=False)
+    assert values[0] / values[1] == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_pole_keeps_away_from_holes():
     mesh = bowl()
     surface = ClosedSurface(open_model(mesh, CLOSED))
     low = mesh.vertices[:, 2].min()
-    assert surface.model.file_points[surface.model.poles[0], 2].max() < 0.6 * low
+    assert surface.model.file_points[surface.model.poles[0], 2].max() < 0.4 * low
 
 
 def test_parts_lie_beside_each_other_and_are_numbered_by_their_poles():
@@ -377,9 +420,7 @@ def test_many_parts_are_flattened_one_by_one():
 
 def test_parts_too_small_to_have_a_mesh_are_left_out_and_said():
     mesh = trimesh.util.concatenate([bumpy(2), trimesh.Trimesh([[9.0, 0, 0], [9, 1, 0], [9, 0, 1]], [[0, 1, 2]])])
-    with pytest.warns(
-        ModelWarning, match=r"1 part of fewer than 4 vertices \(3 vertices\) cannot be simplified and are"
-    ):
+    with pytest.warns(ModelWarning, match=r"1 part of fewer than 4 vertices \(1 face\)"):
         model = open_model(as_source(mesh, "bits"), CLOSED)
     assert model.n_vertices == len(mesh.vertices) - 3
     assert model.found["small_parts_left_out"] == 1
@@ -408,6 +449,7 @@ def test_a_hole_within_a_hole_is_another_part():
     """An island in a hole of another part."""
     mesh = bumpy()
     island = without(mesh, [([-1.2, 0.0, 0.0], 2.05)])
+    island.vertices *= 1.001
     rest = without(mesh, [([0.9, 0.0, 0.0], 0.5)])
     model = open_model(trimesh.util.concatenate([rest, island]), CLOSED)
     assert model.n_parts == 2

@@ -8,6 +8,9 @@ import numba
 import numpy as np
 import pytest
 import trimesh
+from closed_lining import CASES as LINED
+from closed_lining import case as lined
+from closed_lining import random_subset as some_of
 
 from meshsimp_pymoo.compiling.functions import OPTIONS
 from meshsimp_pymoo.compiling.linking import EntryCompiler, is_known
@@ -196,3 +199,40 @@ def test_where_there_is_no_border_room_for_one_triangle_stays_empty():
     most = 2 * int(kept.sum()) - 3
     moved = relocate(surface, kept, moves=2_000, seed=1, triangles=most, shares=MoveShares(border=0.9))
     assert surface.evaluate(moved)[0, TRIANGLES] == most - 1
+
+
+def check_moves_beside_lines(surface, n, every):
+    """Make random moves, also such that insert and remove, and compare with what there is from scratch."""
+    kept = some_of(surface, 0.1, 4)
+    ground, rng = surface.ground(), np.random.default_rng(1)
+    with surface.books(kept) as books:
+        for number in range(1, n + 1):
+            free = np.flatnonzero(kept & ~surface.pinned)
+            v, w = rng.choice(free), rng.choice(np.flatnonzero(~kept))
+            kind = rng.random()
+            if kind < 0.25 and len(free) < surface.n_vertices // 3:
+                v = -1
+            elif kind < 0.5 and len(free) > 2 * surface.model.n_parts + 2:
+                w = -1
+            change, triangles, before, size, after, new_size = step(ground, books, int(v), int(w), np.inf, True)
+            if np.isfinite(change):
+                kept[[row for row in (v, w) if row >= 0]] ^= True
+                assert new_size - size == triangles
+                assert abs(after - before - change) <= 1e-9 * (1.0 + after)
+            if number % every == 0:
+                sites, cost, triangles = moves.snapshot(ground, books, surface.n_vertices)
+                row = surface.evaluate(kept)[0]
+                assert np.array_equal(sites, kept)
+                assert triangles == row[TRIANGLES]
+                assert cost == pytest.approx(row[ERROR], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", LINED)
+def test_moves_beside_lines_end_where_scratch_does(name):
+    check_moves_beside_lines(lined(name), 300, 20)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LINED)
+def test_many_moves_beside_lines_end_where_scratch_does(name):
+    check_moves_beside_lines(lined(name), 20_000, 100)

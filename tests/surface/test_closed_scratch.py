@@ -218,7 +218,6 @@ def test_rows_and_positions_are_pinned():
     [
         (Rules(footprint="hull"), r"footprint='hull' \(--footprint hull\) describes height surfaces"),
         (Rules(outside="ignore"), r"outside='ignore' \(--outside ignore\) describes height surfaces"),
-        (Rules(break_lines="sharp:30"), "break lines are for height surfaces"),
     ],
 )
 def test_what_describes_height_surfaces_is_refused(rules, said):

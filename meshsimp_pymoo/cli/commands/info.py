@@ -8,11 +8,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.formats.source import SourceMesh
+    from meshsimp_pymoo.opening import Judged
     from meshsimp_pymoo.surface.closed.model import Topology
+    from meshsimp_pymoo.surface.kinds import OfModel
     from meshsimp_pymoo.surface.rules import Rules
 
 # What is said of a model whatever it is taken for; None where it is not known, or there is none.
-OF_SURFACES = ("components", "genus", "loops", "caps", "flips", "least_image_edge", "not_height", "not_closed")
+OF_SURFACES = (
+    *("components", "genus", "loops", "rim_edges", "caps", "copied", "small_parts_left_out", "least_image_edge"),
+    *("not_height", "not_closed"),
+)
 HELP = "say what a model is and whether it can be simplified"
 DESCRIPTION = """\
 Say what MODEL is, whether it is a height field or a closed surface, and what would be
@@ -71,7 +76,7 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
     from meshsimp_pymoo.cli.terminal import BAD_INPUT, OK, say, tell
     from meshsimp_pymoo.formats.source.classes import classes_in_words
     from meshsimp_pymoo.formats.source.missing import suspects
-    from meshsimp_pymoo.opening import kind_of, mended_source
+    from meshsimp_pymoo.opening import judge, mended_source
     from meshsimp_pymoo.surface.units import known_units, length_unit, reference_system
 
     source, mended = mended_source(model, options)
@@ -119,13 +124,14 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
     if classes := source.georeference.get("classes"):
         content["classes"] = classes
         rows["classes"] = classes_in_words(classes)
-    kind = rows["surface"] = kind_of(source, options)
-    refusal = (_as_closed if kind == "closed" else _as_height)(source, options, rules, content, rows)
+    judged = judge(source, options)
+    kind = rows["surface"] = judged.kind
+    refusal = (_as_closed if kind == "closed" else _as_height)(source, judged, rules, content, rows)
     if refusal:
         rows["surface"] = "none"
     else:
         content["surface"] = kind
-    usable = "usable: a closed surface of genus 0" if kind == "closed" else "usable: an open height field"
+    usable = f"usable: {'a closed surface of genus 0' if kind == 'closed' else 'an open height field'}"
     doubt = f"usable, but see the warning: {odd[0][1]:,} heights of {odd[0][0]:.9g}" if odd else ""
     rows["verdict"] = "refused" if refusal else doubt or usable
     if as_json:
@@ -141,28 +147,20 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
 
 
 def _as_height(
-    source: SourceMesh, options: Options, rules: Rules, content: dict[str, Any], rows: dict[str, str]
+    source: SourceMesh, judged: Judged, rules: Rules, content: dict[str, Any], rows: dict[str, str]
 ) -> str | None:
     """Add what a model is as a height field, and why it is no closed surface; return why it is refused, if it is."""
     from dataclasses import asdict
 
-    from meshsimp_pymoo.errors import ModelError
-    from meshsimp_pymoo.opening import not_closed_either
     from meshsimp_pymoo.surface.closed.model import topology
     from meshsimp_pymoo.surface.height import HeightSurface
     from meshsimp_pymoo.surface.model import build_model
-    from meshsimp_pymoo.surface.orient import seen_upright, upright_rotation
+    from meshsimp_pymoo.surface.orient import upright_rotation
     from meshsimp_pymoo.surface.places import count_places
-    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
-    from meshsimp_pymoo.surface.units import length_unit
 
-    measured = source.measured
-    try:
-        up, facts = seen_upright(measured, options.up)
-    except ModelError as problem:
-        refusal: str | None = str(problem)
-    else:
-        refusal = facts.refusal
+    measured, refusal = source.measured, judged.refusal
+    if judged.seen is not None:
+        up, facts = judged.seen
         n_below = n_feet = 0
         if not refusal and source.sort == "mesh":  # grids and clouds have one vertex at a place
             n_below, n_feet = count_places(measured.points @ upright_rotation(up).T, measured.faces)
@@ -180,10 +178,7 @@ def _as_height(
             "folded over": f"{'' if facts.complete else 'at least '}{facts.n_folded:,} faces ({facts.fold_share:.2%})",
         }
     if rules.break_lines is not None and not refusal:
-        lined = HeightSurface(build_model(source, up=options.up), rules)
-        assert lined.model.lines is not None
-        content["lines"] = facts_of_lines(lined, lined.model.lines)
-        rows["break lines"] = lines_in_words(content["lines"], length_unit(source.georeference))
+        _add_lines(HeightSurface(build_model(source, seen=judged.seen), rules), content, rows)
     why_not: str | None = f"is a {source.sort}"
     if source.sort == "mesh":
         what = topology(source.faces)
@@ -192,47 +187,58 @@ def _as_height(
         if refusal or why_not is None:
             rows["not closed"] = why_not or "it could be taken as a closed surface (--surface closed)"
     content["not_closed"] = why_not
-    return refusal and refusal + not_closed_either(source, options)
+    return refusal
 
 
 def _as_closed(
-    source: SourceMesh, options: Options, rules: Rules, content: dict[str, Any], rows: dict[str, str]
+    source: SourceMesh, judged: Judged, rules: Rules, content: dict[str, Any], rows: dict[str, str]
 ) -> str | None:
     """Add what a model is as a closed surface, and why it is no height field; return why it is refused, if it is."""
-    from meshsimp_pymoo.cli.terminal import with_options
     from meshsimp_pymoo.errors import ModelError
-    from meshsimp_pymoo.surface.closed.embedding import faults, shortest_edge
+    from meshsimp_pymoo.opening import judge
+    from meshsimp_pymoo.surface.closed.embedding import shortest_edge
     from meshsimp_pymoo.surface.closed.model import closed_model, topology
     from meshsimp_pymoo.surface.closed.surface import ClosedSurface
-    from meshsimp_pymoo.surface.orient import seen_upright
 
     what = topology(source.faces)
     content |= _facts_of(what)
-    rows["parts"] = f"{what.components}"
+    rows["parts"] = f"{what.components:,}"
     rows["genus"] = "not known" if what.genus is None else f"{what.genus}"
-    rows["holes"] = f"{what.loops}"
-    try:
-        why_not = seen_upright(source.measured, options.up)[1].refusal
-    except ModelError as problem:
-        why_not = str(problem)
-    content["not_height"] = why_not
-    said = with_options((why_not or "").removeprefix(f"{source.name}: "))
-    rows["no height field"] = said or "it could be taken as one (--surface height)"
+    rows["holes"] = f"{what.loops:,}" + f" ({what.rim_edges:,} edges at rims)" * (what.loops > 0)
+    # where the options say what it is, nobody has looked at the other
+    fault = content["not_height"] = judged.fault or judge(source).fault
+    rows["no height field"] = f"it {fault}" if fault else "it could be taken as one (--surface height)"
     try:
         model = closed_model(source)
-        ClosedSurface(model, rules)
+        surface = ClosedSurface(model, rules)
     except ModelError as problem:
+        content["not_closed"] = rows["not closed"] = what.refusal or str(problem).removeprefix(f"{source.name}: ")
         return str(problem)
+    left = {name: model.found.get(name, 0) for name in ("copied", "small_parts_left_out")}
+    if n_small := left["small_parts_left_out"]:
+        rows["parts"] += f" ({n_small:,} of fewer than 4 vertices left out)"
+    if n_copied := left["copied"]:
+        rows["vertices"] += f" (and {n_copied:,} copies of those in which several fans of faces meet)"
     least = shortest_edge(model.xy, model.faces)
-    flips, _ = faults(model.xy, model.faces, model.poles)
-    content |= {"flips": flips, "least_image_edge": least}
-    rows["flattened"] = f"{flips} faces flipped, the shortest edge {least:.3g} of the plane's side"
+    content |= {"caps": model.n_holes, "least_image_edge": least} | left
+    rows["flattened"] = f"the shortest edge is {least:.3g} of the plane's side"
+    _add_lines(surface, content, rows)
     return None
 
 
+def _add_lines(surface: OfModel, content: dict[str, Any], rows: dict[str, str]) -> None:
+    """Add what break lines are and ask of every mesh, if there are any."""
+    from meshsimp_pymoo.surface.smallest import facts_of_lines, lines_in_words
+    from meshsimp_pymoo.surface.units import length_unit
+
+    if surface.model.lines is not None:
+        content["lines"] = facts_of_lines(surface, surface.model.lines)
+        rows["break lines"] = lines_in_words(content["lines"], length_unit(surface.model.georeference))
+
+
 def _facts_of(what: Topology) -> dict[str, Any]:
-    """Return what closed surfaces are judged by; no holes are capped."""
-    return {"components": what.components, "genus": what.genus, "loops": what.loops, "caps": 0}
+    """Return what closed surfaces are judged by."""
+    return {"components": what.components, "genus": what.genus, "loops": what.loops, "rim_edges": what.rim_edges}
 
 
 def _sides(extent: Any) -> str:

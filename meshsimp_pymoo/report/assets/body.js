@@ -5,6 +5,7 @@ const LEAST_ZOOM = 0.25;
 const MOST_ZOOM = 60;
 const MOST_SAMPLES = 300_000; // of the error on a simplified mesh
 const MOST_PARTS = 48; // of one edge of it
+const [FRONT_SIDE, BACK_SIDE] = [0, 1]; // as three.js numbers them; the build of it here has no names of them
 
 // Which of some points in space is nearest to another one: a tree of halves.
 class NearestPoint {
@@ -163,6 +164,39 @@ class BodyPair extends MeshPair {
     this.look(...this.first);
   }
 
+  // Of a body with holes each side is drawn for itself, the inside in another tone, and the rims.
+  scene(faces, ends) {
+    const part = super.scene(faces, ends);
+    if (!this.open) return part;
+    if (!this.materials.inside) {
+      const sides = [FRONT_SIDE, BACK_SIDE];
+      if (this.open.winding < 0) sides.reverse();
+      this.materials.shaded.side = sides[0];
+      const { polygonOffset, polygonOffsetFactor, polygonOffsetUnits } = this.materials.shaded;
+      const lifted = { polygonOffset, polygonOffsetFactor, polygonOffsetUnits };
+      this.materials.inside = new THREE.MeshLambertMaterial({ color: this.open.inside, flatShading: true, side: sides[1], ...lifted });
+    }
+    part.inside = new THREE.Mesh(part.mesh.geometry, this.materials.inside);
+    part.inside.frustumCulled = false;
+    part.scene.add(part.inside);
+    part.rims = this.linesOf(this.rimsOf(faces), this.materials.rim);
+    return part;
+  }
+
+  // The ends of the edges that one triangle only has.
+  rimsOf(faces) {
+    const rows = this.arrays.position.length / 3;
+    const alone = new Map(); // edge -> its two ends
+    for (let t = 0; t < faces.length; t += 3) {
+      for (let k = 0; k < 3; k++) {
+        const [a, b] = [faces[t + k], faces[t + ((k + 1) % 3)]];
+        const edge = Math.min(a, b) * rows + Math.max(a, b);
+        if (!alone.delete(edge)) alone.set(edge, [a, b]);
+      }
+    }
+    return Float32Array.from([...alone.values()].flat().flatMap((row) => [...this.arrays.position.subarray(3 * row, 3 * row + 3)]));
+  }
+
   show(faces, edges) {
     this.fine?.dispose();
     this.fine = null;
@@ -179,6 +213,7 @@ class BodyPair extends MeshPair {
   // On the simplified mesh the error is that of the original vertex that is nearest.
   dress(part, which) {
     super.dress(part, which);
+    if (part.inside) part.inside.visible = this.mode !== "wireframe";
     if (which === 0) return;
     const isError = this.mode === "error";
     if (isError && !this.fine) this.makeFine(part.wire.geometry.index.array);

@@ -222,7 +222,7 @@ function paintErrors() {
   state.viewer.setErrors(colours);
   part("scale-middle").textContent = readable(end / 2);
   part("scale-end").textContent = data.solutions.some((solution) => solution && solution.largest > end) ? `≥ ${readable(end)}` : readable(end);
-  if (!data.closed) part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
+  if (part("uncovered-key")) part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
 }
 
 function colourBar() {
@@ -265,6 +265,7 @@ async function openViewer() {
       exaggeration: heights ? heights.valueAsNumber : 1,
       relief: model.relief,
       first: data.closed && data.closed.front.map((degrees) => (degrees * Math.PI) / 180),
+      open: data.closed && data.closed.open,
       onDraw() {
         if (!first || !state.mesh) return;
         first = false;
@@ -302,6 +303,7 @@ async function openViewer() {
   }
 }
 
+if (data.closed?.open) part("inside-key").style.background = data.closed.open.inside;
 colourBar();
 pick(data.chosen === null ? data.knee : data.chosen);
 openViewer();

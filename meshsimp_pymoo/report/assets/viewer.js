@@ -9,9 +9,10 @@ const TEXTURE_SIZE = 1024;
 
 class MeshPair {
   // positions: (V, 3) upright from a local origin; extent: [low, high] of the original; paint: (V, k) uint8 or null;
-  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null; first: where a body is looked at from
-  constructor(canvas, windows, { positions, faces, lines, paint, channels, exaggeration, relief, first, onDraw }) {
-    Object.assign(this, { canvas, windows, paint, first, onDraw });
+  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null; first: where a body is looked at from;
+  // open: how the inside of a body with holes looks, or null
+  constructor(canvas, windows, { positions, faces, lines, paint, channels, exaggeration, relief, first, open, onDraw }) {
+    Object.assign(this, { canvas, windows, paint, first, open, onDraw });
     const count = positions.length / 3;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -50,11 +51,12 @@ class MeshPair {
 
     const side = THREE.DoubleSide;
     const lifted = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
-    const below = lines ? lifted : {}; // lines lie in front of the faces that they are edges of
+    const below = lines || open ? lifted : {}; // lines lie in front of the faces that they are edges of
     this.materials = {
       shaded: new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side, ...below }),
       texture: new THREE.MeshLambertMaterial({ flatShading: true, side, ...below }),
       line: new THREE.LineBasicMaterial(),
+      rim: new THREE.LineBasicMaterial(),
       paper: new THREE.MeshBasicMaterial({ side, ...lifted }),
       wire: new THREE.MeshBasicMaterial({ wireframe: true, side }),
     };
@@ -123,10 +125,10 @@ class MeshPair {
   }
 
   // ends: (2 S, 3) Float32Array; the lines have a scene of their own, which is drawn several times to make them wider
-  linesOf(ends) {
+  linesOf(ends, material = this.materials.line) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(ends, 3));
-    const segments = new THREE.LineSegments(geometry, this.materials.line);
+    const segments = new THREE.LineSegments(geometry, material);
     segments.frustumCulled = false;
     const scene = new THREE.Scene();
     scene.add(segments);
@@ -136,7 +138,7 @@ class MeshPair {
   // faces: Uint32Array or null for no mesh; edges: the ends of its break lines as rows of the vertices, or null
   show(faces, edges) {
     if (this.simplified) this.simplified.wire.geometry.dispose();
-    if (this.simplified?.lines) this.simplified.lines.segments.geometry.dispose();
+    for (const lines of [this.simplified?.lines, this.simplified?.rims]) lines?.segments.geometry.dispose();
     const ends = edges && new Float32Array(3 * edges.length);
     for (let i = 0; ends && i < ends.length; i++) ends[i] = this.arrays.position[3 * edges[Math.floor(i / 3)] + (i % 3)];
     this.simplified = faces ? this.scene(faces, ends) : null;
@@ -149,14 +151,14 @@ class MeshPair {
   }
 
   // Lines are one pixel wide by WebGL's rules; moved by half a pixel to all sides they are two.
-  drawLines(part, width, height) {
-    part.lines.segments.scale.z = this.exaggeration;
-    part.lines.scene.add(this.camera);
+  drawLines(lines, width, height) {
+    lines.segments.scale.z = this.exaggeration;
+    lines.scene.add(this.camera);
     this.renderer.autoClear = false;
     const step = 0.5;
     for (const [x, y] of [[step, 0], [-step, 0], [0, step], [0, -step]]) {
       this.camera.setViewOffset(width, height, x, y, width, height);
-      this.renderer.render(part.lines.scene, this.camera);
+      this.renderer.render(lines.scene, this.camera);
     }
     this.camera.clearViewOffset();
     this.renderer.autoClear = true;
@@ -190,6 +192,7 @@ class MeshPair {
     this.materials.paper.color.set(style.getPropertyValue("--card").trim());
     this.materials.wire.color.set(style.getPropertyValue("--wire").trim());
     this.lineColours = { shaded: "#00574b", wireframe: style.getPropertyValue("--breakline").trim() };
+    this.rimColours = { shaded: this.open?.rim, wireframe: style.getPropertyValue("--rim").trim() };
     this.request();
   }
 
@@ -279,7 +282,9 @@ class MeshPair {
     const bright = this.mode === "error" ? 0.72 : 0.3; // colours of the error must be told from the light
     this.sky.intensity = Math.PI * bright;
     this.sun.intensity = Math.PI * (this.mode === "error" ? 0.36 : 0.78);
-    this.materials.line.color.set(this.lineColours[this.mode === "wireframe" ? "wireframe" : "shaded"]);
+    const ground = this.mode === "wireframe" ? "wireframe" : "shaded";
+    this.materials.line.color.set(this.lineColours[ground]);
+    if (this.open) this.materials.rim.color.set(this.rimColours[ground]);
     renderer.setScissorTest(false);
     renderer.clear();
     renderer.setScissorTest(true);
@@ -295,7 +300,8 @@ class MeshPair {
       part.mesh.scale.z = part.wire.scale.z = this.exaggeration;
       part.scene.add(this.camera, this.sky);
       renderer.render(part.scene, this.camera);
-      if (part.lines && this.linesShown) this.drawLines(part, rectangle[2], rectangle[3]);
+      if (part.rims) this.drawLines(part.rims, rectangle[2], rectangle[3]);
+      if (part.lines && this.linesShown) this.drawLines(part.lines, rectangle[2], rectangle[3]);
     });
     this.onDraw();
   }

@@ -1,8 +1,9 @@
-"""The closed surface: a mesh without a border and of genus 0, where a subset means the convex hull of its images on a
-sphere.
+"""The closed surface: parts of genus 0 once their holes are closed.
 
-Bottom up: `embedding` flattens the original once, `model` holds it in vector order, `distance` says how far a vertex is
-from a triangle, `nearest` from a whole mesh, `ground` and `books` are the records of compiled functions, `evaluate`
-measures a subset from scratch, `live` by moves, `refit` moves the vertices off the original ones, and `surface` is all
-that together, as the search knows it.
-"""  # noqa: D205
+A subset means, for each part, the convex hull of its images on a sphere, without what lies in holes.
+
+Bottom up: `embedding` flattens the original once, `model` holds it in vector order, `lining` gives it break lines,
+`distance` says how far a vertex is from a triangle, `nearest` from a whole mesh, `ground` and `books` are the records
+of compiled functions, `evaluate` measures a subset from scratch, `live` by moves, `refit` moves the vertices off the
+original ones, and `surface` is all that together, as the search knows it.
+"""

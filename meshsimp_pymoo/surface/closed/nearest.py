@@ -50,6 +50,19 @@ def distances_to_mesh(
     return np.sqrt(squares), order[nearest]
 
 
+def distances_to_line(points: FloatArray, line: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return how far points (N, 3) are from a polyline (n, 3), and the piece that each is nearest to (N,).
+
+    Examples
+    --------
+    >>> line = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    >>> [found.tolist() for found in distances_to_line(np.array([[0.5, 0.0, 2.0], [3.0, 0.5, 0.0]]), line)]
+    [[2.0, 2.0], [0, 1]]
+    """
+    k = np.arange(len(line) - 1)
+    return distances_to_mesh(points, line, np.column_stack([k, k + 1, k + 1]))  # triangles without an area
+
+
 def _morton_keys(points: FloatArray) -> IntArray:
     """Return the place of points (n, 3) along a curve that fills their box."""
     low, extent = points.min(axis=0), np.ptp(points, axis=0).max()
@@ -134,3 +147,34 @@ def _nearest_triangles(
             depth += 2
         squares[i] = least
         nearest[i] = best
+
+
+def nearest_shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> FloatArray:
+    """Return the barycentric coordinates (K, 3) of the point of each triangle that is nearest to each point.
+
+    The triangles have their first corners at ``a`` (K, 3), and their sides ``u`` and ``v`` lead from there.
+    """
+    p = points - a
+    uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
+    up, vp = (u * p).sum(axis=1), (v * p).sum(axis=1)
+    area = uu * vv - uv * uv
+    solid = area > 0.0
+    s = np.where(solid, vv * up - uv * vp, -1.0) / np.where(solid, area, 1.0)
+    t = np.where(solid, uu * vp - uv * up, -1.0) / np.where(solid, area, 1.0)
+    inside = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
+
+    # else the nearest point of the three sides
+    def along(top: FloatArray, bottom: FloatArray) -> FloatArray:
+        return np.clip(top / np.where(bottom > 0.0, bottom, 1.0), 0.0, 1.0)
+
+    ab, ac = along(up, uu), along(vp, vv)
+    w, q = v - u, p - u
+    bc = along((w * q).sum(axis=1), (w * w).sum(axis=1))
+    zero = np.zeros(len(p))
+    choices = np.stack([np.stack([ab, zero]), np.stack([zero, ac]), np.stack([1.0 - bc, bc])])  # (side, 2, K)
+    away = [((p - st[0][:, None] * u - st[1][:, None] * v) ** 2).sum(axis=1) for st in choices]
+    side = np.argmin(away, axis=0)
+    on_side = choices[side, :, np.arange(len(p))]
+    s = np.where(inside, s, on_side[:, 0])
+    t = np.where(inside, t, on_side[:, 1])
+    return np.column_stack([1.0 - s - t, s, t])

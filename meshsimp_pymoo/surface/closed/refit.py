@@ -27,7 +27,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
+from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh, nearest_shares
 from meshsimp_pymoo.surface.edges import Edges
 
 # Rounds, and what holds vertices where they are: this share of what a sample weighs, times the samples a vertex.
@@ -189,7 +189,7 @@ def _on_planes(vertices: FloatArray, faces: IntArray, samples: Samples, nearest:
     a, b, c = (vertices[faces[nearest, k]] for k in range(3))
     across = normal[nearest]
     values = (across * samples.points).sum(axis=1)
-    return _Rows(faces[nearest], _shares(a, b - a, c - a, samples.points), across, values, samples.weights)
+    return _Rows(faces[nearest], nearest_shares(a, b - a, c - a, samples.points), across, values, samples.weights)
 
 
 def _on_rims(vertices: FloatArray, faces: IntArray, rim: _Rim, samples: Samples, edge: IntArray) -> _Rows:
@@ -253,31 +253,3 @@ def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return the normals (M, 3) of triangles, twice as long as their areas."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
-
-
-def _shares(a: FloatArray, u: FloatArray, v: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the barycentric coordinates (K, 3) of the point of each triangle that is nearest to each point."""
-    p = points - a
-    uu, uv, vv = (u * u).sum(axis=1), (u * v).sum(axis=1), (v * v).sum(axis=1)
-    up, vp = (u * p).sum(axis=1), (v * p).sum(axis=1)
-    area = uu * vv - uv * uv
-    solid = area > 0.0
-    s = np.where(solid, vv * up - uv * vp, -1.0) / np.where(solid, area, 1.0)
-    t = np.where(solid, uu * vp - uv * up, -1.0) / np.where(solid, area, 1.0)
-    inside = (s >= 0.0) & (t >= 0.0) & (s + t <= 1.0)
-
-    # else the nearest point of the three sides
-    def along(top: FloatArray, bottom: FloatArray) -> FloatArray:
-        return np.clip(top / np.where(bottom > 0.0, bottom, 1.0), 0.0, 1.0)
-
-    ab, ac = along(up, uu), along(vp, vv)
-    w, q = v - u, p - u
-    bc = along((w * q).sum(axis=1), (w * w).sum(axis=1))
-    zero = np.zeros(len(p))
-    choices = np.stack([np.stack([ab, zero]), np.stack([zero, ac]), np.stack([1.0 - bc, bc])])  # (side, 2, K)
-    away = [((p - st[0][:, None] * u - st[1][:, None] * v) ** 2).sum(axis=1) for st in choices]
-    side = np.argmin(away, axis=0)
-    on_side = choices[side, :, np.arange(len(p))]
-    s = np.where(inside, s, on_side[:, 0])
-    t = np.where(inside, t, on_side[:, 1])
-    return np.column_stack([1.0 - s - t, s, t])

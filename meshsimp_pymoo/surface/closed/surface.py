@@ -1,4 +1,4 @@
-"""The closed surface: a mesh of genus 0 without a border, where a subset means the convex hull of its images."""
+"""The closed surface: parts of genus 0, with holes or without, where a subset means the convex hulls of its images."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspa
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
-from meshsimp_pymoo.surface.closed.model import ClosedModel
-from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
+from meshsimp_pymoo.surface.closed.model import LEAST_VERTICES, ClosedModel
+from meshsimp_pymoo.surface.closed.nearest import distances_to_line, distances_to_mesh
 from meshsimp_pymoo.surface.closed.refit import Held, Samples, rounds_of_refit
 from meshsimp_pymoo.surface.measures import TRIANGLES, as_quality
 from meshsimp_pymoo.surface.pins import named_vertices
@@ -38,9 +38,10 @@ LARGE = 300_000
 class ClosedSurface(ModelSurface):
     """A closed model and the rules for it; see `Surface` for what its attributes are.
 
-    The mesh of a subset is the Delaunay triangulation of its images and the outside as one more triangle: it is
-    watertight, of genus 0, uses all n vertices and has 2 n - 4 triangles. The deviation d_p of a vertex is its distance
-    in space to the triangle that holds its image and to those across its edges.
+    The mesh of a subset is the Delaunay triangulation of its images and the outside of each part as one more triangle,
+    without what lies in holes. Without holes each part is watertight, of genus 0, uses all n vertices and has 2 n - 4
+    triangles. The deviation d_p of a vertex is its distance in space to the triangle that holds its image and to those
+    across its edges, as far as they are in the mesh.
 
     Parameters
     ----------
@@ -57,9 +58,10 @@ class ClosedSurface(ModelSurface):
 
     def __init__(self, model: ClosedModel, rules: Rules = DEFAULT) -> None:
         _refuse_rules(model.name, rules)
-        self.model = model if rules.weights is None else model.with_weights(rules.weights)
+        bare = model if rules.break_lines is None else model.without_lines()
+        self.model = bare if rules.weights is None else bare.with_weights(rules.weights)
         if rules.break_lines is not None:
-            self.model = lined_closed_model(self.model.without_lines(), rules.break_lines, rules.line_tolerance)
+            self.model = lined_closed_model(self.model, rules.break_lines, rules.line_tolerance)
         self.rules = rules
         self.pinned: BoolArray = named_vertices(self.model, rules.pin)
         self.pinned[self.model.poles] = True
@@ -80,6 +82,17 @@ class ClosedSurface(ModelSurface):
     def border(self) -> IntArray:
         """The vertices at the rims of holes."""
         return self.model.border
+
+    @property
+    def least_triangles(self) -> int:
+        """No mesh has fewer triangles: each part has its pole, and without holes two for each vertex but four.
+
+        With holes more vertices can be fewer triangles.
+        """
+        if len(self.model.rim):
+            return self.model.n_parts
+        pinned = np.bincount(self.model.part[self.pinned], minlength=self.model.n_parts)
+        return int((2 * np.maximum(pinned, LEAST_VERTICES) - 4).sum())
 
     @property
     def places(self) -> FloatArray:
@@ -298,8 +311,7 @@ class ClosedSurface(ModelSurface):
         kept[rows] = True
         ends = []
         for line, chain in zip(lines.originals, self.line_chains(kept), strict=True):
-            k = np.arange(len(chain) - 1)
-            _, nearest = distances_to_mesh(line, self.points[chain], np.column_stack([k, k + 1, k + 1]))
+            _, nearest = distances_to_line(line, self.points[chain])
             at = np.searchsorted(rows, chain)
             ends.append(np.column_stack([at[nearest], at[nearest + 1]]))
         return Held(np.concatenate(lines.originals), np.concatenate(ends), lines.tolerance)
@@ -318,5 +330,5 @@ def _refuse_rules(name: str, rules: Rules) -> None:
         if (value := getattr(rules, what)) is not None:
             raise ModelError(
                 f"{name}: {what}={value!r} (--{what} {value}) describes height surfaces, and this is a closed one, "
-                "whose meshes cover all of it; leave it out"
+                "whose holes stay open and whose uncovered vertices cost their distance; leave it out"
             )
