@@ -99,10 +99,10 @@ def lattice_footprint(bits: np.ndarray, x: np.ndarray, y: np.ndarray) -> Footpri
     x, y : (C,), (R,) float arrays
         Where its columns are, ascending, and its rows, descending, in the unit square.
     """
-    none = np.zeros(0, np.int32)
     state = np.ascontiguousarray(bits).ravel()
     at = np.array(x, float), np.array(y, float)
-    return Footprint(1, bits.shape[1], state, none, none, none.reshape(0, 3), *at, NO_RIM, NO_BOXES)
+    no_faces = NO_CELLS.reshape(0, 3)
+    return Footprint(1, bits.shape[1], state, NO_CELLS, NO_CELLS, no_faces, *at, NO_RIM, NO_BOXES)
 
 
 @inner

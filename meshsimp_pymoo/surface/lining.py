@@ -247,7 +247,7 @@ class _Lining:
                 "vertex"
             )
         # all are gone along in the one direction that does not depend on how they are listed
-        self.turned = np.array([is_turned(line) for line in source.lines])
+        self.turned = np.array([_is_turned(line) for line in source.lines])
         along = [line[::-1] if turned else line for line, turned in zip(source.lines, self.turned, strict=True)]
         lengths = [len(line) for line in along]
         part = np.repeat(np.arange(len(lengths)), lengths)
@@ -276,7 +276,7 @@ class _Lining:
         near = np.isfinite(away)
         xy[near] = self.places.data[place[near]]
         others = np.flatnonzero(~near)
-        places, number = distinct_places(xy[others])
+        places, number = _distinct_places(xy[others])
         xy[others] = places[first_near(places, self.reach)[number]]
         moved = (xy != lines.xy).any(axis=1)
         given = np.where(moved[:, None], np.nan, lines.given)
@@ -384,7 +384,7 @@ class _Lining:
 
     def _over_samples(self, lines: Polylines) -> Polylines:
         """Give lines with heights a vertex wherever they pass far above or below a vertex of the model."""
-        places, node = distinct_places(lines.xy)
+        places, node = _distinct_places(lines.xy)
         pieces = lines.pieces
         pieces = pieces[lines.source[pieces] <= BETWEEN_GIVEN]
         if len(pieces) == 0:
@@ -400,7 +400,7 @@ class _Lining:
 
     def _met(self, lines: Polylines) -> Polylines:
         """Make vertices of one line on another vertices of both; refuse lines that cross otherwise."""
-        places, node = distinct_places(lines.xy)
+        places, node = _distinct_places(lines.xy)
         pieces, ends, number = _segments(lines, node)
         on = points_on(places, ends, self.reach)
         if len(on):
@@ -469,7 +469,7 @@ class _Lining:
     def _lined(self, lines: Polylines) -> OpenModel:
         """Thin the lines, add their vertices to the model and put it in order."""
         model = self.model
-        places, node = distinct_places(lines.xy)
+        places, node = _distinct_places(lines.xy)
         z, chosen = self._heights(lines, node, len(places))
         away, place = self.places.query(places, distance_upper_bound=self.reach)
         # the model's vertex at each place, -1 where there is none
@@ -589,7 +589,7 @@ class _Lining:
         return lined, row[n:], row[:n]
 
 
-def is_turned(line: FloatArray) -> bool:
+def _is_turned(line: FloatArray) -> bool:
     """Tell whether a line (n, 2 or 3) leads from its greater end to the lesser, or if closed, first to the greater."""
     ends = [(tuple(line[k]), tuple(line[step])) for k, step in ((0, 1), (-1, -2))]
     return ends[1] < ends[0]
@@ -605,7 +605,7 @@ def place_keys(xy: FloatArray) -> Any:
     return np.ascontiguousarray(xy + 0.0)[:, 0] + 1j * xy[:, 1]
 
 
-def distinct_places(xy: FloatArray) -> tuple[FloatArray, IntArray]:
+def _distinct_places(xy: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return the different places (P, 2), by x, then y, and which of them each (M, 2) is."""
     found, number = np.unique(place_keys(xy), return_inverse=True)
     return np.column_stack([found.real, found.imag]), number.ravel()

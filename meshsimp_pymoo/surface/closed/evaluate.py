@@ -8,9 +8,10 @@ belongs to the triangle on the left of the edge from its first to its second ver
 
 Where there are several parts, the edges of their poles are forced, and what lies between them is outside. Where there
 are holes, a triangle is no part of the mesh if its centroid lies in one, or a point halfway from there to a corner: no
-vertex is where a triangle hangs over a hole, so that it costs nothing, and by the centroid alone half of it would. If
-none of the four triangles is part of the mesh, d_p is the distance to the pole, which every mesh has; and so it is for
-a kept vertex that no triangle of the mesh uses.
+vertex is where a triangle hangs over a hole, so that it costs nothing, and by the centroid alone half of it would. What
+holds a forced edge is in the mesh all the same (see `plane.constraints.holds_line`). If none of the four triangles is
+part of the mesh, d_p is the distance to the pole, which every mesh has; and so it is for a kept vertex that no triangle
+of the mesh uses.
 """
 
 from __future__ import annotations

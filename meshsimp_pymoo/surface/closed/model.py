@@ -476,8 +476,8 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     if n_small:
         if is_small.all():
             raise ModelError(
-                f"{source.name}: all of its {count(n_small, 'part')} have fewer than {LEAST_VERTICES} vertices; a "
-                "closed surface has more"
+                f"{source.name}: all of its {count(n_small, 'part')} have fewer than {LEAST_VERTICES} vertices, and a "
+                "closed surface has more; merge vertices at one place in a mesh program"
             )
         large = ~is_small[fans.part]
         faces, fan = faces[large], fan[np.repeat(large, 3)]

@@ -191,7 +191,7 @@ class ClosedSurface(ModelSurface):
         Raises
         ------
         ValueError
-            If there are fewer than 4, or the pole is not among them.
+            If there are fewer than 4 of a part, or its pole is not among them.
         """
         faces, numbers, deviation, covered = self._triangulated(kept)
         quality = as_quality(numbers, self.total_weight, **self._of_mesh(self.points, faces))
@@ -274,7 +274,8 @@ class ClosedSurface(ModelSurface):
 
         See :mod:`~meshsimp_pymoo.surface.closed.refit`. The measure is the true distance of the vertices, as
         :meth:`score` has it; the mesh of the least error of all rounds is returned, or the one given where none has
-        less. There is no proved bound: it is 0.
+        less. Where there are holes, what it is off their rims counts in that choice, at `RIM_WEIGHT`, but no mesh of a
+        greater error is taken. There is no proved bound: it is 0.
         """
         rows, compact = used_rows(mesh.faces)
         n, before = self.n_vertices, mesh.quality.error

@@ -16,6 +16,7 @@ from meshsimp_pymoo.plane.segments import points_on
 from meshsimp_pymoo.surface.closed.embedding import are_poles
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.closed.nearest import MeshTree, nearest_shares
+from meshsimp_pymoo.surface.lining import rounded
 
 # Both sides of where a line passes from one face to another, as a share of the face's size.
 FINE = 1e-3
@@ -240,8 +241,7 @@ class Tracer:
         """Return the images (M, 2) of feet, and the vertex of its pole that each is taken to, -1 if it is not on it."""
         model = self.model
         corners = self.faces[feet.face]
-        xy = (feet.shares[:, :, None] * model.xy[corners]).sum(axis=1)
-        xy = (xy + 1.0) - 1.0
+        xy = rounded((feet.shares[:, :, None] * model.xy[corners]).sum(axis=1))
         poles = model.poles[model.part[corners[:, 0]]]
         outside = self.is_pole[feet.face]
         for k in range(3):  # clockwise
