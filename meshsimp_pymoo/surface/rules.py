@@ -59,10 +59,10 @@ class Rules:
         None,
         kind=Pins(PINS),
         accepts='"corners", "hull", "border", file rows, positions, or a list of these',
-        doc="Vertices that every mesh keeps, besides the four corners, or of each part of a closed surface the three of "
-        "one face: whole numbers for rows of the file, or an array of positions (K, 3) in the file's frame; of a height "
-        'surface ``"hull"`` for all on the convex hull, ``"border"`` for all on the outline and around the holes, so that '
-        "tiles still fit together, or positions (K, 2) in the upright plane, too.",
+        doc="Vertices that every mesh keeps, besides the four corners, or of each part of a closed surface the three "
+        "of one face: whole numbers for rows of the file, or an array of positions (K, 3) in the file's frame; of a "
+        'height surface ``"hull"`` for all on the convex hull, ``"border"`` for all on the outline and around the '
+        "holes, so that tiles still fit together, or positions (K, 2) in the upright plane, too.",
         help="vertices that every mesh keeps beside the corners: rows of the file, from 0, or of height surfaces the "
         "convex hull, or the outline and the holes' rims",
         metavar="hull|border|I,J,...",
