@@ -471,23 +471,8 @@ def closed_model(source: SourceMesh) -> ClosedModel:
             "holes or without: split or mend it in a mesh program, or cut out one side as a height surface with "
             "--patch front (patch='front')"
         )
-    is_small, faces, fan = fans.is_small, source.faces, fans.fan
-    n_small = int(is_small.sum())
-    if n_small:
-        if is_small.all():
-            raise ModelError(
-                f"{source.name}: all of its {count(n_small, 'part')} have fewer than {LEAST_VERTICES} vertices, and a "
-                "closed surface has more; merge vertices at one place in a mesh program"
-            )
-        large = ~is_small[fans.part]
-        faces, fan = faces[large], fan[np.repeat(large, 3)]
-        used[:] = False
-        used[faces] = True
-        warn_of(
-            f"{source.name}: left out what is too small to be simplified: {count(n_small, 'part')} of fewer than "
-            f"{LEAST_VERTICES} vertices ({count(int((~large).sum()), 'face')})"
-        )
-    rows = np.flatnonzero(used)
+    faces, fan, n_small = _without_small_parts(source, fans)
+    rows = np.unique(faces)
     rows = rows[np.lexsort(source.points[rows].T[::-1])]
     place = np.full(n_rows, -1, np.int64)
     place[rows] = np.arange(len(rows))
@@ -507,15 +492,7 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     measured = source.measured.points
     pivot = measured[rows].min(axis=0)
     local = measured[rows] - pivot
-    if not local.any(axis=0).all() or np.linalg.matrix_rank(local - local.mean(axis=0)) < 3:
-        raise ModelError(
-            f"{source.name}: all {len(rows)} vertices lie in one plane, so that it is no closed surface but a height "
-            "field; leave --surface closed (surface='closed') out"
-        )
-    if local.max() < LEAST_EXTENT:
-        raise ModelError(
-            f"{source.name}: extends over {local.max():g} only; rescale the model to above {LEAST_EXTENT:g}"
-        )
+    _refuse_shape(source.name, local)
     part = components(len(rows), faces[:, :2].ravel(), faces[:, 1:].ravel())
     found = embed(local, faces, part)
     _refuse_faults(source.name, len(faces), found.n_flipped, found.n_coinciding)
@@ -546,6 +523,36 @@ def closed_model(source: SourceMesh) -> ClosedModel:
     )
     order = vector_order(found.xy)
     return model._reordered(order, np.ascontiguousarray(found.xy[order]))
+
+
+def _without_small_parts(source: SourceMesh, fans: _Fans) -> tuple[IntArray, IntArray, int]:
+    """Return the faces (F, 3), and the fan of each of their corners (3 F,), without parts too small, and how many."""
+    is_small = fans.is_small
+    n_small = int(is_small.sum())
+    if n_small == 0:
+        return source.faces, fans.fan, 0
+    if is_small.all():
+        raise ModelError(
+            f"{source.name}: all of its {count(n_small, 'part')} have fewer than {LEAST_VERTICES} vertices, and a "
+            "closed surface has more; merge vertices at one place in a mesh program"
+        )
+    large = ~is_small[fans.part]
+    warn_of(
+        f"{source.name}: left out what is too small to be simplified: {count(n_small, 'part')} of fewer than "
+        f"{LEAST_VERTICES} vertices ({count(int((~large).sum()), 'face')})"
+    )
+    return source.faces[large], fans.fan[np.repeat(large, 3)], n_small
+
+
+def _refuse_shape(name: str, local: FloatArray) -> None:
+    """Refuse vertices (N, 3), from the lowest corner of their box, that are flat or too small for double precision."""
+    if not local.any(axis=0).all() or np.linalg.matrix_rank(local - local.mean(axis=0)) < 3:
+        raise ModelError(
+            f"{name}: all {len(local)} vertices lie in one plane, so that it is no closed surface but a height field; "
+            "leave --surface closed (surface='closed') out"
+        )
+    if local.max() < LEAST_EXTENT:
+        raise ModelError(f"{name}: extends over {local.max():g} only; rescale the model to above {LEAST_EXTENT:g}")
 
 
 def vector_order(xy: FloatArray) -> IntArray:
