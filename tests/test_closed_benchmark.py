@@ -251,6 +251,12 @@ def test_rims_of_closed_surfaces_are_not_off_and_a_hole_that_closed_is_infinitel
     assert largest > mean > 0.5
 
 
+def test_lines_are_thinned_to_a_share_of_the_diagonal(benchmark):
+    assert benchmark.lines_of("", 20.0) == {}
+    assert benchmark.lines_of("outline", 20.0) == {"break_lines": "outline"}
+    assert benchmark.lines_of("sharp:30@1e-3", 20.0) == {"break_lines": "sharp:30", "line_tolerance": 0.02}
+
+
 def test_without_a_referee_or_with_another_sheet_it_stops_in_a_line(benchmark, tmp_path, capsys):
     with pytest.raises(SystemExit, match="is no Python file with a function measure"):
         benchmark.main(["--referee", str(tmp_path / "none.py")])

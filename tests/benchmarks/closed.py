@@ -11,8 +11,9 @@
   '.[baselines,meshlab]'``, ``pip install --pre meshoptimizer``.
 
 A model is a file of a folder (``--shared``), a built-in name, or a front patch of that folder of which a whole scan is
-made, ``whole:FILE`` (see ``closed_scans.py``); ``NAME+sharp:30`` or ``NAME+outline`` has such break lines. ``--models``
-takes the names of groups, too: closed surfaces of one part, ones with holes, whole scans, several parts, CAD.
+made, ``whole:FILE`` (see ``closed_scans.py``); ``NAME+sharp:30`` or ``NAME+outline`` has such break lines, with
+``@3e-4`` behind thinned to that share of the diagonal. ``--models`` takes the names of groups, too: closed surfaces of
+one part, ones with holes, whole scans, several parts, CAD.
 
 FILE has a function ``measure(original, simplified, samples)`` that takes two mesh files and returns ``vmean``, the mean
 distance of the original's vertices, ``smean`` and ``srms``, the symmetric mean distance and its root mean square, and
@@ -35,6 +36,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -224,6 +226,13 @@ def refitted_mesh(found: FrontSolution) -> Mesh:
     return fitted.vertices, np.searchsorted(fitted.rows, fitted.faces)
 
 
+def lines_of(spelled: str, diagonal: float) -> dict[str, Any]:
+    """Return what a problem is told of break lines."""
+    what, _, share = spelled.partition("@")
+    told: dict[str, Any] = {"break_lines": what} if what else {}
+    return told | ({"line_tolerance": float(share) * diagonal} if share else {})
+
+
 def compared(
     name: str, lines: list[str], options: argparse.Namespace, measure: Measure, folder: Path
 ) -> Iterator[list[Row]]:
@@ -248,9 +257,8 @@ def compared(
 
     for of in lines:
         say(f"{name}: {model.n_vertices:,} vertices{', ' * bool(of)}{of}, searched")
-        lined = {"break_lines": of} if of else {}
         try:
-            problem = MeshProblem(source, surface="closed", weights=options.weights, **lined)
+            problem = MeshProblem(source, surface="closed", weights=options.weights, **lines_of(of, diagonal))
         except InputError as reason:
             say(f"left out: {reason}")
             continue
