@@ -184,7 +184,10 @@ def _as_height(
         what = topology(source.faces)
         content |= _facts_of(what)
         why_not = what.refusal
-        if why_not is None:
+        facts = None if judged.seen is None else judged.seen[1]
+        # of a plain sheet it would say nothing: its outline alone is the hole
+        is_doubtful = facts is None or what.loops > 1 or facts.n_folded + facts.vertical_faces > 0
+        if why_not is None and (refusal or is_doubtful):
             rows["closed too"] = "it could be taken as a closed surface (--surface closed)"
         elif refusal:
             rows["not closed"] = why_not
