@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.compiling.functions import entry
 from meshsimp_pymoo.plane.constraints import Constraints, make_constraints
 from meshsimp_pymoo.plane.footprint import Footprint
@@ -52,7 +52,7 @@ def make_ground(model: ClosedModel, rules: Rules) -> ClosedGround:
         poles=np.ascontiguousarray(model.poles, np.int64).ravel(),
         part=np.ascontiguousarray(model.part, np.int32) if model.n_parts > 1 else np.empty(0, np.int32),
         footprint=model.footprint,
-        far=_to_poles(model) if len(model.rim) else np.empty(0),
+        far=to_poles(model.points, model.poles, model.part) if len(model.rim) else np.empty(0),
         exact_area=area,
         exact_lift=lift,
         lines=_forced_edges(model),
@@ -66,10 +66,10 @@ def make_ground(model: ClosedModel, rules: Rules) -> ClosedGround:
     )
 
 
-def _to_poles(model: ClosedModel) -> FloatArray:
-    """Return how far each vertex is from the pole of its part, which every mesh has."""
-    far = np.empty(model.n_vertices)
-    _enter_distances(np.ascontiguousarray(model.points).ravel(), model.poles, model.part.astype(np.int64), far)
+def to_poles(points: FloatArray, poles: IntArray, part: IntArray) -> FloatArray:
+    """Return how far each point (N, 3) is from the pole of its part, which every mesh has."""
+    far = np.empty(len(points))
+    _enter_distances(np.ascontiguousarray(points).ravel(), poles, part.astype(np.int64), far)
     return far
 
 
