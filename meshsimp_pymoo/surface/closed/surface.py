@@ -328,7 +328,7 @@ class ClosedSurface(ModelSurface):
 
     def __getstate__(self) -> dict[str, Any]:
         unstored = ("_ground", "_between", "view")
-        return {name: value for name, value in self.__dict__.items() if name not in unstored}
+        return {name: value for name, value in self.__dict__.items() if name not in unstored} | {"_free": {}}
 
 
 def _refuse_rules(name: str, rules: Rules) -> None:
