@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -138,9 +138,9 @@ def _quarter(dx: float, dy: float) -> int:
 
 
 @entry
-def _open(ground: Ground, books: Live, n: int) -> None:
+def _open(freedom: Freedom, books: Live, n: int) -> None:
     """Put triangles to far corners, the samples n to n + 3, in place of the ghosts; slivers are as others are."""
-    g = borrowed(ground)
+    g = borrowed(freedom).ground
     live = borrowed(books)
     mesh = live.mesh
     kind = live.kind
@@ -447,7 +447,7 @@ def _swap_inside(
 
 @inner
 def _swap_outline(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.ndarray) -> int:
-    """Let site v of the outline collapse along it and another vertex of the original's border come; as `_swap_inside`."""
+    """Let site v of the outline collapse along it and another one of the original's border come; as `_swap_inside`."""
     g = free.ground
     fan = free.fan
     other = free.other
@@ -835,7 +835,7 @@ class FreeGround:
         with self._rooms.one() as (live, fan, other, onto):
             freedom = self._freedom._replace(ratio=float(min_height), onto=onto, fan=fan, other=other)
             build(freedom.ground, live, self._sites(kept, self.pinned), self.name)
-            _open(freedom.ground, live, len(freedom.ground.z))
+            _open(freedom, live, len(freedom.ground.z))
             yield FreeTriangulation(freedom, live, self.held)
 
 
@@ -858,7 +858,7 @@ class FreeTriangulation:
         How many flips, shifts and swaps were made.
     """
 
-    def __init__(self, freedom: Freedom, books: Live, held: BoolArray) -> None:
+    def __init__(self, freedom: Any, books: Any, held: BoolArray) -> None:
         self.freedom = freedom
         self.books = books
         self.held = held
@@ -872,7 +872,7 @@ class FreeTriangulation:
 
     def _may_move(self) -> BoolArray:
         """Return which vertices (N,) may move where they are sites and not held."""
-        return self.books.used[: self.freedom.n_vertices] > 0
+        return np.asarray(self.books.used[: self.freedom.n_vertices] > 0)
 
     @property
     def faces(self) -> IntArray:

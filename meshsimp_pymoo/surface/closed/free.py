@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -601,11 +601,8 @@ def _normals_of(model: ClosedModel) -> FloatArray:
 class ClosedFreeTriangulation(FreeTriangulation):
     """A free closed mesh that is changed by moves; `ClosedFreeGround.triangulation` lends one."""
 
-    freedom: Any
-    books: Any
-
     def _may_move(self) -> BoolArray:
-        there = np.zeros(self.freedom.n_vertices, np.bool_)
+        there: BoolArray = np.zeros(self.freedom.n_vertices, np.bool_)
         corners, is_shown = self._corners()
         there[corners[is_shown]] = True
         there[corners[~is_shown]] = False
@@ -615,12 +612,12 @@ class ClosedFreeTriangulation(FreeTriangulation):
         """Return the corners (M, 3) of all triangles but ghosts, and whether each is in the mesh, poles left out."""
         end = int(self.books.tally[END])
         corners = self.books.mesh[:end].reshape(-1, RECORD)[:, :3].astype(np.int64)
-        is_shown = self.books.planes[: end // RECORD, 3] < np.inf
+        is_shown = np.asarray(self.books.planes[: end // RECORD, 3] < np.inf)
         real = (corners <= LAST_INDEX).all(axis=1)
         corners, is_shown = corners[real], is_shown[real]
         if len(self.freedom.ground.part):
             part = self.freedom.ground.part[corners]
-            is_shown = is_shown & (part == part[:, :1]).all(axis=1)
+            is_shown &= (part == part[:, :1]).all(axis=1)
         return corners, is_shown
 
     @property

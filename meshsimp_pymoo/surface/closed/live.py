@@ -141,6 +141,7 @@ def _holder_among_new(g: ClosedGround, live: ClosedLive, guess: int, i: int) -> 
 
 @inner(inline=True)
 def write(live: ClosedLive, at: int, value: int, logged: bool) -> None:
+    """Write an entry of the records, and with a log what it was."""
     if logged:
         n = live.tally[N_LOG]
         live.log_at[n] = at
@@ -569,6 +570,7 @@ def degree(live: ClosedLive, v: int, most: int) -> int:
 
 @inner(inline=True)
 def total(live: ClosedLive) -> float:
+    """Return the sum of the costs; infinite where a part has too few sites to be a mesh."""
     return live.amount[COST] if live.tally[N_SHORT] == 0 else np.inf
 
 

@@ -123,7 +123,7 @@ class ClosedSurface(ModelSurface):
         return self._ground
 
     def free_ground(self, *, centroids: bool = True) -> ClosedFreeGround:
-        """Return what the free meshes of this surface have in common; see :mod:`~meshsimp_pymoo.surface.closed.free`."""
+        """Return what the free meshes of this surface have in common; see `closed.free`."""
         if centroids not in self._free:
             self._free[centroids] = ClosedFreeGround(self.model, self._ground, self.pinned, centroids=centroids)
         return self._free[centroids]
