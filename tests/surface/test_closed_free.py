@@ -44,8 +44,7 @@ def subset(surface, share, seed):
 
 
 def squared(points, a, b, c):
-    """Return the squared distances of points to triangles, all (M, 3): the least to the plane, where the foot is inside,
-    and to the three sides."""
+    """Return the squared distances of points to triangles, all (M, 3): the least to planes within and to sides."""
     u, v, w = b - a, c - a, points - a
     normal = np.cross(u, v)
     area = (normal**2).sum(axis=1)
@@ -303,6 +302,7 @@ def test_a_front_is_freed():
     assert (freed.F[:, 0] < front.F[:, 0]).all()
 
 
+@pytest.mark.usefixtures("sketched")
 def test_the_shell_frees_meshes_and_reads_them_back(tmp_path, capsys):
     path = tmp_path / "parts.ply"
     parts().export(path)
