@@ -12,7 +12,7 @@ from samples import BODIES, CLOSED
 
 from meshsimp_pymoo import datasets
 from meshsimp_pymoo.datasets import describe, load, names
-from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.surface.closed.model import ClosedModel, topology
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -53,6 +53,13 @@ def test_a_closed_built_in_is_one_without_a_word_and_wound_outwards(name):
     assert ((np.cross(a, b) * c).sum(axis=1) > 0).all()  # all of them are stars around the origin
     assert isinstance(open_model(name), ClosedModel)  # a warning would be an error
     assert len(source.points) == len(np.unique(source.points, axis=0)) == len(source.faces) // 2 + 2
+
+
+def test_parts_are_taken_for_closed_surfaces_without_a_word_and_a_scan_with_one():
+    assert isinstance(open_model("pebbles:100"), ClosedModel)
+    assert isinstance(open_model("bracket:1000"), ClosedModel)
+    with pytest.warns(ModelWarning, match="no height field but a closed surface with 2 holes"):
+        assert isinstance(open_model("blob:200,holes=2"), ClosedModel)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +153,14 @@ def _rims(faces):
 
 
 @pytest.mark.parametrize(
-    ("name", "holes"), [("blob:500,holes=1", 1), ("blob:3000,holes=5", 5), ("blob:3000,holes=12", 12)]
+    ("name", "holes"),
+    [
+        ("blob:500,holes=1", 1),
+        ("blob:3000,holes=5", 5),
+        ("blob:3000,holes=12", 12),
+        ("blob:1000,seed=10,holes=1", 1),  # a face apart from the disc would be cut out too
+        ("blob:200,seed=23,holes=1", 1),  # a face would hang in one vertex
+    ],
 )
 def test_a_scan_of_a_blob_has_its_holes_of_different_sizes_with_ragged_rims_and_no_other_fault(name, holes):
     source, whole = load(name), load(name, holes=0)

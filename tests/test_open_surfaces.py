@@ -337,14 +337,14 @@ def test_info_says_holes_rims_parts_and_what_is_left_out(tmp_path, capsys):
     ):
         assert re.search(rf"^  {text}$", out, re.MULTILINE), text
     assert main(["info", str(tmp_path / "scan.ply"), "--surface", "height"]) == 2
-    assert re.search(r"^  not closed +it could be taken as a closed surface", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(r"^  closed too +it could be taken as a closed surface", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_info_tells_of_a_sheet_with_a_hole_that_it_could_be_closed(capsys):
     assert main(["info", "ring:120"]) == 0
     out = capsys.readouterr().out
     assert re.search(r"^  surface +height$", out, re.MULTILINE)
-    assert re.search(r"^  not closed +it could be taken as a closed surface \(--surface closed\)$", out, re.MULTILINE)
+    assert re.search(r"^  closed too +it could be taken as a closed surface \(--surface closed\)$", out, re.MULTILINE)
 
 
 # ---------------------------------------------------------------------------------------------------- stored and read

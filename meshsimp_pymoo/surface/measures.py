@@ -131,8 +131,8 @@ class Quality:
     below_5_degrees : float
         Share of the triangles whose least angle, measured so, is below 5 degrees.
     line_max_error : float
-        Largest vertical distance of the mesh from a vertex of a break line as it was given. Only where the model has
-        break lines [model units].
+        Largest vertical distance of the mesh from a vertex of a break line as it was given; of a closed surface in
+        space. Only where the model has break lines [model units].
     line_mean_error : float
         Mean of that distance, weighted by the length of the lines. Only where the model has break lines [model units].
     """

@@ -43,7 +43,7 @@ class Runs:
 
 
 def cut_into_runs(lines: list[IntArray], corners: IntArray) -> Runs:
-    """Cut polylines where they end or meet, and at some of their vertices.
+    """Cut polylines where they end, meet or turn back, and at some of their vertices.
 
     Parameters
     ----------
@@ -64,6 +64,8 @@ def cut_into_runs(lines: list[IntArray], corners: IntArray) -> Runs:
     pieces = np.unique(np.sort(pieces, axis=1), axis=0)
     stays = np.bincount(pieces.ravel(), minlength=max(int(pieces.max()), int(corners.max(initial=0))) + 1) != 2
     stays[[end for line in lines for end in (line[0], line[-1])]] = True
+    for line in lines:  # where one turns back it runs along with itself from there
+        stays[line[1:-1][line[2:] == line[:-2]]] = True
     stays[corners] = True
     runs: list[IntArray] = []
     known: dict[bytes, int] = {}

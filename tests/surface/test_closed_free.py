@@ -307,7 +307,8 @@ def test_the_shell_frees_meshes_and_reads_them_back(tmp_path, capsys):
     path = tmp_path / "parts.ply"
     parts().export(path)
     out = tmp_path / "out"
-    said = ["--free", "--surface", "closed", "--moves", "20000", "--population", "8", "--no-page", "-q", "--refit"]
+    said = ["--free", "--surface", "closed", "--moves", "20000", "--population", "8", "--no-page", "-q"]
+    said += ["--refit", "--meshes", "4"]
     assert main(["simplify", str(path), "-o", str(out), *said]) == 0
     front = Front.load(out)
     assert front.n_free > 0

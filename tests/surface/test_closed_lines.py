@@ -8,20 +8,23 @@ import itertools
 import numpy as np
 import pytest
 import trimesh
-from closed_lining import CASES, case, lined, meridian, model_of, parallel, random_subset
+from closed_lining import CASES, case, lined, meridian, model_of, of_mesh, parallel, random_subset
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import InputError, ModelError, ModelWarning
 from meshsimp_pymoo.plane.faces import edge_table
-from meshsimp_pymoo.surface.closed.model import closed_model
+from meshsimp_pymoo.surface.closed.lining import _Lining
+from meshsimp_pymoo.surface.closed.model import ClosedModel, closed_model
 from meshsimp_pymoo.surface.closed.nearest import distances_to_line
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.closed.tracing import Tracer, near_in_space
 from meshsimp_pymoo.surface.kinds import as_stored, stored_arrays
+from meshsimp_pymoo.surface.line_thinning import Chords
+from meshsimp_pymoo.surface.polylines import cut_into_runs
 from meshsimp_pymoo.surface.rules import Rules
 
-POLYHEDRA = [("tetrahedron:9", 6), ("cube:9", 12), ("icosahedron:6", 30)]
+POLYHEDRA = [("tetrahedron:3", 6), ("tetrahedron:9", 6), ("cube:9", 12), ("icosahedron:6", 30)]
 
 
 def edges(faces: IntArray) -> set[tuple[int, int]]:
@@ -48,6 +51,9 @@ def test_the_sharp_edges_of_a_polyhedron_are_its_edges(name, n_edges):
         for line, (a, b) in zip(lines.originals, ends, strict=True)
     ]
     assert max(away) < 1e-12
+    at_pole = set(map(tuple, surface.points[surface.model.poles.ravel()]))
+    for line, chain in zip(lines.originals, lines.chains, strict=True):
+        assert at_pole & set(map(tuple, line)) <= set(map(tuple, surface.points[chain]))
     mesh = surface.simplify(surface.pinned)
     assert mesh.quality.surface_error < 1e-15 * surface.diagonal
     assert mesh.quality.line_max_error < 1e-15 * surface.diagonal
@@ -155,14 +161,44 @@ def test_a_line_on_a_sphere_follows_it_and_stays_within_the_tolerance():
     assert len(np.unique(model.xy, axis=0)) == model.n_vertices
 
 
-def test_lines_at_vertices_of_the_model_are_these():
-    corners = [[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, -1.0]]
-    surface = lined("cube:9", [corners], 0.01)
+@pytest.mark.parametrize("off", [0.0, 1e-10])
+@pytest.mark.parametrize("way", [1, -1])
+def test_lines_at_vertices_of_the_model_are_these(way, off):
+    corners = [[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, -1.0]][::way]
+    surface = lined("cube:9", [np.add(corners, [off, -off, off])], 0.01)
     lines = surface.model.lines
     assert len(lines.added) == 0
     assert len(lines.originals[0]) >= 17
     assert surface.model.to_file(lines.originals[0][[0, -1]]).tolist() == [corners[0], corners[2]]
+    assert np.linalg.norm(np.diff(lines.originals[0], axis=0), axis=1).sum() == pytest.approx(4.0)
     assert surface.simplify(surface.pinned).quality.line_max_error == 0.0
+
+
+def test_a_line_above_the_surface_stays_as_far_above_it_and_its_images_are_its_own():
+    """Its vertices are above vertices of the cube, whose images theirs would be."""
+    given = np.array([[-0.75, -0.5, 1.02], [0.5, -0.5, 1.02], [0.5, 0.25, 1.02]])
+    surface = lined("cube:9", [given], 0.01)
+    model, lines = surface.model, surface.model.lines
+    assert np.abs(model.to_file(lines.originals[0])[:, 2] - 1.02).max() < 1e-12
+    assert len(lines.added) == len(lines.vertices) >= 3
+    assert len(np.unique(model.xy, axis=0)) == model.n_vertices
+    kept = random_subset(surface, 0.3, 1)
+    assert steps(surface.line_chains(kept)[0]) <= edges(surface.simplify(kept).faces)
+
+
+@pytest.mark.parametrize("y", [0.25, 0.75])
+def test_a_chord_that_an_image_lies_on_by_chance_gets_a_vertex_back(y):
+    model = model_of("cube:9")
+    lining = _Lining(model, 0.01)
+    inner = np.setdiff1d(np.arange(model.n_vertices), model.poles)
+    a, bend, b, other = inner[:4]
+    lining.places = np.full_like(model.xy, 0.125)
+    lining.places[[a, bend, b, other]] = [[0.25, 0.5], [0.5, y], [0.75, 0.5], [0.5, 0.5]]
+    runs = cut_into_runs([np.array([a, bend, b])], np.array([], int))
+    chord = Chords(np.array([0]), np.array([0]), np.array([2]), np.array([[a, b]]))
+    assert lining._astray(runs, chord) == {(0, 1)}
+    lining.places[other] = [0.5, 1.0 - y]
+    assert lining._astray(runs, chord) == set()
 
 
 def test_neither_the_way_nor_the_order_in_which_lines_are_listed_is_of_matter():
@@ -231,6 +267,76 @@ def test_lines_of_users_need_a_tolerance():
         lined("cube:9", [[[0, 0, 1], [0.5, 0, 1]]])
 
 
+def test_a_line_that_turns_back_on_itself_is_gone_along_twice():
+    a, b, c = [-0.75, -0.5, 1.0], [0.5, -0.4, 1.0], [0.6, 0.6, 1.0]
+    surface = lined("cube:9", [[a, b, a, b, c]], 0.01)
+    (chain,) = surface.model.lines.chains
+    once = lined("cube:9", [[a, b, c]], 0.01).model.lines.chains[0]
+    assert np.array_equal(chain[-len(once) :], once)
+    assert steps(chain) == steps(once)
+
+
+def random_lines(model: ClosedModel, seed: int) -> list[FloatArray]:
+    """Return up to three lines: far over the body, through vertices, or from vertex to neighbour and a little aside."""
+    rng = np.random.default_rng(seed)
+    lines = []
+    for _ in range(rng.integers(1, 4)):
+        kind, n = rng.integers(3), int(rng.integers(2, 6))
+        if kind == 0:
+            corners = model.file_points[model.faces[rng.integers(len(model.faces), size=n)]]
+            line = (corners * rng.dirichlet([1.0, 1.0, 1.0], n)[:, :, None]).sum(axis=1)
+        elif kind == 1:
+            line = model.file_points[rng.integers(model.n_vertices, size=n)]
+        else:
+            start, around = model.neighbours
+            path = [int(rng.integers(model.n_vertices))]
+            for _ in range(8):
+                path.append(int(rng.choice(around[start[path[-1]] : start[path[-1] + 1]])))
+            aside = rng.choice([0.0, 1e-10, 1e-3, 5e-3]) * model.diagonal
+            line = model.file_points[path] + aside * rng.normal(size=(9, 3))
+        lines.append(line)
+    return lines
+
+
+def check_random_lines(seeds: range) -> None:
+    n_lined = 0
+    for seed in seeds:
+        model = model_of(("sphere:600", "blob:900", "holed", "pair", "cube:9", "cylinder")[seed % 6])
+        tolerance = (0.0, 1e-3, 1e-2, 5e-2)[seed // 6 % 4] * model.diagonal
+        try:
+            surface = ClosedSurface(model, Rules(break_lines=random_lines(model, seed), line_tolerance=tolerance))
+        except ModelError as trouble:
+            if "cross" not in str(trouble):
+                raise
+            continue
+        n_lined += 1
+        lines = surface.model.lines
+        assert len(np.unique(surface.model.xy, axis=0)) == surface.n_vertices
+        for share in (0.0, 0.3):
+            kept = random_subset(surface, share, seed)
+            mesh = surface.simplify(kept)
+            there = edges(mesh.faces)
+            for chain, line in zip(surface.line_chains(kept), lines.originals, strict=True):
+                assert steps(chain) <= there
+                if "vertices_at_the_pole" not in lines.found:
+                    away, _ = distances_to_line(line, surface.points[chain])
+                    assert away.max() <= tolerance * (1.0 + 1e-9) + 2e-9 * surface.diagonal
+            if len(surface.model.rim) == 0:
+                assert mesh.quality.triangles == 2 * kept.sum() - 4 * surface.model.n_parts
+    assert n_lined > len(seeds) / 4
+
+
+@pytest.mark.filterwarnings("ignore:break_lines")
+def test_random_lines_are_refused_or_in_every_mesh_within_the_tolerance():
+    check_random_lines(range(24))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:break_lines")
+def test_many_random_lines_are_refused_or_in_every_mesh_within_the_tolerance():
+    check_random_lines(range(24, 1000))
+
+
 def test_what_leads_away_from_the_surface_is_cut_off_with_its_count():
     with pytest.warns(ModelWarning, match=r"of 3 lines, parts of 1 and the whole of 1 are farther than .* 7\d.*% of"):
         surface = lined(
@@ -251,6 +357,42 @@ def test_what_lies_over_a_hole_is_cut_off():
     z = surface.model.to_file(found)[:, 2]
     assert 0.7 < z.max() < 0.85
     assert -0.85 < z.min() < -0.7
+
+
+def test_what_lies_over_a_small_hole_is_cut_off_though_its_rim_is_near():
+    mesh = trimesh.creation.icosphere(subdivisions=3)
+    a, b, c = mesh.vertices[mesh.faces[100]]
+    elsewhere = mesh.vertices[mesh.faces[700, :2]]
+    mesh.update_faces(np.arange(len(mesh.faces)) != 100)
+    across = [0.5 * (a + b), 0.5 * (a + c)]
+    model = closed_model(of_mesh(mesh, "pricked"))
+    with pytest.warns(
+        ModelWarning, match="of 2 lines, parts of 1 and the whole of 0 .* or over its holes, and are cut"
+    ):
+        surface = ClosedSurface(model, Rules(break_lines=[elsewhere, across], line_tolerance=0.001))
+    lines = surface.model.lines
+    left = [line for line, name in zip(lines.originals, lines.names, strict=True) if name == "line 2"]
+    length = sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in left)
+    assert 0.0 < length < 0.2 * np.linalg.norm(across[1] - across[0])
+
+
+def test_a_line_through_the_body_does_not_jump_from_side_to_side():
+    with pytest.warns(ModelWarning, match="of 1 line, parts of 1 and the whole of 0 are farther than"):
+        surface = lined("cube:9", [[[0.1, 0.2, 1.0], [0.3, 0.2, 1.0], [0.3, 0.2, -1.0], [0.1, 0.2, -1.0]]], 0.01)
+    for line in surface.model.lines.originals:
+        assert np.linalg.norm(np.diff(line, axis=0), axis=1).max() < 0.3
+
+
+def test_a_line_over_the_gap_between_two_parts_is_cut_there():
+    one, other = trimesh.creation.box().subdivide().subdivide(), trimesh.creation.box().subdivide().subdivide()
+    other.apply_translation([1.005, 0.0, 0.0])
+    mesh = trimesh.util.concatenate([one, other])
+    model = closed_model(of_mesh(mesh, "gap"))
+    with pytest.warns(ModelWarning, match="of 1 line, parts of 1 and the whole of 0"):
+        surface = ClosedSurface(model, Rules(break_lines=[[[-0.3, 0.1, 0.5], [1.2, 0.2, 0.5]]], line_tolerance=0.01))
+    parts = [set(surface.model.part[chain]) for chain in surface.model.lines.chains]
+    assert sorted(map(len, parts)) == [1, 1]
+    assert set.union(*parts) == {0, 1}
 
 
 def test_a_line_over_the_pole_goes_through_its_corners():

@@ -587,3 +587,10 @@ def test_lines_far_off_the_surface_are_taken_with_a_warning():
     model = build_model(load("roof:9"))
     with pytest.warns(ModelWarning, match=r"lie 99\.3 off the surface of roof:9 on average"):
         lined_model(model, [[[-0.5, 0.0, 100.0], [0.5, 0.0, 100.0]]], 0.1)
+
+
+def test_a_line_that_turns_back_on_itself_is_gone_along_twice():
+    a, b, c = [-0.75, -0.5], [0.5, -0.4], [0.6, 0.6]
+    (there_and_back,) = surface("plane:9", break_lines=[[a, b, a, b, c]], line_tolerance=0.01).model.lines.chains
+    (once,) = surface("plane:9", break_lines=[[a, b, c]], line_tolerance=0.01).model.lines.chains
+    assert there_and_back.tolist() == [*once[:2], *once[:2], once[2]]

@@ -184,8 +184,10 @@ def _as_height(
         what = topology(source.faces)
         content |= _facts_of(what)
         why_not = what.refusal
-        if refusal or why_not is None:
-            rows["not closed"] = why_not or "it could be taken as a closed surface (--surface closed)"
+        if why_not is None:
+            rows["closed too"] = "it could be taken as a closed surface (--surface closed)"
+        elif refusal:
+            rows["not closed"] = why_not
     content["not_closed"] = why_not
     return refusal
 

@@ -577,10 +577,8 @@ def _centroids_of(model: ClosedModel) -> tuple[FloatArray, FloatArray, FloatArra
     faces = model.faces
     a, b, c = (model.points[faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    is_pole = np.isin(faces, model.poles).all(axis=1)
     poles = {tuple(row) for row in np.sort(model.poles, axis=1).tolist()}
-    is_pole[is_pole] = [tuple(row) in poles for row in np.sort(faces[is_pole], axis=1).tolist()]
-    rows = np.flatnonzero(~is_pole)
+    rows = np.flatnonzero([tuple(row) not in poles for row in np.sort(faces, axis=1).tolist()])
     place = np.rint(model.xy[faces[rows]].sum(axis=1) / (3.0 * QUANTUM)) * QUANTUM
     order = np.argsort(hilbert_keys(place), kind="stable")
     rows = rows[order]

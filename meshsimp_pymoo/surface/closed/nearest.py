@@ -36,18 +36,36 @@ def distances_to_mesh(
     >>> distances_to_mesh(np.array([[0.2, 0.2, 3.0], [2.0, 0.0, 0.0]]), triangle, np.array([[0, 1, 2]]))[0].tolist()
     [3.0, 1.0]
     """
-    corners = np.asarray(vertices, float)[np.asarray(faces)]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    order = np.argsort(_morton_keys(0.5 * (low + high)), kind="stable")
-    squares, nearest = np.empty(len(points)), np.full(len(points), -1, np.int64)
-    if guesses is not None:
-        place = np.empty(len(order), np.int64)
-        place[order] = np.arange(len(order))
-        nearest[:] = place[guesses]
-    xyz, ordered = np.ascontiguousarray(vertices, float).ravel(), np.ascontiguousarray(faces, np.int64)[order]
-    boxes = _tree(low[order], high[order])
-    _nearest_triangles(np.ascontiguousarray(points, float), xyz, ordered, boxes, squares, nearest)
-    return np.sqrt(squares), order[nearest]
+    return MeshTree(vertices, faces).distances(points, guesses)
+
+
+class MeshTree:
+    """The triangles of a mesh, for distances to them that are asked for again and again.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float array
+    faces : (M, 3) int array
+    """
+
+    def __init__(self, vertices: FloatArray, faces: IntArray) -> None:
+        corners = np.asarray(vertices, float)[np.asarray(faces)]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        self._order = np.argsort(_morton_keys(0.5 * (low + high)), kind="stable")
+        self._xyz = np.ascontiguousarray(vertices, float).ravel()
+        self._faces = np.ascontiguousarray(faces, np.int64)[self._order]
+        self._boxes = _tree(low[self._order], high[self._order])
+
+    def distances(self, points: FloatArray, guesses: IntArray | None = None) -> tuple[FloatArray, IntArray]:
+        """Return how far points are from the mesh, and the nearest triangles; see :func:`distances_to_mesh`."""
+        squares, nearest = np.empty(len(points)), np.full(len(points), -1, np.int64)
+        if guesses is not None:
+            place = np.empty(len(self._order), np.int64)
+            place[self._order] = np.arange(len(self._order))
+            nearest[:] = place[guesses]
+        given = np.ascontiguousarray(points, float)
+        _nearest_triangles(given, self._xyz, self._faces, self._boxes, squares, nearest)
+        return np.sqrt(squares), self._order[nearest]
 
 
 def distances_to_line(points: FloatArray, line: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -7,8 +7,9 @@ pull towards where they are. Slipping along the surface costs nothing so, which 
 Where a triangle would turn over, as in thin parts, its vertices stay where they were at first.
 
 Planes know no end, so that rims of holes would stay where their vertices happen to be. The rims of the original are
-samples too: each is taken to lie on the edge of the mesh's rims that is nearest, if that is no farther than it is long
-(the mesh may have no such hole), and what counts is how far it is beside that edge within the plane of its triangle.
+samples too: each is taken to lie on the edge of the mesh's rims that is nearest, if that is no farther than a share of
+its length (the mesh may have no such hole), and what counts is how far it is beside that edge within the plane of its
+triangle.
 
 References
 ----------
@@ -36,6 +37,8 @@ PULL = 0.01
 # Conjugate gradients end where so much of the residual is left, or after so many steps: rounds go on from there.
 CLOSE = 1e-6
 MOST_STEPS = 200
+# How far a sample of a rim may be from an edge that it is taken to lie on, in lengths of that edge.
+NEAR_RIM = 0.25
 # So often the way of a vertex of a break line is halved until its edges are near enough to the line; then it is none.
 TRIES = 4
 
@@ -93,7 +96,7 @@ class _Rim(NamedTuple):
             return np.zeros(len(points)), np.full(len(points), -1)
         away, edge = distances_to_mesh(points, vertices, self.ends[:, [0, 1, 1]])
         length = np.linalg.norm(vertices[self.ends[:, 1]] - vertices[self.ends[:, 0]], axis=1)
-        near = away <= length[edge]
+        near = away <= NEAR_RIM * length[edge]
         return np.where(near, away, 0.0), np.where(near, edge, -1)
 
 

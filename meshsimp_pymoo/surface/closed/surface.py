@@ -31,7 +31,7 @@ from meshsimp_pymoo.surface.surface import ModelSurface, Refitted, Scored, Simpl
 from meshsimp_pymoo.workers import Reserve
 
 # What a sample of a rim counts where vertices are moved, as a share of what a vertex does.
-RIM_WEIGHT = 0.25
+RIM_WEIGHT = 0.1
 # From so many vertices on, books and workspaces that are not used are given back: hundreds of bytes a vertex each.
 LARGE = 300_000
 

@@ -15,7 +15,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.plane.segments import points_on
 from meshsimp_pymoo.surface.closed.embedding import are_poles
 from meshsimp_pymoo.surface.closed.model import ClosedModel
-from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh, nearest_shares
+from meshsimp_pymoo.surface.closed.nearest import MeshTree, nearest_shares
 
 # Both sides of where a line passes from one face to another, as a share of the face's size.
 FINE = 1e-3
@@ -132,6 +132,7 @@ class Tracer:
         self.model = model
         self.tolerance, self.most = tolerance, most
         self.faces = model.faces.astype(np.int64)
+        self._tree = MeshTree(model.points, self.faces)
         self.is_pole = are_poles(self.faces, model.poles)
         corners = model.points[self.faces]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -146,7 +147,7 @@ class Tracer:
     def feet(self, points: FloatArray) -> Feet:
         """Return where points (M, 3) are on the surface."""
         model = self.model
-        _, face = distances_to_mesh(points, model.points, self.faces)
+        _, face = self._tree.distances(points)
         a, b, c = (model.points[self.faces[face, k]] for k in range(3))
         shares = nearest_shares(a, b - a, c - a, points)
         foot = shares[:, :1] * a + shares[:, 1:2] * b + shares[:, 2:] * c
