@@ -184,11 +184,12 @@ def _as_height(
         what = topology(source.faces)
         content |= _facts_of(what)
         why_not = what.refusal
-        facts = None if judged.seen is None else judged.seen[1]
+        seen = judged.seen
         # of a plain sheet it would say nothing: its outline alone is the hole
-        is_doubtful = facts is None or what.loops > 1 or facts.n_folded + facts.vertical_faces > 0
-        if why_not is None and (refusal or is_doubtful):
-            rows["closed too"] = "it could be taken as a closed surface (--surface closed)"
+        is_doubtful = seen is None or what.loops > 1 or seen[1].n_folded + seen[1].vertical_faces > 0
+        if why_not is None:
+            if refusal or is_doubtful:
+                rows["closed too"] = "it could be taken as a closed surface (--surface closed)"
         elif refusal:
             rows["not closed"] = why_not
     content["not_closed"] = why_not
