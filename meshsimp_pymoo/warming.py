@@ -185,10 +185,10 @@ def _gaps() -> None:
     tiled_front(open_grid(heights), tile=LEAST_TILE)
 
 
-def _free() -> None:
+def _free(make: Callable[[], Any] = _square) -> None:
     from meshsimp_pymoo.search.free import FreeLadder
 
-    surface = _square()
+    surface = make()
     FreeLadder().compile_for(surface, surface.pinned)
 
 
@@ -241,6 +241,7 @@ def _files() -> None:
 
 #: Grounds, as file:class.
 HEIGHT, CLOSED = "surface.ground:Ground", "surface.closed.ground:ClosedGround"
+FREEDOM, CLOSED_FREEDOM = "surface.fans:Freedom", "surface.closed.free:ClosedFreedom"
 
 PARTS = (
     Part(
@@ -257,7 +258,8 @@ PARTS = (
     Part("thinning", ("search.greedy:thin",), _thinning, 16.6, True, HEIGHT),
     Part("moves", ("search.local_search:anneal", "search.local_search:fit_size"), _moves, 5.9, True, HEIGHT),
     Part(
-        "free meshes", ("surface.free:_open", "surface.free:anneal_freely", "search.free:_thin"), _free, 12.0, False
+        "free meshes", ("surface.free:_open", "surface.free:anneal_freely", "search.free:_thin"), _free, 12.0, False,
+        FREEDOM,
     ),
     Part("insertion", ("search.greedy:_grow",), _insertion, 4.5, False, HEIGHT),
     Part("single moves", ("surface.live:exchange_once", "surface.live:try_exchange_once"), _single_moves, 3.4, True),
@@ -307,6 +309,10 @@ PARTS = (
         partial(_moves, _body), 2.8, True, CLOSED,
     ),
     Part("their insertion", ("search.greedy:_grow",), partial(_insertion, _body), 1.5, False, CLOSED),
+    Part(
+        "their free meshes", ("surface.free:anneal_freely", "search.free:_thin"),
+        partial(_free, _body), 8.0, False, CLOSED_FREEDOM,
+    ),
     Part("folded scans", ("surface.overlap:_mark_hidden", "surface.orient:_seen_sides"), _folds, 3.0, False),
     Part("files", ("formats.source.rows:_scan_bytes", "formats.source.rows:_scan_numbers"), _files, 1.0, False),
 )  # fmt: skip
@@ -316,6 +322,7 @@ SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
 CLOSED_SEARCH = ("closed surfaces", "their meshes", "their thinning", "their moves")
 #: What free meshes need besides.
 FREE = ("free meshes",)
+CLOSED_FREE = ("their free meshes",)
 #: What break lines need besides: their errors are measured as scores are, of a closed surface as its own are.
 LINED = ("break lines", "scores")
 CLOSED_LINED = ("break lines",)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,7 +14,7 @@ import pytest
 import trimesh
 from pymoo.optimize import minimize
 
-from meshsimp_pymoo import Front, MeshProblem, memetic, nsga2_v1
+from meshsimp_pymoo import Front, MeshProblem, nsga2_v1
 from meshsimp_pymoo.cli import main, preparing, searching
 from meshsimp_pymoo.cli.requests import Free, Output, Request, Search, Tiling, Wish
 from meshsimp_pymoo.cli.terminal import Stages
@@ -29,7 +30,7 @@ from meshsimp_pymoo.surface.height import HeightSurface, refit_heights
 from meshsimp_pymoo.surface.kinds import as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.live_triangulation import LiveTriangulation
 from meshsimp_pymoo.surface.rules import Rules
-from meshsimp_pymoo.warming import CLOSED_SEARCH, CLOSED_WISH, SEARCH, Warming
+from meshsimp_pymoo.warming import CLOSED_FREE, CLOSED_SEARCH, CLOSED_WISH, SEARCH, Warming
 
 pytestmark = [
     pytest.mark.usefixtures("sketched"),
@@ -313,7 +314,6 @@ PAIRS = {
     ("--pin", "border"): r"pin='border' .* closed",
     ("--break-lines", "outline"): r"no outline and no holes .*--break-lines outline",
     ("--format", "landxml"): r"--format landxml .*--surface closed",
-    ("--free",): r"--free .*--surface closed",
     ("--max-edge", "3"): r"max_edge .*point clouds",
     ("--tile", "64", *CLOSED): r"--surface does not go with tiles",
     ("--tile", "64"): r"closed surface.*tiles",
@@ -344,8 +344,6 @@ def test_what_does_not_go_with_a_closed_surface_is_refused_in_one_line_before_an
             lambda problem: LiveTriangulation(problem.surface, problem.pinned),
             "live triangulations are of height surfaces",
         ),
-        (lambda problem: minimize(problem, memetic(8, triangulation="free"), ("n_gen", 1)), "free meshes are made by"),
-        (lambda problem: Front.from_subsets(problem, ~problem.pinned).free(moves=10), "free meshes are made by"),
         (
             lambda problem: MeshProblem(problem.surface, regions=4),
             "regions=4.*RegionCrossover",
@@ -449,6 +447,8 @@ def request_for(surface, **wish):
 def test_what_is_compiled_is_of_the_kind_of_the_model(monkeypatch):
     assert searching._parts(request_for("closed")) == list(CLOSED_SEARCH)
     assert searching._parts(request_for("closed", triangles=10)) == list(CLOSED_WISH)
+    freed = replace(request_for("closed"), free=Free(free=True))
+    assert searching._parts(freed) == [*CLOSED_SEARCH, *CLOSED_FREE]
     assert searching._parts(request_for("height")) == list(SEARCH)
     for lacking, guessed in (
         ((), "height"),

@@ -169,7 +169,7 @@ def test_ours_are_compared_with_the_best_tool_for_each_number_and_subsets_with_t
     assert goals[3:5] == ["0.80", "0.90"]
     above, mean, largest = benchmark.verdicts(rows)
     assert above.endswith(": sphere at 10 %")
-    assert mean.endswith(": sphere 1.500 (0.750 at 5 %, 3.000 at 10 %)")
+    assert mean.endswith(": sphere 1.500 (0.750 at 5 %; 3.000 at 10 %)")
     assert largest.endswith(": none")  # which is asked of parts with sharp edges only
     assert all(line.endswith(": none") for line in benchmark.verdicts(rows[:4]))
 
@@ -189,7 +189,14 @@ def test_of_parts_with_sharp_edges_what_counts_is_the_mesh_with_lines_and_tools_
     above, mean, largest = benchmark.verdicts(rows)
     assert above.endswith(": none")
     assert mean.endswith(": none")
-    assert largest.endswith(": c_fandisk, sharp:30 1.250 (1.250 at 5 %)")
+    assert largest.endswith(": c_fandisk 1.250 (1.250 at 5 %, sharp:30)")
+    # of several tolerances each size takes the one that suits it
+    finer = [
+        row(benchmark, "refitted", 2.0, model="c_fandisk", lines="sharp:30@1e-4", haus=2.0),
+        row(benchmark, "subset", 2.0, model="c_fandisk", lines="sharp:30@1e-4"),
+    ]
+    assert all(line.endswith(": none") for line in benchmark.verdicts(rows + finer))
+    assert [r.lines for r in benchmark.best_of_lines(rows[:1] + rows[2:3] + finer[:1])] == ["sharp:30@1e-4"]
 
 
 @pytest.mark.parametrize(("of", "inner"), [("face:300", 0), ("ring:300", 1)])

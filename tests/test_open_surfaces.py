@@ -245,6 +245,8 @@ def test_weights_and_pins_of_a_vertex_with_copies_are_given_by_its_row():
     weights = np.arange(1.0, len(source.points) + 1)
     weighed = model.with_weights(weights)
     assert weighed.total_weight == weights.sum()
+    assert model.area_shares.sum() == pytest.approx(model.n_vertices)
+    assert not model.area_shares[model.weightless].any()
     by_area = model.with_weights("area")
     assert by_area.total_weight == pytest.approx(model.n_vertices)
     assert (by_area.weights[model.weightless] == 0.0).all()
@@ -311,6 +313,21 @@ def first_of_each_vertex(faces):
         if chosen[-1]:
             used.update(face)
     return np.array(chosen)
+
+
+def test_the_least_mesh_is_known_with_holes_and_without():
+    two = joined("two", (BALL.points, BALL.faces), (BALL.points + 5.0, BALL.faces))
+    assert MeshProblem(two, surface="closed").surface.least_triangles == 8
+    pinned = MeshProblem(two, surface="closed", pin=list(range(10))).surface
+    kept = pinned.pinned.copy()
+    other = np.flatnonzero(pinned.model.part != pinned.model.part[np.argmax(pinned.model.source_index < 10)])
+    kept[other[~kept[other]][:1]] = True  # the part without pins has one vertex beside its pole
+    assert pinned.least_triangles == pinned.simplify(kept).quality.triangles > 8
+    assert MeshProblem(scan(), surface="closed").surface.least_triangles == 1
+    problem = MeshProblem(pair(), surface="closed")
+    some = np.random.default_rng(1).random((200, problem.n_var)) < 0.02
+    found = problem.surface.evaluate(some | problem.surface.pinned)[:, 1]
+    assert found[found > 0].min() >= problem.surface.least_triangles == 2
 
 
 # ------------------------------------------------------------------------------------------------------------- info

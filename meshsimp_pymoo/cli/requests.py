@@ -245,10 +245,6 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
         )
         for name in ("free_height", "no_centroids")
     },
-    ("--free", CLOSED): (
-        _is_closed_and(lambda request: request.free.free),
-        "its meshes follow from their vertices; leave --free out (--refit lowers the error further)",
-    ),
     ("--format landxml", CLOSED): (
         _is_closed_and(lambda request: request.output.format == "landxml"),
         "LandXML holds surfaces with one height at each place; write another format, such as ply",

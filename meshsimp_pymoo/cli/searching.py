@@ -75,7 +75,17 @@ from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.smallest import tolerance_for
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.tiles.front import TILE
-from meshsimp_pymoo.warming import CLOSED_LINED, CLOSED_SEARCH, CLOSED_WISH, FREE, LINED, SEARCH, WISH, missing
+from meshsimp_pymoo.warming import (
+    CLOSED_FREE,
+    CLOSED_LINED,
+    CLOSED_SEARCH,
+    CLOSED_WISH,
+    FREE,
+    LINED,
+    SEARCH,
+    WISH,
+    missing,
+)
 
 # Seconds that freeing a front is thought to take where nobody says how long.
 FREEING_SECONDS = 15.0
@@ -181,7 +191,8 @@ def _parts(request: Request) -> list[str]:
     """Return what has to be compiled for a request of a model of a kind that is known."""
     lined = request.rules.break_lines is not None
     if request.options.surface == "closed":
-        return [*(CLOSED_WISH if request.is_targeted else CLOSED_SEARCH), *(CLOSED_LINED if lined else ())]
+        parts = [*(CLOSED_WISH if request.is_targeted else CLOSED_SEARCH), *(CLOSED_LINED if lined else ())]
+        return [*parts, *(CLOSED_FREE if request.free.free else ())]
     parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
     if request.output.refit or request.free.no_centroids:
         parts.append("scores")

@@ -29,8 +29,8 @@ from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.budgets import stopping
 from meshsimp_pymoo.search.greedy import begin_thinning, go_on_thinning, make_queue
 from meshsimp_pymoo.search.wishes import shortfall
-from meshsimp_pymoo.surface.free import take_numbers
 from meshsimp_pymoo.surface.measures import MEASURES, REGIONS, TRIANGLES, UNCOVERED, as_quality
+from meshsimp_pymoo.surface.moves import take_numbers
 from meshsimp_pymoo.surface.rules import MOST_RATIO, USUAL_RATIO
 from meshsimp_pymoo.surface.score import measured_angles
 from meshsimp_pymoo.surface.surface import FreeMesh, Surface, freedom_of
@@ -672,6 +672,6 @@ def _mesh(surface: Surface, faces: IntArray, row: FloatArray) -> FreeMesh:
         row[:REGIONS],
         surface.total_weight,
         surface_error=float(row[BETWEEN]),
-        **measured_angles(surface.points[:, :2], faces),
+        **measured_angles(surface.points[:, : surface.places.shape[1]], faces),  # of heights: in the plane
     )
     return FreeMesh(kept, faces, quality)

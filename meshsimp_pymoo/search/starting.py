@@ -106,7 +106,9 @@ class Start:
         raise ValueError(f"there is no subset {len(self) + k}; there are {len(self)}")
 
     def __str__(self) -> str:
-        ranges = [f"{int(part.triangles.min()):,} to {int(part.triangles.max()):,}" for part in self.parts]
+        sizes = [part.triangles[part.triangles > 0] for part in self.parts]  # what is pinned may be no mesh yet
+        ends = [(int(own.min()), int(own.max())) for own in sizes if len(own)]
+        ranges = [f"{low:,} to {high:,}" if low < high else f"{low:,}" for low, high in ends]
         return f"meshes of {', '.join(ranges)} triangles"
 
 

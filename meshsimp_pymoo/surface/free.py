@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -138,9 +138,9 @@ def _quarter(dx: float, dy: float) -> int:
 
 
 @entry
-def _open(ground: Ground, books: Live, n: int) -> None:
+def _open(freedom: Freedom, books: Live, n: int) -> None:
     """Put triangles to far corners, the samples n to n + 3, in place of the ghosts; slivers are as others are."""
-    g = borrowed(ground)
+    g = borrowed(freedom).ground
     live = borrowed(books)
     mesh = live.mesh
     kind = live.kind
@@ -272,41 +272,46 @@ def _inside(free: Freedom, live: Live, fan: Fan, v: int, w: int, limit: float) -
 
 
 @inner(inline=True)
-def _drawn(n: int, first: float, share: float, state: np.ndarray) -> int:
+def drawn(n: int, first: float, share: float, state: np.ndarray) -> int:
     """Draw one of n things in a window on them, which starts at a share of all and is of another."""
     k = int(first * n) + below(state, max(int(share * n), 1))
     return k if k < n else k - n
 
 
+@answers(moves.flip, Freedom)
 @inner
-def _flip(free: Freedom, live: Live, h: int, most: int, limit: float, state: np.ndarray) -> float:
-    """Flip the edge of halfedge h; return the change of cost, inf where it stays."""
+def _flip(free: Freedom, live: Live, h: int, most: int, limit: float, state: np.ndarray) -> bool:
     mesh = live.mesh
     t = h & TRIANGLE
     s = np.int64(mesh[h + 4]) & TRIANGLE
     if (mesh[t] | mesh[t + 1] | mesh[t + 2] | mesh[s] | mesh[s + 1] | mesh[s + 2]) > LAST_INDEX:
-        return np.inf
+        return False
     if is_forced(free.ground.lines, mesh[h], mesh[t + ((h & 3) + 1) % 3]):
-        return np.inf
+        return False
     fan = free.fan
     take_pair(live, fan, h)
     fill_from(fan, 0)
     if live.kind[t >> 3] & live.kind[s >> 3] & EMITTED:
-        return _inside(free, live, fan, -1, -1, limit)
+        return _inside(free, live, fan, -1, -1, limit) < np.inf
     if not free.moves_outline:
-        return np.inf
+        return False
     if not (live.kind[t >> 3] | live.kind[s >> 3]) & EMITTED and below(state, IDLE) > 0:
-        return np.inf
-    return _outside(free, live, fan, -1, -1, 0, most, limit)
+        return False
+    return _outside(free, live, fan, -1, -1, 0, most, limit) < np.inf
 
 
+@answers(moves.shift, Freedom)
 @inner
-def _shift(free: Freedom, live: Live, v: int, inside: bool, most: int, limit: float, state: np.ndarray) -> int:
-    """Move site v, whose star is the cavity, to a vertex that comes instead; return that, -1 where v stays."""
+def _shift(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.ndarray) -> int:
+    if not take_star(live, free.fan, v):
+        return -1
+    inside = is_covered(live, free.fan)
+    if not inside and not free.moves_outline:
+        return -1
     if inside:
-        w = _stroll(free.indptr, free.indices, v, 1 + below(state, 3), state)
+        w = stroll(free.indptr, free.indices, v, 1 + below(state, 3), state)
     else:
-        w = _stroll(free.border_indptr, free.border_indices, v, 1 + below(state, 3), state)
+        w = stroll(free.border_indptr, free.border_indices, v, 1 + below(state, 3), state)
     if live.site[w]:
         return -1
     fill_around(free.fan, w)
@@ -318,7 +323,7 @@ def _shift(free: Freedom, live: Live, v: int, inside: bool, most: int, limit: fl
 
 
 @inner
-def _stroll(indptr: np.ndarray, indices: np.ndarray, v: int, steps: int, state: np.ndarray) -> int:
+def stroll(indptr: np.ndarray, indices: np.ndarray, v: int, steps: int, state: np.ndarray) -> int:
     """Walk at random on a graph."""
     w = v
     for _ in range(steps):
@@ -389,8 +394,20 @@ def _meet(one: Fan, two: Fan) -> bool:
     return False
 
 
+@answers(moves.swap, Freedom)
 @inner
 def _swap(
+    free: Freedom, live: Live, v: int, most: int, limit: float, first: float, share: float, state: np.ndarray
+) -> int:
+    if not take_star(live, free.fan, v):
+        return -1
+    if is_covered(live, free.fan):
+        return _swap_inside(free, live, v, most, limit, first, share, state)
+    return _swap_outline(free, live, v, most, limit, state) if free.moves_outline else -1
+
+
+@inner
+def _swap_inside(
     free: Freedom, live: Live, v: int, most: int, limit: float, first: float, share: float, state: np.ndarray
 ) -> int:
     """Let site v inside the mesh collapse and a vertex come where the cost is large; return that, -1: nothing changed.
@@ -402,7 +419,7 @@ def _swap(
     n_records = live.tally[END] >> 3
     t = np.int64(-1)
     for _ in range(TRIES):
-        r = _drawn(n_records, first, share, state)
+        r = drawn(n_records, first, share, state)
         if live.kind[r] & EMITTED and (t < 0 or live.subtotal[r] > live.subtotal[t >> 3]):
             t = r * RECORD
     if t < 0:
@@ -430,7 +447,7 @@ def _swap(
 
 @inner
 def _swap_outline(free: Freedom, live: Live, v: int, most: int, limit: float, state: np.ndarray) -> int:
-    """Let site v of the outline collapse along it and another vertex of the original's border come; as `_swap`."""
+    """Let site v of the outline collapse along it and another one of the original's border come; as `_swap_inside`."""
     g = free.ground
     fan = free.fan
     other = free.other
@@ -501,7 +518,7 @@ def anneal_freely(
     books: Live,
     movable: np.ndarray,
     n_movable: np.ndarray,
-    moves: int,
+    n_moves: int,
     hot: float,
     cold: float,
     most: int,
@@ -524,7 +541,7 @@ def anneal_freely(
     n_records = live.tally[END] >> 3
     share = min(WINDOW / n_records, 1.0)
     first = 0.0
-    for step in range(moves):
+    for step in range(n_moves):
         if step % 64 == 0:
             if stop[0]:
                 visited[0] += step
@@ -533,47 +550,41 @@ def anneal_freely(
             if share < 1.0:
                 first = 0.5 * share * ((visited[0] + step) // VISIT)
                 first -= int(first)
-            temperature = hot * (cold / hot) ** (step / moves) if hot > 0.0 else 0.0
+            temperature = hot * (cold / hot) ** (step / n_moves) if hot > 0.0 else 0.0
         # what costs nothing is refused in the end: it would go on for ever
         limit = -temperature * np.log(unit(state)) if hot > 0.0 else -1e-300
         what = unit(state)
         if what < shares.flip or n_movable[0] == 0:
-            t = _drawn(n_records, first, share, state) * RECORD
-            accepted[0] += _flip(free, live, t + below(state, 3), most, limit, state) < np.inf
+            t = drawn(n_records, first, share, state) * RECORD
+            accepted[0] += moves.flip(free, live, t + below(state, 3), most, limit, state)
             continue
-        q = _drawn(n_movable[0], first, share, state)
+        q = drawn(n_movable[0], first, share, state)
         v = movable[q]
-        if not take_star(live, free.fan, v):
-            continue
-        inside = is_covered(live, free.fan)
-        if not inside and not free.moves_outline:
-            continue
         if what < shares.flip + shares.shift:
-            w = _shift(free, live, v, inside, most, limit, state)
+            w = moves.shift(free, live, v, most, limit, state)
             accepted[1] += w >= 0
         else:
-            if inside:
-                w = _swap(free, live, v, most, limit, first, share, state)
-            else:
-                w = _swap_outline(free, live, v, most, limit, state)
+            w = moves.swap(free, live, v, most, limit, first, share, state)
             accepted[2] += w >= 0
         if w >= 0:
             if live.site[v]:  # there was room for one more
                 q = n_movable[0]
                 n_movable[0] += 1
             movable[q] = w
-    retake(live, len(free.ground.z))
-    visited[0] += moves
-    return moves
+    moves.settle(free, live)
+    visited[0] += n_moves
+    return n_moves
 
 
+@answers(moves.settle, Freedom)
 @inner
-def take_numbers(free: Freedom, live: Live, share: np.ndarray, row: np.ndarray) -> None:
-    """Fill a row (7,) with what is said of the mesh: the columns of `measures`, then its surface error.
+def _settle(free: Freedom, live: Live) -> None:
+    retake(live, len(free.ground.z))
 
-    ``share`` is the share in the area of each sample behind the vertices, whose deviations make the last; without any
-    it is not a number.
-    """
+
+@answers(moves.take_numbers, Freedom)
+@inner
+def _take_numbers(free: Freedom, live: Live, share: np.ndarray, row: np.ndarray) -> None:
     g = free.ground
     mesh = live.mesh
     n = free.n_vertices
@@ -824,7 +835,7 @@ class FreeGround:
         with self._rooms.one() as (live, fan, other, onto):
             freedom = self._freedom._replace(ratio=float(min_height), onto=onto, fan=fan, other=other)
             build(freedom.ground, live, self._sites(kept, self.pinned), self.name)
-            _open(freedom.ground, live, len(freedom.ground.z))
+            _open(freedom, live, len(freedom.ground.z))
             yield FreeTriangulation(freedom, live, self.held)
 
 
@@ -840,24 +851,28 @@ class FreeTriangulation:
     Attributes
     ----------
     freedom, books : records
-        What the compiled functions work on.
+        What the compiled functions work on: of height surfaces, or of another kind in a class that says what differs.
     held : (N,) bool array
         Vertices that neither move nor collapse.
     accepted : (3,) int array
         How many flips, shifts and swaps were made.
     """
 
-    def __init__(self, freedom: Freedom, books: Live, held: BoolArray) -> None:
+    def __init__(self, freedom: Any, books: Any, held: BoolArray) -> None:
         self.freedom = freedom
         self.books = books
         self.held = held
         n = freedom.n_vertices
-        rows = np.flatnonzero((books.site[:n] == 1) & (books.used[:n] > 0) & ~held)
+        rows = np.flatnonzero((books.site[:n] == 1) & self._may_move() & ~held)
         self._movable = np.empty(n, np.int64)
         self._movable[: len(rows)] = rows
         self._n_movable = np.array([len(rows)])
         self._visited = np.zeros(1, np.int64)
         self.accepted = np.zeros(3, np.int64)
+
+    def _may_move(self) -> BoolArray:
+        """Return which vertices (N,) may move where they are sites and not held."""
+        return np.asarray(self.books.used[: self.freedom.n_vertices] > 0)
 
     @property
     def faces(self) -> IntArray:

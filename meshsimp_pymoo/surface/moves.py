@@ -44,7 +44,7 @@ from meshsimp_pymoo.plane.borrow import borrowed
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # The files of this package with answers.
-ANSWERING = tuple(f"meshsimp_pymoo.surface.{name}" for name in ("live", "free", "closed.live"))
+ANSWERING = tuple(f"meshsimp_pymoo.surface.{name}" for name in ("live", "free", "closed.live", "closed.free"))
 
 
 class Answers:
@@ -85,6 +85,10 @@ def answers(question: Callable[..., Any], record: type) -> Callable[[Function], 
             3: lambda ground, books, v: function(ground, books, v),
             4: lambda ground, books, v, w: function(ground, books, v, w),
             5: lambda ground, books, v, w, limit: function(ground, books, v, w, limit),
+            6: lambda ground, books, v, most, limit, state: function(ground, books, v, most, limit, state),
+            8: lambda ground, books, v, most, limit, first, share, state: function(
+                ground, books, v, most, limit, first, share, state
+            ),
         }[arity]
 
         def choose(ground: Any, *_: Any) -> Any:
@@ -203,6 +207,49 @@ def worst_in(ground: Any, books: Any, cell: int) -> tuple[int, float, float]:
 def cells_around(ground: Any, books: Any, v: int, found: np.ndarray) -> int:
     """List the cells at site v, which has just come; return their number."""
     return int(_unanswered())
+
+
+# Of free meshes, whose edges are searched too (see `surface.free`); ``state`` is that of the random numbers.
+
+
+@question
+def flip(ground: Any, books: Any, h: int, most: int, limit: float, state: np.ndarray) -> bool:
+    """Flip the edge of halfedge h, if that costs no more than ``limit`` and makes no more than ``most`` triangles."""
+    return bool(_unanswered())
+
+
+@question
+def shift(ground: Any, books: Any, v: int, most: int, limit: float, state: np.ndarray) -> int:
+    """Move site v to a vertex inside its star, with these limits; return that vertex, -1 where v stays."""
+    return int(_unanswered())
+
+
+@question
+def swap(
+    ground: Any, books: Any, v: int, most: int, limit: float, first: float, share: float, state: np.ndarray
+) -> int:
+    """Let site v collapse and a vertex come where the cost is large; return that vertex, -1: nothing changed.
+
+    That place is drawn from a window on the triangles' records (see `surface.free.drawn`). Where there is room for two
+    triangles more, v stays.
+    """
+    return int(_unanswered())
+
+
+@question
+def settle(ground: Any, books: Any) -> None:
+    """Take sums that have been carried on through many moves again."""
+    _unanswered()
+
+
+@question
+def take_numbers(ground: Any, books: Any, share: np.ndarray, row: np.ndarray) -> None:
+    """Fill a row (7,) with what is said of the mesh: the columns of `measures`, then its surface error.
+
+    ``share`` is the share in the area of each sample behind the vertices, whose deviations make the last; without any
+    it is not a number.
+    """
+    _unanswered()
 
 
 @entry

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from meshsimp_pymoo.opening import Judged
     from meshsimp_pymoo.surface.closed.model import Topology
     from meshsimp_pymoo.surface.kinds import OfModel
-    from meshsimp_pymoo.surface.orient import SurfaceFacts
     from meshsimp_pymoo.surface.rules import Rules
 
 # What is said of a model whatever it is taken for; None where it is not known, or there is none.
@@ -185,12 +184,14 @@ def _as_height(
         what = topology(source.faces)
         content |= _facts_of(what)
         why_not = what.refusal
+        seen = judged.seen
         # of a plain sheet it would say nothing: its outline alone is the hole
-        is_plain = judged.seen is not None and what.loops <= 1 and _is_plain(judged.seen[1])
-        if why_not is not None:
-            rows |= {"not closed": why_not} if refusal else {}
-        elif refusal or not is_plain:
-            rows["closed too"] = "it could be taken as a closed surface (--surface closed)"
+        is_doubtful = seen is None or what.loops > 1 or seen[1].n_folded + seen[1].vertical_faces > 0
+        if why_not is None:
+            if refusal or is_doubtful:
+                rows["closed too"] = "it could be taken as a closed surface (--surface closed)"
+        elif refusal:
+            rows["not closed"] = why_not
     content["not_closed"] = why_not
     return refusal
 
@@ -229,11 +230,6 @@ def _as_closed(
     rows["flattened"] = f"the shortest edge is {least:.3g} of the plane's side"
     _add_lines(surface, content, rows)
     return None
-
-
-def _is_plain(facts: SurfaceFacts) -> bool:
-    """Tell whether nothing of a height field is folded over or upright."""
-    return facts.n_folded == 0 and facts.vertical_faces == 0
 
 
 def _add_lines(surface: OfModel, content: dict[str, Any], rows: dict[str, str]) -> None:

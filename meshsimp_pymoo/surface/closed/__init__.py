@@ -2,9 +2,9 @@
 
 A subset means, for each part, the convex hull of its images on a sphere, without what lies in holes.
 
-`tracing` follows polylines along the surface, `lining`, beside `evaluate`, makes them its break lines. All else, bottom
-up: `embedding` flattens the original once, `model` holds it in vector order,
-`distance` says how far a vertex is from a triangle, `nearest` from a whole mesh, `ground` and `books` are the records
-of compiled functions, `evaluate` measures a subset from scratch, `live` by moves, `refit` moves the vertices off the
-original ones, and `surface` is all that together, as the search knows it.
+Bottom up: `embedding` flattens the original once, `model` holds it in vector order, `distance` says how far a vertex is
+from a triangle, `nearest` from a whole mesh, `ground` and `books` are the records of compiled functions, `tracing`
+follows polylines along the surface, `lining` makes them its break lines, `evaluate` measures a subset from scratch,
+`live` by moves, `free` chooses the edges too, `refit` moves the vertices off the original ones, and `surface` is all
+that together, as the search knows it.
 """

@@ -6,13 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray
-from meshsimp_pymoo.compiling.functions import entry
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.plane.constraints import Constraints, make_constraints
 from meshsimp_pymoo.plane.footprint import Footprint
 from meshsimp_pymoo.plane.predicates import exact_ranges
-from meshsimp_pymoo.surface.closed.distance import squared_distance
 from meshsimp_pymoo.surface.closed.model import ClosedModel
+from meshsimp_pymoo.surface.closed.nearest import nearest_shares
 from meshsimp_pymoo.surface.measures import OBJECTIVES
 from meshsimp_pymoo.surface.rules import Rules
 
@@ -52,7 +51,7 @@ def make_ground(model: ClosedModel, rules: Rules) -> ClosedGround:
         poles=np.ascontiguousarray(model.poles, np.int64).ravel(),
         part=np.ascontiguousarray(model.part, np.int32) if model.n_parts > 1 else np.empty(0, np.int32),
         footprint=model.footprint,
-        far=_to_poles(model) if len(model.rim) else np.empty(0),
+        far=to_poles(model.points, model.poles, model.part) if len(model.rim) else np.empty(0),
         exact_area=area,
         exact_lift=lift,
         lines=_forced_edges(model),
@@ -66,18 +65,11 @@ def make_ground(model: ClosedModel, rules: Rules) -> ClosedGround:
     )
 
 
-def _to_poles(model: ClosedModel) -> FloatArray:
-    """Return how far each vertex is from the pole of its part, which every mesh has."""
-    far = np.empty(model.n_vertices)
-    _enter_distances(np.ascontiguousarray(model.points).ravel(), model.poles, model.part.astype(np.int64), far)
-    return far
-
-
-@entry
-def _enter_distances(xyz: np.ndarray, poles: np.ndarray, part: np.ndarray, far: np.ndarray) -> None:
-    for i in range(len(far)):
-        a, b, c = poles[part[i], 0], poles[part[i], 1], poles[part[i], 2]
-        far[i] = np.sqrt(squared_distance(xyz, a, b, c, xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]))
+def to_poles(points: FloatArray, poles: IntArray, part: IntArray) -> FloatArray:
+    """Return how far each point (N, 3) is from the pole of its part, which every mesh has."""
+    a, b, c = (points[poles[part, k]] for k in range(3))
+    _, s, t = nearest_shares(a, b - a, c - a, points).T
+    return np.linalg.norm(points - a - s[:, None] * (b - a) - t[:, None] * (c - a), axis=1)
 
 
 def _forced_edges(model: ClosedModel) -> Constraints:

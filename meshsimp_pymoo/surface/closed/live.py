@@ -101,7 +101,7 @@ def _enter_squares(g: ClosedGround, live: ClosedLive, t: int, i: int, row: int) 
 
 
 @inner(inline=True)
-def _deviation(g: ClosedGround, live: ClosedLive, i: int, row: int) -> float:
+def deviation(g: ClosedGround, live: ClosedLive, i: int, row: int) -> float:
     """Return d_p of vertex i, which a row of ``squares`` is about."""
     squares = live.squares
     least = min(min(squares[row, 0], squares[row, 1]), min(squares[row, 2], squares[row, 3]))
@@ -140,7 +140,8 @@ def _holder_among_new(g: ClosedGround, live: ClosedLive, guess: int, i: int) -> 
 
 
 @inner(inline=True)
-def _write(live: ClosedLive, at: int, value: int, logged: bool) -> None:
+def write(live: ClosedLive, at: int, value: int, logged: bool) -> None:
+    """Write an entry of the records, and with a log what it was."""
     if logged:
         n = live.tally[N_LOG]
         live.log_at[n] = at
@@ -150,10 +151,10 @@ def _write(live: ClosedLive, at: int, value: int, logged: bool) -> None:
 
 
 @inner(inline=True)
-def _link(live: ClosedLive, h: int, twin: int, logged: bool) -> None:
+def link(live: ClosedLive, h: int, twin: int, logged: bool) -> None:
     """Make two halfedges twins."""
-    _write(live, h + 4, twin, logged)
-    _write(live, twin + 4, h, logged)
+    write(live, h + 4, twin, logged)
+    write(live, twin + 4, h, logged)
 
 
 @inner(inline=True)
@@ -167,7 +168,7 @@ def _count_use(live: ClosedLive, t: int, change: int) -> None:
 
 
 @inner(inline=True)
-def _note_gone(live: ClosedLive, t: int, logged: bool) -> None:
+def note_gone(live: ClosedLive, t: int, logged: bool) -> None:
     """List a triangle among those that go."""
     n = live.tally[N_GONE]
     if is_in_mesh(live.planes, t >> 3):
@@ -193,7 +194,6 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
     gone, came, mark = live.gone, live.came, live.mark
     tally[N_GONE] = 0
     tally[N_CAME] = 0
-    tally[N_BESIDE] = 0
     tally[N_LOG] = 0
     n_ears = 0
     if v >= 0:
@@ -202,22 +202,22 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
         if n_ears == 0:
             return False
         for k in range(m):
-            _note_gone(live, np.int64(cavity[k]), logged)
+            note_gone(live, np.int64(cavity[k]), logged)
         for k in range(n_ears):
             t = np.int64(gone[k])
             for e in range(3):
-                _write(live, t + e, live.ears[k, e], logged)
+                write(live, t + e, live.ears[k, e], logged)
                 side = live.ear_edges[k, e]
                 if side < m:
-                    _link(live, t + e, np.int64(rim[side]), logged)
+                    link(live, t + e, np.int64(rim[side]), logged)
                 elif side < m + k:
-                    _link(live, t + e, np.int64(gone[side - m]) + 2, logged)
+                    link(live, t + e, np.int64(gone[side - m]) + 2, logged)
         for k in range(n_ears, m):
             t = np.int64(gone[k])
             live.free[tally[N_FREE]] = t
             tally[N_FREE] += 1
             for e in range(3):  # to whoever scans the records an unused one is a ghost
-                _write(live, t + e, INFINITE, logged)
+                write(live, t + e, INFINITE, logged)
     n_cavity = 0
     if w >= 0:
         t0 = np.int64(live.place[w])
@@ -235,7 +235,7 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
         for k in range(n_cavity):
             t = np.int64(cavity[k])
             if not mark[t >> 3] & GONE:
-                _note_gone(live, t, logged)
+                note_gone(live, t, logged)
             mark[t >> 3] |= IN_CAVITY
         for k in range(n_rim):  # read before any record is written over
             h = np.int64(rim[k])
@@ -252,11 +252,11 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
         for k in range(n_rim):
             t = np.int64(came[k])
             after = np.int64(came[k + 1 if k + 1 < n_rim else 0])
-            _write(live, t, np.int64(ring[k]), logged)
-            _write(live, t + 1, np.int64(ring[k + 1 if k + 1 < n_rim else 0]), logged)
-            _write(live, t + 2, w, logged)
-            _link(live, t, np.int64(rim[k]), logged)
-            _link(live, t + 1, after + 2, logged)
+            write(live, t, np.int64(ring[k]), logged)
+            write(live, t + 1, np.int64(ring[k + 1 if k + 1 < n_rim else 0]), logged)
+            write(live, t + 2, w, logged)
+            link(live, t, np.int64(rim[k]), logged)
+            link(live, t + 1, after + 2, logged)
         tally[N_CAME] = n_rim
     for k in range(n_ears):
         t = np.int64(gone[k])
@@ -265,6 +265,15 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
             tally[N_CAME] += 1
     for k in range(n_cavity):
         mark[np.int64(cavity[k]) >> 3] &= ~IN_CAVITY
+    note_came(g, live)
+    return True
+
+
+@inner
+def note_came(g: ClosedGround, live: ClosedLive) -> None:
+    """Enter the planes of the triangles that came, whose records are written, and list those that stay beside them."""
+    mesh, came, mark, tally = live.mesh, live.came, live.mark, live.tally
+    tally[N_BESIDE] = 0
     for k in range(tally[N_CAME]):
         mark[np.int64(came[k]) >> 3] |= CAME
     for k in range(tally[N_CAME]):
@@ -283,7 +292,6 @@ def _replace(g: ClosedGround, live: ClosedLive, v: int, w: int, logged: bool) ->
                 tally[N_BESIDE] += 1
                 live.sides[r] = 0
             live.sides[r] |= 1 << (h & 3)
-    return True
 
 
 @inner
@@ -308,7 +316,7 @@ def _cost_beside(g: ClosedGround, live: ClosedLive, s: int, i: int, row: int) ->
     for k in range(3):
         if bits & (1 << k):
             _enter_square(g, live, s, k, i, row)
-    return _deviation(g, live, i, row)
+    return deviation(g, live, i, row)
 
 
 @inner(inline=True)
@@ -359,7 +367,7 @@ def _enter_idle(g: ClosedGround, live: ClosedLive, i: int) -> None:
 
 
 @inner
-def _tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> float:
+def tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> float:
     """Return the change of cost by what :func:`_replace` made, or inf once it is known to exceed the limit."""
     tally = live.tally
     head, following = live.head, live.following
@@ -379,7 +387,7 @@ def _tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> f
             if i != w:
                 q = _holder_among_new(g, live, q, i)
                 _enter_squares(g, live, np.int64(live.came[q]), i, scratch)
-                change += noted_cost(g, live, _deviation(g, live, i, scratch), i)
+                change += noted_cost(g, live, deviation(g, live, i, scratch), i)
             i = np.int64(following[i]) if k >= 0 else np.int64(-1)
         if change > limit:
             return np.inf
@@ -397,7 +405,7 @@ def _tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> f
 
 
 @inner
-def _undo(live: ClosedLive, n_free: int, end: int) -> None:
+def undo(live: ClosedLive, n_free: int, end: int) -> None:
     """Take back what :func:`_replace` made, with a log."""
     tally = live.tally
     for k in range(tally[N_CAME]):
@@ -418,7 +426,7 @@ def _undo(live: ClosedLive, n_free: int, end: int) -> None:
 
 
 @inner
-def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
+def enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
     """Enter what :func:`_replace` made into the books."""
     tally = live.tally
     mesh, head, following, place, pool = live.mesh, live.head, live.following, live.place, live.pool
@@ -464,7 +472,7 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
         place[i] = t
         following[i] = head[r]
         head[r] = i
-        d = noted_cost(g, live, _deviation(g, live, i, i), i)
+        d = noted_cost(g, live, deviation(g, live, i, i), i)
         subtotal[r] += d
         amount[COST] += d
     for k in range(tally[N_BESIDE]):
@@ -495,13 +503,20 @@ def _enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
     if amount[COST] > amount[PEAK]:
         amount[PEAK] = amount[COST]
     elif amount[COST] < RETAKEN_BELOW * amount[PEAK]:
-        amount[COST] = 0.0
-        for r in range(tally[END] >> 3):
-            amount[COST] += subtotal[r]
-        for i in range(len(live.idle)):
-            if live.idle[i] & UNUSED:
-                amount[COST] += _idle_cost(g, i)
-        amount[PEAK] = amount[COST]
+        retake(g, live)
+
+
+@inner
+def retake(g: ClosedGround, live: ClosedLive) -> None:
+    """Take the sum of the costs again."""
+    amount = live.amount
+    amount[COST] = 0.0
+    for r in range(live.tally[END] >> 3):
+        amount[COST] += live.subtotal[r]
+    for i in range(len(live.idle)):
+        if live.idle[i] & UNUSED:
+            amount[COST] += _idle_cost(g, i)
+    amount[PEAK] = amount[COST]
 
 
 @inner(inline=True)
@@ -515,7 +530,7 @@ def _count_site(g: ClosedGround, live: ClosedLive, i: int, change: int) -> None:
 
 
 @inner(inline=True)
-def _may_go(g: ClosedGround, live: ClosedLive, v: int, w: int) -> bool:
+def may_go(g: ClosedGround, live: ClosedLive, v: int, w: int) -> bool:
     """Whether enough sites are left of the part of v, once it has gone and vertex w has come."""
     if len(g.part) == 0:
         return w >= 0 or live.tally[N_SITES] > LEAST_VERTICES
@@ -529,13 +544,13 @@ def _peak_in(g: ClosedGround, live: ClosedLive, r: int) -> float:
     i = np.int64(live.head[r])
     while i >= 0:
         if counts(g, i):
-            peak = max(peak, _deviation(g, live, i, i))
+            peak = max(peak, deviation(g, live, i, i))
         i = np.int64(live.following[i])
     return peak
 
 
 @inner(inline=True)
-def _degree(live: ClosedLive, v: int, most: int) -> int:
+def degree(live: ClosedLive, v: int, most: int) -> int:
     """Return the number of triangles at site v, or ``most`` + 1 if there are more than that."""
     mesh = live.mesh
     first = np.int64(live.place[v])
@@ -554,7 +569,8 @@ def _degree(live: ClosedLive, v: int, most: int) -> int:
 
 
 @inner(inline=True)
-def _total(live: ClosedLive) -> float:
+def total(live: ClosedLive) -> float:
+    """Return the sum of the costs; infinite where a part has too few sites to be a mesh."""
     return live.amount[COST] if live.tally[N_SHORT] == 0 else np.inf
 
 
@@ -563,11 +579,11 @@ def _total(live: ClosedLive) -> float:
 def exchange(g: ClosedGround, live: ClosedLive, v: int, w: int) -> bool:
     """Remove site v and insert vertex w, either of them -1 for none; return False if v cannot go."""
     live.amount[LARGEST] = 0.0
-    if v >= 0 and not _may_go(g, live, v, w):
+    if v >= 0 and not may_go(g, live, v, w):
         return False
     if not _replace(g, live, v, w, False):
         return False
-    _enter(g, live, v, w)
+    enter(g, live, v, w)
     return True
 
 
@@ -600,11 +616,11 @@ def try_exchange(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float
     live.amount[LARGEST] = 0.0
     tally[N_LOOKED_AT] = 0
     if v >= 0:
-        if not _may_go(g, live, v, w):
+        if not may_go(g, live, v, w):
             return np.inf, 0
-        tally[N_LOOKED_AT] = _degree(live, v, MOST_TOUCHED)
+        tally[N_LOOKED_AT] = degree(live, v, MOST_TOUCHED)
         if tally[N_LOOKED_AT] > MOST_TOUCHED:
-            tally[N_LOOKED_AT] = _degree(live, v, len(live.site))
+            tally[N_LOOKED_AT] = degree(live, v, len(live.site))
             return _done_and_undone(g, live, v, w)
     if w >= 0:
         # how many are in conflict with w is known by looking; the star of v makes at most so many more
@@ -626,8 +642,8 @@ def try_exchange(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float
     if not _replace(g, live, v, w, True):
         return np.inf, 0
     triangles = tally[N_IN_MESH] - n_before
-    change = _tried(g, live, v, w, limit)
-    _undo(live, n_free, end)
+    change = tried(g, live, v, w, limit)
+    undo(live, n_free, end)
     return change, triangles
 
 
@@ -635,14 +651,14 @@ def try_exchange(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float
 @inner(inline=True)
 def total_cost(g: ClosedGround, live: ClosedLive) -> float:
     """Sum of the costs; inf where there is no mesh."""
-    return _total(live)
+    return total(live)
 
 
 @answers(moves.error_now, ClosedGround)
 @inner(inline=True)
 def error_now(g: ClosedGround, live: ClosedLive) -> float:
     """Sum of the costs, or the largest deviation where the books know it; inf where there is no mesh."""
-    return live.peaks[1] if len(live.peaks) > 0 and live.tally[N_SHORT] == 0 else _total(live)
+    return live.peaks[1] if len(live.peaks) > 0 and live.tally[N_SHORT] == 0 else total(live)
 
 
 @answers(moves.ranked, ClosedGround)
@@ -685,7 +701,7 @@ def _urgency(g: ClosedGround, live: ClosedLive, v: int) -> float:
 
 @answers(moves.sites_around, ClosedGround)
 @inner
-def _sites_around(g: ClosedGround, live: ClosedLive, v: int, found: np.ndarray) -> int:
+def sites_around(g: ClosedGround, live: ClosedLive, v: int, found: np.ndarray) -> int:
     """List the ring of v and the tips of the triangles outside it: their stars, or what is beside them, will change."""
     mesh = live.mesh
     m = triangles_around(mesh, np.int64(live.place[v]), v, live.cavity, live.rim, live.ring)
@@ -739,7 +755,7 @@ def _worst_in(g: ClosedGround, live: ClosedLive, cell: int) -> tuple[int, float,
     most = 0.0
     i = np.int64(live.head[cell])
     while i >= 0:
-        d = _deviation(g, live, i, i)
+        d = deviation(g, live, i, i)
         if len(live.peaks) > 0:
             d = d if counts(g, i) else 0.0
         elif g.weighed:
@@ -823,7 +839,7 @@ def _build_closed(
         live.following[i] = live.head[r]
         live.head[r] = i
         _enter_squares(g, live, t, i, i)
-        d = noted_cost(g, live, _deviation(g, live, i, i), i)
+        d = noted_cost(g, live, deviation(g, live, i, i), i)
         live.subtotal[r] += d
         live.amount[COST] += d
     if len(live.peaks) > 0:

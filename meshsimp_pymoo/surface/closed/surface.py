@@ -16,6 +16,7 @@ from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.plane.faces import used_rows
 from meshsimp_pymoo.surface.closed.books import ClosedLive, make_live, with_peaks
 from meshsimp_pymoo.surface.closed.evaluate import evaluate_closed, make_workspace, triangulate_closed
+from meshsimp_pymoo.surface.closed.free import ClosedFreeGround
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, make_ground
 from meshsimp_pymoo.surface.closed.lining import lined_closed_model
 from meshsimp_pymoo.surface.closed.live import build
@@ -67,6 +68,7 @@ class ClosedSurface(ModelSurface):
         self.pinned[self.model.poles] = True
         if self.model.lines is not None:
             self.pinned[self.model.lines.vertices] = True
+        self._free: dict[bool, ClosedFreeGround] = {}
         is_small = self.n_vertices < LARGE
         self._workspaces = Reserve(partial(make_workspace, self.n_vertices), is_small)
         has_holes = len(self.model.rim) > 0
@@ -120,8 +122,11 @@ class ClosedSurface(ModelSurface):
         """Return the model's arrays and the rules for compiled functions."""
         return self._ground
 
-    def free_ground(self, *, centroids: bool = True) -> None:
-        """Return nothing: the edges of closed meshes follow from their vertices."""
+    def free_ground(self, *, centroids: bool = True) -> ClosedFreeGround:
+        """Return what the free meshes of this surface have in common; see `closed.free`."""
+        if centroids not in self._free:
+            self._free[centroids] = ClosedFreeGround(self.model, self._ground, self.pinned, centroids=centroids)
+        return self._free[centroids]
 
     def measuring(self, measure: str) -> ClosedSurface:
         """Return this surface with another measure of the error, or itself."""
@@ -130,6 +135,7 @@ class ClosedSurface(ModelSurface):
         other = copy.copy(self)
         other.rules = replace(self.rules, measure=measure)
         other.__dict__.pop("_ground", None)
+        other._free = {}
         return other
 
     def bounded(self, most: float, *, own: float = 0.0) -> ClosedSurface:
@@ -148,6 +154,7 @@ class ClosedSurface(ModelSurface):
                 raise ValueError(f"{name} = {value!r} is no number of at least 0")
         other = copy.copy(self)
         other.rules = replace(self.rules, measure="error")  # the sum of these costs
+        other._free = {}
         other._ground = self._ground._replace(bound=float(most), own=float(own), weighed=True, by_peak=False)
         return other
 
@@ -322,7 +329,7 @@ class ClosedSurface(ModelSurface):
 
     def __getstate__(self) -> dict[str, Any]:
         unstored = ("_ground", "_between", "view")
-        return {name: value for name, value in self.__dict__.items() if name not in unstored}
+        return {name: value for name, value in self.__dict__.items() if name not in unstored} | {"_free": {}}
 
 
 def _refuse_rules(name: str, rules: Rules) -> None:
