@@ -84,7 +84,7 @@ from meshsimp_pymoo.surface.measures import (
     VERTICES,
 )
 from meshsimp_pymoo.surface.model import OpenModel
-from meshsimp_pymoo.surface.moves import answers
+from meshsimp_pymoo.surface.moves import answers, flip, settle, shift, swap
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules
 from meshsimp_pymoo.workers import Reserve
 
@@ -556,22 +556,22 @@ def anneal_freely(
         what = unit(state)
         if what < shares.flip or n_movable[0] == 0:
             t = drawn(n_records, first, share, state) * RECORD
-            accepted[0] += moves.flip(free, live, t + below(state, 3), most, limit, state)
+            accepted[0] += flip(free, live, t + below(state, 3), most, limit, state)
             continue
         q = drawn(n_movable[0], first, share, state)
         v = movable[q]
         if what < shares.flip + shares.shift:
-            w = moves.shift(free, live, v, most, limit, state)
+            w = shift(free, live, v, most, limit, state)
             accepted[1] += w >= 0
         else:
-            w = moves.swap(free, live, v, most, limit, first, share, state)
+            w = swap(free, live, v, most, limit, first, share, state)
             accepted[2] += w >= 0
         if w >= 0:
             if live.site[v]:  # there was room for one more
                 q = n_movable[0]
                 n_movable[0] += 1
             movable[q] = w
-    moves.settle(free, live)
+    settle(free, live)
     visited[0] += n_moves
     return n_moves
 

@@ -184,12 +184,12 @@ def test_whatever_moves_a_free_mesh_is_valid_and_its_cost_as_of_a_slow_twin(name
         np.testing.assert_array_equal(first, canonical_faces(surface.triangles(kept)))
         assert cost == pytest.approx(costs(surface, free), rel=1e-9)
         state = np.array([k + 1], np.uint64)
-        for hot in (0.3, 0.02, 0.0):
+        for hot in (1e3, 0.3, 0.02, 0.0):  # at first whatever may be is made
             hot *= cost / free.movable
             free.anneal(3000, state, hot=hot, cold=0.1 * hot, triangles=triangles)
-            if hot > 0.0 and name == "parts":  # the twin looks at all of all
-                continue
             check(surface, free, first, ratio=ratio)
+            if 0.0 < hot < 1.0 and name == "parts":  # the twin looks at all of all
+                continue
             assert free.triangles == triangles
             assert free.cost == pytest.approx(costs(surface, free), rel=1e-7)
         assert (free.accepted > 0).all()
@@ -262,7 +262,7 @@ def test_an_edge_that_cuts_a_corner_of_a_box_flips():
 # ------------------------------------------------------------------------------------------------------------ a search
 
 
-def front_of(problem, moves=60_000):
+def front_of(problem, moves=40_000):
     return Front.from_result(minimize(problem, memetic(12, triangulation="free"), Moves(moves), seed=3))
 
 
