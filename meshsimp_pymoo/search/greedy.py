@@ -185,7 +185,8 @@ def greedy_insertion(
     surface : Surface
         The original mesh of N vertices and its rules; see :func:`thinning`.
     pinned : (N,) bool array, optional
-        Vertices to start from, besides those that the surface pins. They must span a triangle of the mesh.
+        Vertices to start from, besides those that the surface pins. They must span a triangle of the mesh; what each
+        of several parts lacks for a mesh of its own is added.
     choose : {"point", "triangle"}
         The vertex with the largest cost of all, or that of the triangle with the largest sum of costs.
     most : int, optional
@@ -212,7 +213,7 @@ def greedy_insertion(
         raise ValueError(f"choose={choose!r} is unknown; use 'point' or 'triangle'")
     if most is not None and most < 0:
         raise ValueError(f"most={most} is no number of vertices; give 0 or more")
-    fixed = _fixed(surface, pinned)
+    fixed = surface.spanning(_fixed(surface, pinned))
     n_all = surface.n_vertices
     flag = stop_flag(stop)
     _error(least_error, "least_error")

@@ -109,7 +109,9 @@ def sharp_edges(model: Mesh, degrees: float) -> IntArray:
     table = edge_table(model.faces)
     pairs = table.first[table.n_triangles == 2]
     faces = np.column_stack([table.order[pairs], table.order[pairs + 1]]) % len(model.faces)
-    angle = _angles(area_vectors(model.points, model.faces), faces)
+    # scaled by a power of two, which rounds nothing, so that squares of areas stay in the range of doubles
+    points = np.ldexp(model.points, -int(np.frexp(model.diagonal)[1]))
+    angle = _angles(area_vectors(points, model.faces), faces)
     edges = highest(model.xy)[table.ends[table.n_triangles == 2][angle > degrees]]
     return edges[edges[:, 0] != edges[:, 1]]
 

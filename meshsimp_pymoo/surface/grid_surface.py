@@ -256,6 +256,10 @@ class GridSurface:
         """Refuse, as :meth:`ground` says."""
         raise self._no_moves()
 
+    def spanning(self, kept: BoolArray) -> BoolArray:
+        """Return the subset: there are no parts."""
+        return kept
+
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> AbstractContextManager[Any]:
         """Refuse, as :meth:`ground` says."""
         raise self._no_moves()

@@ -21,8 +21,13 @@ DIGITS = 2
 
 
 def smallest_mesh(surface: Surface) -> int:
-    """Return how many triangles the mesh of the pinned vertices alone has, those of break lines among them."""
-    return int(surface.evaluate(surface.pinned[None])[0, TRIANGLES])
+    """Return how many triangles the mesh of the pinned vertices alone has, those of break lines among them.
+
+    Of a closed surface with what each part needs besides.
+    """
+    triangles = int(surface.evaluate(surface.spanning(surface.pinned)[None])[0, TRIANGLES])
+    # the pole of a single part alone spans nothing
+    return surface.least_triangles if triangles == 0 and isinstance(surface, ClosedSurface) else triangles
 
 
 def facts_of_lines(surface: Surface, lines: ModelLines) -> dict[str, Any]:

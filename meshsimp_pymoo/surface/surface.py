@@ -352,6 +352,10 @@ class Surface(Protocol):
         """
         ...
 
+    def spanning(self, kept: BoolArray) -> BoolArray:
+        """Return a subset (N,) with what each of several parts needs for a mesh; the one given where nothing lacks."""
+        ...
+
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> AbstractContextManager[Any]:
         """Lend the record of the triangulation of a subset, to be changed by moves until the context ends.
 
@@ -370,6 +374,10 @@ class ModelSurface:
     def n_vertices(self) -> int:
         """Number N of original vertices."""
         return int(self.model.n_vertices)
+
+    def spanning(self, kept: BoolArray) -> BoolArray:
+        """Return the subset: it has no parts that would need vertices of their own."""
+        return kept
 
     @property
     def points(self) -> FloatArray:

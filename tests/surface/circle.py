@@ -202,6 +202,10 @@ class Circle:
         other._ground = self.ground()._replace(bound=float(most), own=float(own), is_sum=True)
         return other
 
+    def spanning(self, kept: BoolArray) -> BoolArray:
+        """Return the subset: there are no parts."""
+        return kept
+
     @contextmanager
     def books(self, kept: BoolArray, *, fixed: BoolArray | None = None) -> Iterator[Any]:
         """Lend a record of the kept points; all are at places of their own."""

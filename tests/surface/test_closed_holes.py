@@ -27,6 +27,7 @@ from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
 from meshsimp_pymoo.surface.closed.surface import ClosedSurface
 from meshsimp_pymoo.surface.measures import ERROR, MAXIMUM, SQUARES, TRIANGLES, UNCOVERED, VERTICES
 from meshsimp_pymoo.surface.rules import Rules
+from meshsimp_pymoo.surface.smallest import smallest_mesh
 
 MAKE = {"holed": holed, "bowl": bowl, "parts": parts}
 CLOSED = Options(surface="closed")
@@ -461,3 +462,23 @@ def test_rims_are_listed_with_the_face_on_their_left():
     model = opened("holed")
     halves = {(a, b) for face in model.faces.tolist() for a, b in pairwise([*face, face[0]])}
     assert all((a, b) in halves and (b, a) not in halves for a, b in model.rim.tolist())
+
+
+def test_insertion_gives_every_part_a_mesh_however_little_it_counts():
+    part = trimesh.creation.icosphere(subdivisions=2)
+    crumb = trimesh.creation.icosphere(subdivisions=1, radius=1e-3)
+    crumb.apply_translation([3.0, 0.0, 0.0])
+    model = open_model(trimesh.util.concatenate([part, crumb]), Options(surface="closed"))
+    weights = np.where(model.points[:, 0] > model.points[:, 0].max() - 0.1, 0.0, 1.0)[np.argsort(model.source_index)]
+    surface = ClosedSurface(model, Rules(weights=weights))
+    front = greedy_insertion(surface, most=20)
+    assert np.isfinite(front.error).all()
+    assert front.error[0] == pytest.approx(surface.evaluate(front.kept(0))[0, ERROR], rel=1e-9)
+    assert front.triangles[0] == 2 * surface.spanning(surface.pinned).sum() - 8
+    kept = np.ones(surface.n_vertices, bool)
+    assert surface.spanning(kept) is kept
+
+
+def test_the_smallest_mesh_with_lines_has_four_vertices_of_each_part():
+    rims = ClosedSurface(opened("parts"), Rules(break_lines="outline"))
+    assert smallest_mesh(rims) == rims.evaluate(rims.spanning(rims.pinned))[0, TRIANGLES] > 0

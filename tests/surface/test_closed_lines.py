@@ -516,3 +516,11 @@ def test_images_that_were_stored_bring_the_lines_that_were_laid_on_them(name):
         )
         with pytest.raises(ModelError, match="images of other break lines"):
             as_stored(surface, spoilt)
+
+
+@pytest.mark.parametrize("size", [1e-50, 1e60])
+def test_sharp_edges_are_found_in_whatever_unit(size):
+    box = trimesh.creation.box().subdivide()
+    box.vertices *= size
+    lines = ClosedSurface(closed_model(of_mesh(box, "box")), Rules(break_lines="sharp:30")).model.lines
+    assert len(lines.chains) == 12

@@ -96,6 +96,24 @@ class ClosedSurface(ModelSurface):
         pinned = np.bincount(self.model.part[self.pinned], minlength=self.model.n_parts)
         return int((2 * np.maximum(pinned, LEAST_VERTICES) - 4).sum())
 
+    def spanning(self, kept: BoolArray) -> BoolArray:
+        """Return a subset (N,) with what is pinned and, of several parts, a fourth vertex of each that has three.
+
+        It is the one farthest from the middle of the part's pole.
+        """
+        model = self.model
+        found = kept | self.pinned
+        short = np.flatnonzero(np.bincount(model.part[found], minlength=model.n_parts) < LEAST_VERTICES)
+        if model.n_parts == 1 or len(short) == 0:
+            return kept
+        middle = self.points[model.poles].mean(axis=1)[model.part]
+        rows = np.flatnonzero(np.isin(model.part, short) & ~found)
+        away = np.linalg.norm(self.points[rows] - middle[rows], axis=1)
+        order = np.lexsort((-away, model.part[rows]))
+        first = np.unique(model.part[rows][order], return_index=True)[1]
+        found[rows[order[first]]] = True
+        return found
+
     @property
     def places(self) -> FloatArray:
         """The vertices (N, 3), for cuts through the surface."""
