@@ -690,6 +690,8 @@ class _Depth(NamedTuple):
         last = np.array(self.z.shape)[::-1] - 1
         for line in lines:
             steps = np.linalg.norm(np.diff(line[:, :2], axis=0), axis=1) / (2.0 * self.size)
+            if not steps.any():  # a line that leads away from the viewer is a point
+                continue
             at = np.concatenate([k + np.arange(n) / n for k, n in enumerate(np.ceil(steps).astype(int)) if n])
             at = np.append(at, len(line) - 1)
             places = np.column_stack([np.interp(at, np.arange(len(line)), line[:, k]) for k in range(3)])

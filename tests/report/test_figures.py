@@ -17,6 +17,7 @@ from meshsimp_pymoo.report.figures import (
     AMBIENT,
     ERROR_SHADE,
     LIGHT,
+    _Depth,
     error_figure,
     front_figure,
     hillshade,
@@ -553,3 +554,11 @@ def test_uncovered_vertices_of_a_body_are_marked():
         drawn = [np.asarray(part.get_array()) for part in panel.get_images()]
         blue.append(sum((part[..., 2] > part[..., 0]).sum() for part in drawn))
     assert blue[0] > 1.5 * blue[1]  # but for the inside
+
+
+def test_a_line_that_leads_away_from_the_viewer_is_not_drawn():
+    depth = _Depth(np.zeros((4, 4)), np.zeros(2), 0.25, 0.01)
+    away = np.array([[0.5, 0.5, 0.0], [0.5, 0.5, 1.0]])
+    across = np.array([[0.1, 0.5, 0.0], [0.9, 0.5, 0.0]])
+    (seen,) = depth.in_sight([away, across])
+    np.testing.assert_allclose(seen[[0, -1]], across[:, :2])
