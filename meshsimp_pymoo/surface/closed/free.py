@@ -48,6 +48,7 @@ from meshsimp_pymoo.surface.closed.books import (
     make_live,
 )
 from meshsimp_pymoo.surface.closed.distance import is_in_mesh
+from meshsimp_pymoo.surface.closed.embedding import are_poles
 from meshsimp_pymoo.surface.closed.evaluate import is_hole, is_outside
 from meshsimp_pymoo.surface.closed.ground import ClosedGround, to_poles
 from meshsimp_pymoo.surface.closed.live import (
@@ -577,8 +578,7 @@ def _centroids_of(model: ClosedModel) -> tuple[FloatArray, FloatArray, FloatArra
     faces = model.faces
     a, b, c = (model.points[faces[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    poles = {tuple(row) for row in np.sort(model.poles, axis=1).tolist()}
-    rows = np.flatnonzero([tuple(row) not in poles for row in np.sort(faces, axis=1).tolist()])
+    rows = np.flatnonzero(~are_poles(faces, model.poles))
     place = np.rint(model.xy[faces[rows]].sum(axis=1) / (3.0 * QUANTUM)) * QUANTUM
     order = np.argsort(hilbert_keys(place), kind="stable")
     rows = rows[order]

@@ -281,8 +281,8 @@ class ClosedModel(Mesh):
         weighted += "" if self.lines is None else f", {count(len(self.lines.chains), 'break line')}"
         size = " x ".join(f"{side:.4g}" for side in np.ptp(self.points, axis=0))
         return (
-            f"<ClosedModel {self.name}: {self.n_vertices:,} vertices, {len(self.faces):,} triangles{weighted}, "
-            f"{size} {length_unit(self.georeference)}>"
+            f"<ClosedModel {self.name}: {self.n_vertices:,} vertices, {len(self.faces):,} triangles"
+            f"{self.parts_and_holes}{weighted}, {size} {length_unit(self.georeference)}>"
         )
 
     @property
