@@ -31,6 +31,7 @@ from meshsimp_pymoo.formats.table import (
     refuse_foreign,
 )
 from meshsimp_pymoo.plane.lattice import cells
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.settings import by_name, settings_of, taken
 from meshsimp_pymoo.surface.closed.model import ClosedModel, Topology, closed_model, has_border, topology
 from meshsimp_pymoo.surface.grid import HeightGrid
@@ -111,6 +112,7 @@ def open_model(model: Source | Model, options: Options = DEFAULT) -> Model:
     return built
 
 
+@brief
 @dataclass(frozen=True)
 class Judged:
     """What a mesh is taken for.

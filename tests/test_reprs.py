@@ -110,7 +110,10 @@ F = [[1, 15], [0, 20]]
         ),
         (BODY.model, "<ClosedModel sphere:100: 100 vertices, 196 triangles, 1.981 x 1.981 x 1.978 model units>"),
         (BODY, "<ClosedSurface of sphere:100: 100 vertices, 3 pinned, error measured>"),
-        (topology(BODY.faces), "Topology(components=1, loops=0, crowded=0, touching=0, mismatched=0, genus=0)"),
+        (
+            topology(BODY.faces),
+            "Topology(components=1, loops=0, rim_edges=0, crowded=0, touching=0, mismatched=0, genus=0, with_handles=0, fault=None)",
+        ),
         (open_grid(np.zeros((40, 30))), "<HeightGrid grid: 40 rows of 30 samples>"),
         (
             GridSurface(open_grid(np.zeros((40, 30)))),

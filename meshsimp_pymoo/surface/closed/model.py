@@ -16,6 +16,7 @@ from meshsimp_pymoo.formats.source import SourceMesh
 from meshsimp_pymoo.plane.faces import canonical_faces
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint, rim_footprint
 from meshsimp_pymoo.plane.hilbert import HILBERT_BITS, hilbert_keys
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.closed.embedding import cell_of, embed, faults
 from meshsimp_pymoo.surface.edges import Edges, border_loops, components, next_corner
 from meshsimp_pymoo.surface.lines import ModelLines
@@ -97,6 +98,7 @@ def topology(faces: IntArray) -> Topology:
     return _Fans.of(np.asarray(faces, np.int64)).topology
 
 
+@brief
 @dataclass(frozen=True)
 class _Fans:
     """The corners of faces that meet along edges at one vertex: what would be a vertex if nothing met in points alone.
