@@ -112,7 +112,8 @@ F = [[1, 15], [0, 20]]
         (BODY, "<ClosedSurface of sphere:100: 100 vertices, 3 pinned, error measured>"),
         (
             topology(BODY.faces),
-            "Topology(components=1, loops=0, rim_edges=0, crowded=0, touching=0, mismatched=0, genus=0, with_handles=0, fault=None)",
+            "Topology(components=1, loops=0, rim_edges=0, crowded=0, touching=0, mismatched=0, genus=0, "
+            "with_handles=0, fault=None)",
         ),
         (open_grid(np.zeros((40, 30))), "<HeightGrid grid: 40 rows of 30 samples>"),
         (
