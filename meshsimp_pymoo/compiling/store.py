@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from functools import cache, cached_property
 from inspect import getclosurevars
 from pathlib import Path
-from types import CodeType
+from types import CodeType, ModuleType
 from typing import Any, NamedTuple
 
 import llvmlite
@@ -123,10 +123,15 @@ def parts_of(function: Any) -> Iterator[Any]:
             continue
         waiting += getattr(item, "parts", [])
         found = getclosurevars(item)
-        for value in (*found.globals.values(), *found.nonlocals.values()):
-            owner = getattr(value, "__module__", None)
-            if owner is None or owner.partition(".")[0] not in ("numpy", "numba", "builtins", "typing"):
-                waiting.append(value)
+        named = [*found.globals.values(), *found.nonlocals.values()]
+        for module in [value for value in named if isinstance(value, ModuleType) and _is_ours(value.__name__)]:
+            named += [vars(module)[name] for name in sorted(found.unbound) if name in vars(module)]
+        waiting += [value for value in named if _is_ours(getattr(value, "__module__", None))]
+
+
+def _is_ours(module: str | None) -> bool:
+    """Tell whether what is in a module, or nobody knows where, may be another thing with the same version of NumPy."""
+    return module is None or module.partition(".")[0] not in ("numpy", "numba", "builtins", "typing", "math")
 
 
 def _code(code: CodeType) -> str:

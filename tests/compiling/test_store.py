@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from types import ModuleType
 from typing import NamedTuple
 
 import numba
@@ -187,6 +188,23 @@ def test_code_of_a_loop_is_made_from_the_answers_of_the_surfaces(monkeypatch):
     known = made_from(thin.py_func)
     monkeypatch.setattr(trial, "MOST_TOUCHED", trial.MOST_TOUCHED + 1)
     assert made_from(thin.py_func) != known
+
+
+def test_code_is_made_from_what_it_calls_by_the_name_of_a_module():
+    """Not only from what was imported by its own name."""
+
+    def calling(constant):
+        tools = ModuleType("tools")
+        tools.limit, tools.other = constant, constant
+
+        @entry
+        def most(a: float) -> float:
+            return min(a, tools.limit)
+
+        return most.py_func
+
+    assert made_from(calling(1.0)) == made_from(calling(1.0))
+    assert made_from(calling(2.0)) != made_from(calling(1.0))
 
 
 def test_code_is_made_from_how_it_is_made(monkeypatch):
