@@ -22,8 +22,9 @@ from meshsimp_pymoo.warming import PARTS, SEARCH, WISH, Warming
 # a search could begin with insertion: functions of their own, none of them twice. 190 until the meshes of a front were
 # measured between the vertices (surface/evaluate.py) and thinning was cut into parts that free meshes go on with. 205
 # until edges could be forced (plane/constraints.py): asked of records and of addresses of records. 225 until footprints
-# could be bits (plane/footprint.py) and moves went along the vector by windows (search/local_search.py).
-MOST_SPECIALISATIONS = 228
+# could be bits (plane/footprint.py) and moves went along the vector by windows (search/local_search.py). 228 until they
+# could be what lies within no rim (plane/footprint.py), which closed surfaces with holes ask.
+MOST_SPECIALISATIONS = 229
 
 
 def test_what_python_calls_is_in_one_part_each():
