@@ -769,7 +769,7 @@ LEAST_HOLE, MOST_HOLES, BETWEEN_HOLES = 3.0, 12, 2.0
 
 def _with_holes(directions: FloatArray, faces: IntArray, holes: int, seed: int) -> IntArray:
     """Cut discs of different sizes out of the faces (F, 3) of a sphere; their rims are ragged, as scans have them."""
-    from meshsimp_pymoo.surface.edges import Edges, components
+    from meshsimp_pymoo.surface.edges import Edges, components, largest_sound_part
 
     _check_range("holes", holes, 0, MOST_HOLES)
     gap = _gap_on_sphere(len(directions))
@@ -798,16 +798,7 @@ def _with_holes(directions: FloatArray, faces: IntArray, holes: int, seed: int) 
     first, second = Edges.of(faces[cut]).pairs
     part = components(int(cut.sum()), first // 3, second // 3)
     cut[cut] = np.isin(part, np.argsort(-np.bincount(part), kind="stable")[:holes])
-    left = faces[~cut]
-    while True:
-        edges = Edges.of(left)
-        first, second = edges.pairs
-        part = components(len(left), first // 3, second // 3)
-        starts = np.bincount(edges.ends(edges.border)[:, 0], minlength=len(directions))
-        sound = (part == np.argmax(np.bincount(part))) & (starts[left] < 2).all(axis=1)
-        if sound.all():
-            return left
-        left = left[sound]
+    return largest_sound_part(faces[~cut])
 
 
 def _outwards(points: FloatArray, faces: npt.NDArray[Any]) -> IntArray:

@@ -121,6 +121,19 @@ def border_loops(edges: Edges) -> tuple[int, int]:
     return len(np.unique(loop[start])), int((fans_per_vertex > 1).sum())
 
 
+def largest_sound_part(faces: IntArray) -> IntArray:
+    """Return the faces of the largest part of a mesh, less those at vertices in which rims meet."""
+    while True:
+        edges = Edges.of(faces)
+        first, second = edges.pairs
+        part = components(len(faces), first // 3, second // 3)
+        starts = np.bincount(edges.ends(edges.border)[:, 0], minlength=int(faces.max()) + 1)
+        sound = (part == np.argmax(np.bincount(part))) & (starts[faces] < 2).all(axis=1)
+        if sound.all():
+            return faces
+        faces = faces[sound]
+
+
 def single_precision(points: FloatArray, seen: FloatArray | None = None) -> float:
     """Return how far apart two vertices may lie that single precision does not tell apart [units of the points].
 

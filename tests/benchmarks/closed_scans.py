@@ -8,7 +8,7 @@ from scipy.sparse import linalg
 from scipy.spatial import cKDTree
 
 from meshsimp_pymoo.arrays import FloatArray, IntArray
-from meshsimp_pymoo.surface.edges import Edges, components
+from meshsimp_pymoo.surface.edges import Edges, largest_sound_part
 
 # How deep the back is that a front gets, over the front; how high the foot is that is cut off, of all, and what is
 # tried where that leaves several rims; how ragged the cut is [edges].
@@ -96,16 +96,7 @@ def _membrane(height: FloatArray, faces: IntArray, outline: IntArray) -> FloatAr
 def _cut_off(points: FloatArray, faces: IntArray, foot: float, rags: float, rng: np.random.Generator) -> IntArray:
     """Return the faces above a height that wavers; one part, in which no rims meet in a vertex."""
     height = points[faces, 1].mean(axis=1) + rags * rng.uniform(-1.0, 1.0, len(faces))
-    left = faces[height > points[:, 1].min() + foot * np.ptp(points[:, 1])]
-    while True:
-        edges = Edges.of(left)
-        first, second = edges.pairs
-        part = components(len(left), first // 3, second // 3)
-        starts = np.bincount(edges.ends(edges.border)[:, 0], minlength=len(points))
-        sound = (part == np.argmax(np.bincount(part))) & (starts[left] < 2).all(axis=1)
-        if sound.all():
-            return left
-        left = left[sound]
+    return largest_sound_part(faces[height > points[:, 1].min() + foot * np.ptp(points[:, 1])])
 
 
 def rim_distance(original: Mesh, simplified: Mesh) -> tuple[float, float]:

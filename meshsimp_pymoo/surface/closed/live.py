@@ -368,7 +368,7 @@ def _enter_idle(g: ClosedGround, live: ClosedLive, i: int) -> None:
 
 @inner
 def tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> float:
-    """Return the change of cost by what :func:`_replace` made, or inf once it is known to exceed the limit."""
+    """Return the change of cost by what was noted to go and come, or inf once it is known to exceed the limit."""
     tally = live.tally
     head, following = live.head, live.following
     scratch = len(live.squares) - 1
@@ -406,7 +406,7 @@ def tried(g: ClosedGround, live: ClosedLive, v: int, w: int, limit: float) -> fl
 
 @inner
 def undo(live: ClosedLive, n_free: int, end: int) -> None:
-    """Take back what :func:`_replace` made, with a log."""
+    """Take back what was written into the records, with a log."""
     tally = live.tally
     for k in range(tally[N_CAME]):
         t = np.int64(live.came[k])
@@ -427,7 +427,7 @@ def undo(live: ClosedLive, n_free: int, end: int) -> None:
 
 @inner
 def enter(g: ClosedGround, live: ClosedLive, v: int, w: int) -> None:
-    """Enter what :func:`_replace` made into the books."""
+    """Enter what was noted to go and come into the books."""
     tally = live.tally
     mesh, head, following, place, pool = live.mesh, live.head, live.following, live.place, live.pool
     subtotal, amount = live.subtotal, live.amount
