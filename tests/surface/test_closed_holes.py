@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from functools import cache
 from itertools import pairwise
 
@@ -11,7 +10,7 @@ import pytest
 import trimesh
 from scans import as_source, bowl, bumpy, holed, parts, without
 from scipy.spatial import Delaunay
-from test_closed_live import step
+from test_closed_live import check_moves
 from true_distance import distances
 
 from meshsimp_pymoo.errors import ModelError, ModelWarning
@@ -20,7 +19,6 @@ from meshsimp_pymoo.opening import open_model
 from meshsimp_pymoo.plane.faces import edge_table
 from meshsimp_pymoo.search.greedy import greedy_insertion, thinning
 from meshsimp_pymoo.search.local_search import relocate
-from meshsimp_pymoo.surface import moves
 from meshsimp_pymoo.surface.closed import embedding
 from meshsimp_pymoo.surface.closed.embedding import are_poles, discs_in_holes, embed
 from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
@@ -216,44 +214,6 @@ def test_a_part_keeps_four_vertices_whatever_others_have():
 # ---------------------------------------------------------------------------------------------------------------- moves
 
 
-def check_moves(name, measure, steps, every, *, weights=None):
-    """Make random moves, also such that insert and remove, of the same part or of others."""
-    surface = surface_of(name, measure, weights)
-    kept = subset(surface, 0.06, 1)
-    most = 2 * int(kept.sum())
-    part, ground, rng = surface.model.part, surface.ground(), np.random.default_rng(1)
-    refused = 0
-    with surface.books(kept) as books:
-        for number in range(1, steps + 1):
-            v, w = rng.choice(np.flatnonzero(kept & ~surface.pinned)), rng.choice(np.flatnonzero(~kept))
-            kind = rng.random()
-            if kind < 0.25 and kept.sum() < most:
-                v = -1
-            elif kind < 0.55:
-                w = -1
-            change, triangles, before, size, after, new_size = step(ground, books, int(v), int(w), np.inf, True)
-            counts = Counter(part[kept].tolist())
-            if v >= 0 and counts[part[v]] == 4 and (w < 0 or part[w] != part[v]):
-                assert change == np.inf
-                assert after == before
-                refused += 1
-                continue
-            assert new_size - size == triangles
-            assert abs(after - before - change) <= 1e-9 * (1.0 + after)
-            kept[[row for row in (v, w) if row >= 0]] ^= True
-            if number % every:
-                continue
-            sites, cost, n_triangles = moves.snapshot(ground, books, surface.n_vertices)
-            assert np.array_equal(sites, kept)
-            row = surface.evaluate(kept)[0]
-            assert n_triangles == row[TRIANGLES]
-            if measure == "max_error":
-                assert books.peaks[1] == pytest.approx(row[MAXIMUM], rel=1e-12)
-            else:
-                assert cost == pytest.approx(row[COLUMN[measure]], rel=1e-9)
-    return refused
-
-
 CASES = [
     *((name, "error", None) for name in MAKE),
     ("holed", "rms_error", "area"),
@@ -264,13 +224,15 @@ CASES = [
 
 @pytest.mark.parametrize(("name", "measure", "weights"), CASES)
 def test_moves_change_what_they_were_tried_to_and_end_where_scratch_does(name, measure, weights):
-    check_moves(name, measure, 800, 20, weights=weights)
+    surface = surface_of(name, measure, weights)
+    check_moves(surface, subset(surface, 0.06, 1), 800, 20)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "measure", "weights"), CASES)
 def test_many_moves_change_what_they_were_tried_to_and_end_where_scratch_does(name, measure, weights):
-    check_moves(name, measure, 16_000, 40, weights=weights)
+    surface = surface_of(name, measure, weights)
+    check_moves(surface, subset(surface, 0.06, 1), 16_000, 40)
 
 
 def test_a_site_that_no_triangle_uses_costs_what_it_is_from_the_pole():
