@@ -29,7 +29,6 @@ from meshsimp_pymoo.surface.smallest import smallest_mesh
 
 MAKE = {"holed": holed, "bowl": bowl, "parts": parts}
 CLOSED = Options(surface="closed")
-COLUMN = {"error": ERROR, "rms_error": SQUARES, "max_error": MAXIMUM}
 
 
 @cache
