@@ -53,6 +53,7 @@ from meshsimp_pymoo.storage import (
     write_front,
     write_solution,
 )
+from meshsimp_pymoo.surface.accuracy import Compared, compare, compare_subset
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
@@ -88,6 +89,8 @@ if TYPE_CHECKING:
     import pandas
     import trimesh
     from matplotlib.axes import Axes
+
+    from meshsimp_pymoo.report.statement import QualityStatement
 
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
@@ -151,6 +154,38 @@ class FrontSolution(_Numbers):
     def refit(self, *, until: float | None = None) -> Refitted:
         """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
         return self.front.surface.refit(self.simplified, until=until)
+
+    def accuracy(self, *, refitted: bool = False) -> QualityStatement:
+        """Measure the mesh in the words of surveyors: LE90, bias, NMAD, coverage, distances in space and more.
+
+        ``solution.accuracy().save("quality")`` writes the statement as data, as a page, and of a raster its residuals.
+
+        Parameters
+        ----------
+        refitted : bool
+            Measure the mesh with its vertices where their error is least instead.
+
+        Returns
+        -------
+        QualityStatement
+            All numbers are attributes; see :class:`~meshsimp_pymoo.surface.accuracy.Accuracy`.
+        """
+        from meshsimp_pymoo.report.statement import stated
+
+        return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
+
+    def _compared(self, *, refitted: bool = False) -> Compared:
+        """Return the mesh beside its original; that of tiles is not held at once."""
+        surface = self.front.surface
+        if isinstance(surface, GridSurface) and not refitted:
+            return compare_subset(surface, self.kept | surface.pinned)
+        return compare(surface, self.refitted if refitted else self.simplified)
+
+    def _called(self, *, refitted: bool = False) -> dict[str, Any]:
+        """Return what a statement of quality calls the mesh."""
+        stored = self.front.folder is not None and self.solution < len(self.front)
+        name = f"solution {self.solution}" + f" of {self.front.folder}" * stored
+        return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
 
     @property
     def points(self) -> FloatArray:

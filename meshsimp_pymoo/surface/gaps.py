@@ -27,8 +27,8 @@ from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import on_threads
 
 # Columns of the table of rows: sum, sum of squares and maximum of the deviations, uncovered samples; and between the
-# row and the next the sum of the deviations, the number of faces and that of those whose centroid is covered, each times
-# the widths of cells.
+# row and the next the sum of the deviations, the number of faces and that of those whose centroid is covered, each
+# times the widths of cells.
 _SUM, _SQUARES, _MAXIMUM, _UNCOVERED, _BETWEEN, _FACES, _COVERED = range(7)
 
 

@@ -22,8 +22,9 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, height_on, lo
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.centroids import Between
 from meshsimp_pymoo.surface.evaluate import measure_between
-from meshsimp_pymoo.surface.gaps import emitted_of, residual_bands_with_gaps, tabulated_with_gaps
+from meshsimp_pymoo.surface.gaps import covered_share, emitted_of, residual_bands_with_gaps, tabulated_with_gaps
 from meshsimp_pymoo.surface.grid import Cells, HeightGrid
+from meshsimp_pymoo.surface.ground import make_ground
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -36,7 +37,7 @@ from meshsimp_pymoo.surface.measures import (
     as_quality,
 )
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
-from meshsimp_pymoo.surface.score import measured_angles
+from meshsimp_pymoo.surface.score import measured_angles, mesh_deviation
 from meshsimp_pymoo.workers import on_threads
 
 
@@ -223,6 +224,20 @@ def residual_bands(grid: HeightGrid, mesh: WeldedMesh) -> Iterator[tuple[int, Fl
             grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table, residuals
         )
         yield first, residuals, np.ones(band.shape, bool)
+
+
+def coverage(grid: HeightGrid, mesh: WeldedMesh) -> float:
+    """Return the share of the area of the grid's faces whose centroids a mesh covers: 1 where it has no gaps."""
+    if grid.lattice is None:
+        return 1.0
+    between = grid.between
+    if isinstance(between, Cells):
+        return covered_share(grid, (mesh.xy, mesh.z, mesh.records, mesh.emitted), between)
+    assert grid.model is not None
+    ground = make_ground(grid.model, Rules())._replace(xy=between.xy, z=between.z, nearest=False)
+    vertices = np.column_stack([mesh.xy * grid.unit, mesh.z])
+    _, covered = mesh_deviation(ground, vertices, mesh.unsorted_faces)
+    return float(between.share[covered].sum())
 
 
 def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, IntArray]]:
