@@ -670,9 +670,8 @@ class Rounding:
             does.append(f"turns over or flattens {self.turned:,} triangle{'s' * (self.turned > 1)}")
         if not does:
             return
-        known = written_formats().values()
-        exact = listed(other.name for other in known if not other.single_precision)
-        stating = listed(other.name for other in known if other.states_origin)
+        exact = listed(other.name for other in _kept_formats() if not other.single_precision)
+        stating = listed(other.name for other in _kept_formats() if other.states_origin)
         warnings.warn(
             f"{name}: {self.kind.name} holds single precision, which {listed(does)}; {exact} keep them exactly"
             + ("" if self.kind.states_origin else f", {stating} states a local origin"),
@@ -681,14 +680,18 @@ class Rounding:
         )
 
 
+def _kept_formats() -> list[Format]:
+    """Return the formats that a mesh can be read from again, which are named in place of one that loses something."""
+    return [kind for kind in written_formats().values() if kind.read is not None]
+
+
 def warn_of_left_behind(kind: Format, name: str, attributes: Iterable[str]) -> None:
     """Warn if the format holds not all of what is known of the vertices."""
     lost = [] if kind.keeps is None else sorted(set(attributes) - set(kind.keeps))
     if lost:
-        exact = [other.name for other in written_formats().values() if other.keeps is None]
+        exact = listed(other.name for other in _kept_formats() if other.keeps is None)
         warnings.warn(
-            f"{name}: {kind.name} does not hold {listed(lost)[:200]} of the vertices; "
-            f"{listed(exact)} {'do' if len(exact) > 1 else 'does'}",
+            f"{name}: {kind.name} does not hold {listed(lost)[:200]} of the vertices; {exact} does",
             ModelWarning,
             stacklevel=3,
         )
