@@ -123,6 +123,9 @@ class Format(NamedTuple):
         Whether it says from which origin its coordinates count; then single precision loses nothing that matters.
     keeps : tuple of str, optional
         The attributes of vertices that it holds when written, among them "uv", with which the material goes; None: all.
+    pack : callable, optional
+        ``pack(mesh, most)`` returns the mesh compressed so that no vertex moves by more than so many metres, as far as
+        the library can; ``write`` then writes that. A ResultError if the library is missing.
     refuse : callable, optional
         ``refuse(model)`` raises a ResultError if it cannot hold meshes of this model.
     open_heights : callable, optional
@@ -149,6 +152,7 @@ class Format(NamedTuple):
     single: Callable[[OutMesh], FloatArray] | None = None
     states_origin: bool = False
     keeps: tuple[str, ...] | None = ()
+    pack: Callable[[OutMesh, float], OutMesh] | None = None
     refuse: Callable[[Held], None] | None = None
     open_heights: Callable[[Path, str, Options], PlacedHeights] | None = None
     count_samples: Callable[[Path, str], int | None] | None = None
