@@ -181,27 +181,41 @@ class FrontSolution(_Numbers):
         """The simplified mesh in the frame of the model's file, with its colours and attributes."""
         return mesh_of(self.front.surface, self.faces)
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False, compress: bool = False) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
-        A mesh that the front's folder holds in this format is copied, unless it names files beside it or is to be
-        compressed: GLB can be, so that no vertex moves by more than a twentieth of the mean error.
+        A mesh that the front's folder holds in this format is copied, unless it names files beside it.
 
         Raises
         ------
         ResultError
-            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, it cannot be written, or
-            not compressed.
+            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         suffix = path.suffix.lower()
         stored = self.front.stored_mesh(self.solution)
         with new_file(path) as unfinished:
-            if stored is not None and stored.suffix == suffix and not (self.front.has_material or compress):
+            if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.surface, self.faces, compress=compress, error=self.mean_error)
+                write_solution(unfinished, self.front.surface, self.faces)
         return path
+
+    def save_compressed(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> float:
+        """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
+
+        That is no more than a twentieth of its mean error, as far as single precision lets it.
+
+        Raises
+        ------
+        ResultError
+            As :meth:`save` does, or if the format is not compressed, or the library is missing.
+        """
+        path = claim_file(path, written_suffixes(), overwrite=overwrite)
+        with new_file(path) as unfinished:
+            written = write_solution(unfinished, self.front.surface, self.faces, compressed_by=self.mean_error)
+        assert written.packed is not None
+        return written.packed.shift
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""

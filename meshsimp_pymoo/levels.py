@@ -241,18 +241,18 @@ def _with_errors(surface: Surface, chosen: Sequence[FrontSolution], *, refit: bo
         yield _Level(solution, quality, vertices, error)
 
 
-def _packing(mesh: OutMesh) -> dict[str, Any]:
+def _packing(mesh: OutMesh) -> dict[str, float]:
     """Return what is said of a mesh that was compressed."""
-    return {} if mesh.packed is None else {"bits": mesh.packed.bits, "moved_by_at_most_m": mesh.packed.shift}
+    return {} if mesh.packed is None else mesh.packed.said
 
 
 def _write_one(path: Path, ladder: _Ladder, writer: MeshWriter, record: dict[str, Any]) -> list[dict[str, Any]]:
     """Write all levels as one GLB; return what is said of them."""
     meshes, said = [], []
     for k, (level, mesh) in enumerate(ladder.meshes(writer)):
-        packed = writer.packed(mesh, level.quality.mean_error)
-        said.append(ladder.said(k) | {"coverage": ladder.coverage[k]} | _packing(packed))
-        meshes.append(replace(packed, extras={"unit": record["unit"]} | said[-1]))
+        numbers = ladder.said(k) | {"coverage": ladder.coverage[k]}
+        meshes.append(writer.packed(replace(mesh, extras={"unit": record["unit"]} | numbers), level.quality.mean_error))
+        said.append(numbers | _packing(meshes[-1]))
     write_glb(path, meshes, ladder.coverage)
     return said
 

@@ -613,12 +613,24 @@ class MeshWriter:
         warn_of_left_behind(self.kind, model.name, model.attributes)
 
 
-def write_solution(
-    path: Path, surface: Surface, faces: IntArray, *, compress: bool = False, error: float = 0.0
-) -> OutMesh:
+def write_solution(path: Path, surface: Surface, faces: IntArray, *, compressed_by: float | None = None) -> OutMesh:
     """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
 
-    With ``compress`` it is compressed as far as its mean ``error`` [model units] lets it. Returns what was written.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    surface : Surface
+        The original mesh and its rules.
+    faces : (M, 3) int array
+        The triangles.
+    compressed_by : float, optional
+        The mean error of the mesh [model units]: it is compressed as far as that lets it.
+
+    Returns
+    -------
+    OutMesh
+        What was written.
 
     Raises
     ------
@@ -631,8 +643,8 @@ def write_solution(
         If single precision moves vertices by more than rounding or turns triangles over, or the format does not hold
         all that is known of the vertices.
     """
-    writer = MeshWriter(format_of_output(path), surface, compress=compress)
-    written = writer.write(path, writer.mesh(faces), error)
+    writer = MeshWriter(format_of_output(path), surface, compress=compressed_by is not None)
+    written = writer.write(path, writer.mesh(faces), compressed_by or 0.0)
     writer.warn()
     return written
 

@@ -315,8 +315,8 @@ def write_glb(path: Path, meshes: Sequence[OutMesh], coverage: Sequence[float] =
     described: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
     for k, mesh in enumerate(meshes):
-        said = {"extras": dict(mesh.extras)} if mesh.extras else {}
-        described.append({"primitives": [_primitive(mesh, binary)]} | said)
+        extras = dict(mesh.extras) | ({} if mesh.packed is None else mesh.packed.said)
+        described.append({"primitives": [_primitive(mesh, binary)]} | ({"extras": extras} if extras else {}))
         node = {"mesh": k, "translation": upright(mesh)[1].tolist(), "extras": _stated(mesh)}
         nodes.append(({"name": f"level-{k}"} if len(meshes) > 1 else {}) | node)
     used = [LEVELS] * (len(meshes) > 1) + [DRACO] * any(mesh.packed is not None for mesh in meshes)

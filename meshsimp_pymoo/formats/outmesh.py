@@ -55,6 +55,11 @@ class Packed:
     bits: int
     shift: float
 
+    @property
+    def said(self) -> dict[str, float]:
+        """What is said of it beside the mesh, as plain data."""
+        return {"bits": self.bits, "moved_by_at_most_m": self.shift}
+
     def __repr__(self) -> str:
         return f"<Packed: {len(self.faces):,} triangles in {len(self.content):,} bytes, {self.shift:.3g} m off>"
 

@@ -113,6 +113,7 @@ def _write(args: argparse.Namespace, path: Any) -> int:
     from meshsimp_pymoo.errors import Missed
     from meshsimp_pymoo.front import Front
     from meshsimp_pymoo.levels import save_levels
+    from meshsimp_pymoo.search.wishes import in_words
 
     front = Front.load(args.front, model=args.model)
     sizes = args.triangles and [
@@ -123,6 +124,11 @@ def _write(args: argparse.Namespace, path: Any) -> int:
     except Missed as missed:
         say(f"{args.front}: {missed}; nothing is written")
         return TARGET_MISSED
+    if wish := front.run.get("wish"):
+        say(
+            f"note: {args.front} was searched around {in_words(wish)}; far from it the meshes are poor. A search without a "
+            "wish is for all sizes"
+        )
     asked = len(sizes or args.max_error or ())
     if len(levels) < asked:
         say(f"note: {asked - len(levels)} of {asked} levels are the same meshes as others, and left out")
