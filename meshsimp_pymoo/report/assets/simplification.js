@@ -17,6 +17,8 @@ function describe(row) {
   return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles${columns.free[row] ? ", free" : ""}, mean error ${readable(columns.mean_error[row])}${data.unit}`;
 }
 
+const sizeOf = (row) =>
+  `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
 const named = (column) => measures[column]?.label ?? column.replace("_", " ");
 const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
@@ -25,7 +27,7 @@ const percent = (share) => `${d3.format(share < 1e-3 ? ".2~r" : share < 0.0995 ?
 
 // -------------------------------------------------------------------------------------------------------- picking
 
-const state = { row: null, mesh: null, viewer: null, geometry: null };
+const state = { row: null, mesh: null, pinned: null, viewer: null, geometry: null };
 
 const chart = new FrontChart(part("chart"), {
   name: "The front: error against triangles. Each point is a simplified mesh.",
@@ -54,7 +56,7 @@ function step(by) {
 
 document.addEventListener("keydown", (event) => {
   const onChart = part("chart").contains(event.target);
-  if (event.target !== document.body && !onChart) return;
+  if (event.target !== document.body && event.target.tagName !== "BUTTON" && !onChart) return;
   if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
   const moves = { ArrowRight: 1, ArrowLeft: -1 };
   if (onChart) Object.assign(moves, { ArrowUp: -1, ArrowDown: 1, Home: -count, End: count });
@@ -74,8 +76,7 @@ async function pick(row) {
   const file = `${data.stem}_${columns.triangles[row]}.ply`;
   part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
   const solution = data.solutions[row];
-  part("simplified-title").textContent =
-    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
+  part("simplified-title").textContent = sizeOf(row);
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
   const [faces, levels, edges] = solution
@@ -84,10 +85,7 @@ async function pick(row) {
   if (state.row !== row) return; // another one was picked meanwhile
   state.mesh = faces && { row, faces, levels, edges };
   document.documentElement.dataset.shown = row;
-  if (state.viewer) {
-    state.viewer.show(faces, edges);
-    paintErrors();
-  }
+  showMesh();
 }
 
 function refitted(row) {
@@ -192,6 +190,5 @@ part("copy").addEventListener("click", async () => {
 });
 
 if (data.closed?.open) part("inside-key").style.background = data.closed.open.inside;
-colourBar();
 pick(data.chosen === null ? data.knee : data.chosen);
 openViewer();
