@@ -6,6 +6,7 @@ const CLAY = "#e6d6c4";
 const NO_VERTEX = "#9aa0a6"; // simplified surface where the original has none
 const TURN_STEP = Math.PI / 36;
 const TEXTURE_SIZE = 1024; // of the map of the error
+const PALE_WIRES = 5_000; // triangles whose edges are as dark as any
 const FILLED = 0.94; // of the window, by the original as it is first seen
 const CREASE = Math.cos((55 * Math.PI) / 180); // edges at which faces turn by more stay sharp on smooth surfaces
 const VIEWER_LIGHT = [-0.5, 0.6, 0.75]; // from the upper left, in front of the picture
@@ -113,7 +114,6 @@ class MeshPair {
       rim: new THREE.LineBasicMaterial(),
       paper: new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, ...this.lifted }),
       wire: new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide }),
-      wireOver: new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide, color: "#2a3442", transparent: true, opacity: 0.5 }),
     };
     this.textures = {
       texture: image && this.textureOf(image.picture, IMAGE_CHANNEL),
@@ -178,9 +178,12 @@ class MeshPair {
     const wire = new THREE.Mesh(mesh.geometry, this.materials.wire);
     mesh.frustumCulled = wire.frustumCulled = false;
     scene.add(mesh, wire);
+    // over colours that are read, edges are paler the more there are
+    const opacity = Math.min(0.5, (3 * PALE_WIRES) / faces.length);
+    const thin = new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide, color: "#2a3442", transparent: true, opacity });
     const own = new THREE.BufferAttribute(this.own, 3);
     const errors = new THREE.BufferAttribute(new Float32Array(this.own.length), 3);
-    return { faces, scene, mesh, wire, lines: ends && this.linesOf(ends), own, errors, indexed: mesh.geometry, smooth: null, map: null };
+    return { faces, scene, mesh, wire, thin, lines: ends && this.linesOf(ends), own, errors, indexed: mesh.geometry, smooth: null, map: null };
   }
 
   // Its triangles one by one, with normals of their own at each corner.
@@ -240,6 +243,7 @@ class MeshPair {
 
   dispose(part) {
     part.indexed.dispose();
+    part.thin.dispose();
     part.smooth?.dispose();
     part.map?.target.dispose();
     part.map?.material.forEach((material) => material.dispose());
@@ -429,7 +433,7 @@ class MeshPair {
 
   // A relief as high as a face is seen nearly from the front, terrain from a hill beside it.
   reset() {
-    this.look(0, this.relief > 0.2 ? 0.25 : 0.85);
+    this.look(0, this.relief > 0.2 ? 0.25 : 0.6);
   }
 
   key(event) {
@@ -481,7 +485,7 @@ class MeshPair {
     const { colours, isRead } = this;
     const isWire = this.shading === "wireframe";
     part.wire.visible = isWire;
-    part.wire.material = isRead ? this.materials.wireOver : this.materials.wire;
+    part.wire.material = isRead ? part.thin : this.materials.wire;
     part.mesh.geometry = this.isSmooth ? this.smoothed(part) : part.indexed;
     if (isWire && !isRead) part.mesh.material = this.materials.paper;
     else if (colours === "error" && !isOriginal) this.dressInErrors(part);

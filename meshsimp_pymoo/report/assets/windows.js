@@ -10,10 +10,8 @@ const looks = { colours: "plain", end: 1 }; // what the colours are, and where t
 
 // ------------------------------------------------------------------------------------------------------ the colour bar
 
-// The end of the errors' scale: fitted to the shown mesh, or the same for all; a few spikes do not pale all the rest.
-function scaleEnd() {
-  if (part("same-scale").checked) return data.scale_end;
-  const { row, levels } = state.mesh;
+// Where a scale that suits a mesh ends: a few spikes do not pale all the rest.
+function fittedEnd({ row, levels }) {
   const covered = levels.filter((level) => level !== UNCOVERED_LEVEL).sort();
   const level = covered.length ? covered[Math.floor(data.scale_quantile * (covered.length - 1))] : 0;
   return errorAt(row, level) || data.solutions[row].largest || 1;
@@ -33,10 +31,11 @@ function errorColours({ row, levels }, end) {
   return colours;
 }
 
-// Both windows have one scale.
+// Both windows have one scale: that of the shown mesh, or of the coarser one, or the same for all.
 function paintErrors() {
   if (!state.mesh) return;
-  const end = scaleEnd();
+  const meshes = [state.mesh, state.pinned].filter(Boolean);
+  const end = part("same-scale").checked ? data.scale_end : Math.max(...meshes.map(fittedEnd));
   state.viewer.setErrors(errorColours(state.mesh, end));
   if (state.pinned) state.viewer.setErrors(errorColours(state.pinned, end), true);
   looks.end = end;
@@ -79,7 +78,8 @@ function showKey() {
   ticks.replaceChildren(
     ...shown.map((value, k) => {
       const tick = document.createElement("span");
-      tick.textContent = `${k === shown.length - 1 && isMore ? "≥ " : ""}${readable(value)}`;
+      const rounded = colours === "error" ? Number(value.toPrecision(3)) : value;
+      tick.textContent = `${k === shown.length - 1 && isMore ? "≥ " : ""}${readable(rounded)}`;
       tick.style.left = `${at(value)}%`;
       return tick;
     }),
@@ -343,7 +343,7 @@ function steerLook(viewer) {
   each("left", (left) => compareWith(left === "pinned" ? kept : null));
   part("pin").addEventListener("click", () => {
     kept = state.mesh;
-    part("pinned-choice").hidden = false;
+    part("left-choice").hidden = false;
     part("pinned-name").textContent = `solution ${kept.row}`;
     document.querySelector("input[name=left][value=pinned]").checked = true;
     compareWith(kept);
