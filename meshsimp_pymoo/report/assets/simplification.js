@@ -17,6 +17,8 @@ function describe(row) {
   return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles${columns.free[row] ? ", free" : ""}, mean error ${readable(columns.mean_error[row])}${data.unit}`;
 }
 
+const sizeOf = (row) =>
+  `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
 const named = (column) => measures[column]?.label ?? column.replace("_", " ");
 const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
@@ -25,7 +27,7 @@ const percent = (share) => `${d3.format(share < 1e-3 ? ".2~r" : share < 0.0995 ?
 
 // -------------------------------------------------------------------------------------------------------- picking
 
-const state = { row: null, mesh: null, viewer: null, geometry: null };
+const state = { row: null, mesh: null, pinned: null, viewer: null, geometry: null };
 
 const chart = new FrontChart(part("chart"), {
   name: "The front: error against triangles. Each point is a simplified mesh.",
@@ -54,7 +56,7 @@ function step(by) {
 
 document.addEventListener("keydown", (event) => {
   const onChart = part("chart").contains(event.target);
-  if (event.target !== document.body && !onChart) return;
+  if (event.target !== document.body && event.target.tagName !== "BUTTON" && !onChart) return;
   if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
   const moves = { ArrowRight: 1, ArrowLeft: -1 };
   if (onChart) Object.assign(moves, { ArrowUp: -1, ArrowDown: 1, Home: -count, End: count });
@@ -74,8 +76,7 @@ async function pick(row) {
   const file = `${data.stem}_${columns.triangles[row]}.ply`;
   part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
   const solution = data.solutions[row];
-  part("simplified-title").textContent =
-    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
+  part("simplified-title").textContent = sizeOf(row);
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
   const [faces, levels, edges] = solution
@@ -84,10 +85,7 @@ async function pick(row) {
   if (state.row !== row) return; // another one was picked meanwhile
   state.mesh = faces && { row, faces, levels, edges };
   document.documentElement.dataset.shown = row;
-  if (state.viewer) {
-    state.viewer.show(faces, edges);
-    paintErrors();
-  }
+  showMesh();
 }
 
 function refitted(row) {
@@ -191,119 +189,6 @@ part("copy").addEventListener("click", async () => {
   }
 });
 
-// ---------------------------------------------------------------------------------------------------- the two meshes
-
-const UNCOVERED_LEVEL = 255; // other levels q mean an error of (q / 254)^2 times the largest of the solution
-const errorAt = (row, level) => data.solutions[row].largest * (level / 254) ** 2;
-
-// The end of the scale: the same for all solutions, or fitted to the shown one; a few spikes do not pale all the rest.
-function scaleEnd() {
-  if (part("scale").value === "all") return data.scale_end;
-  const { row, levels } = state.mesh;
-  const covered = levels.filter((level) => level !== UNCOVERED_LEVEL).sort();
-  const level = covered.length ? covered[Math.floor(data.scale_quantile * (covered.length - 1))] : 0;
-  return errorAt(row, level) || data.solutions[row].largest || 1;
-}
-
-function paintErrors() {
-  if (!state.mesh) return;
-  const { row, levels } = state.mesh;
-  const end = scaleEnd();
-  const table = Array.from({ length: 256 }, (_, level) => {
-    if (level === UNCOVERED_LEVEL) return data.uncovered_colour;
-    const share = Math.min(1, errorAt(row, level) / end);
-    return data.colours[Math.round(share * (data.colours.length - 1))];
-  });
-  const { points, measured } = state.geometry;
-  const colours = new Float32Array(points.length);
-  levels.forEach((level, i) => {
-    for (let k = 0; k < 3; k++) colours[3 * measured[i] + k] = table[level][k] / 255;
-  });
-  state.viewer.setErrors(colours);
-  part("scale-middle").textContent = readable(end / 2);
-  part("scale-end").textContent = data.solutions.some((solution) => solution && solution.largest > end) ? `≥ ${readable(end)}` : readable(end);
-  if (part("uncovered-key")) part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
-}
-
-function colourBar() {
-  const bar = part("bar");
-  const pen = bar.getContext("2d");
-  data.colours.forEach((rgb, k) => {
-    pen.fillStyle = `rgb(${rgb.join(",")})`;
-    pen.fillRect((k * bar.width) / data.colours.length, 0, bar.width / data.colours.length + 1, bar.height);
-  });
-}
-
-async function openViewer() {
-  const [points, faces, lines, paint] = await Promise.all([
-    unpackArray(data.points),
-    unpackFaces(data.faces),
-    data.lines && unpackArray(data.lines),
-    data.paint && unpackArray(data.paint),
-  ]);
-  state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
-  const { pivot, rotation, scale } = model; // scaled, coordinates are lengths
-  const upright = new Float64Array(points.length);
-  for (let i = 0; i < points.length; i += 3) {
-    for (let k = 0; k < 3; k++) {
-      let sum = 0;
-      for (let j = 0; j < 3; j++) sum += rotation[k][j] * (scale[j] * points[i + j] - pivot[j]);
-      upright[i + k] = sum;
-    }
-  }
-  const canvas = part("canvas");
-  const windows = [part("original-window"), part("simplified-window")];
-  const heights = part("heights"); // which a closed mesh has not
-  let first = true;
-  try {
-    state.viewer = new (data.closed ? BodyPair : MeshPair)(canvas, windows, {
-      positions: upright,
-      faces,
-      lines,
-      paint,
-      channels: data.paint ? data.paint.channels : 0,
-      exaggeration: heights ? heights.valueAsNumber : 1,
-      relief: model.relief,
-      first: data.closed && data.closed.front.map((degrees) => (degrees * Math.PI) / 180),
-      open: data.closed && data.closed.open,
-      onDraw() {
-        if (!first || !state.mesh) return;
-        first = false;
-        performance.mark("first picture");
-        document.documentElement.dataset.ready = "yes";
-      },
-    });
-  } catch (problem) {
-    part("no-3d").hidden = false;
-    part("no-3d").textContent = `The meshes cannot be shown: this browser gives no WebGL (${problem.message}). All else works.`;
-    document.documentElement.dataset.ready = "without WebGL";
-    return;
-  }
-  const viewer = state.viewer;
-  for (const radio of document.querySelectorAll("input[name=look]")) {
-    radio.addEventListener("change", () => {
-      viewer.setMode(radio.value);
-      part("error-key").hidden = radio.value !== "error";
-    });
-  }
-  part("scale").addEventListener("change", paintErrors);
-  heights?.addEventListener("input", () => {
-    part("heights-value").textContent = `× ${readable(heights.valueAsNumber)}`;
-    viewer.setExaggeration(heights.valueAsNumber);
-  });
-  part("lines")?.addEventListener("change", (event) => viewer.showLines(event.target.checked));
-  part("from-above")?.addEventListener("click", () => viewer.look(0, 0));
-  part("from-side")?.addEventListener("click", () => viewer.look(0.6, 1.2));
-  part("quarter-turn")?.addEventListener("click", () => viewer.turn(Math.PI / 2, 0, 1));
-  part("other-side")?.addEventListener("click", () => viewer.turn(Math.PI, 0, 1));
-  part("reset").addEventListener("click", () => viewer.reset());
-  if (state.mesh) {
-    viewer.show(state.mesh.faces, state.mesh.edges);
-    paintErrors();
-  }
-}
-
 if (data.closed?.open) part("inside-key").style.background = data.closed.open.inside;
-colourBar();
 pick(data.chosen === null ? data.knee : data.chosen);
 openViewer();
