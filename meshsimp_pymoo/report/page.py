@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray, Rows
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
@@ -26,7 +26,7 @@ from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import StoredFront
-from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
+from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Measure
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import mesh_lines
@@ -145,11 +145,11 @@ def simplification_page(
     columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
+    first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
         "folder": printable(as_argument(folder)),
-        "measure": measure,
         "closed": _closed_look(surface) if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [
@@ -162,7 +162,11 @@ def simplification_page(
         "refitted_meshes": front.refitted_meshes,
         "knee": knee,
         "chosen": chosen,
-        "series": [{"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()} for name, F in front.series.items()],
+        "searched": _same_order(measure),
+        "series": [
+            {"name": name, "x": F[:, 1].tolist(), "y": _known_errors(F[:, 0], measure, surface.total_weight)}
+            for name, F in front.series.items()
+        ],
         "model": {
             "vertices": model.n_vertices,
             "triangles": len(model.faces),
@@ -195,16 +199,16 @@ def simplification_page(
         heights=None if view.is_closed else _heights(view.exaggeration),
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
-            "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
+            "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
         },
         painted=paint is not None,
         covering=has_border,
         holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",
         further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
-        errors={
-            name: MEASURES[name].label for name in _errors() if any(one is not None for one in columns.get(name, ()))
-        },
+        errors={name: label for name, label in _errors().items() if any(v is not None for v in columns.get(name, ()))},
+        first_error=first_error,
+        unit_sign="" if unit == LENGTH else unit,
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
@@ -229,10 +233,29 @@ def _heights(exaggeration: float) -> dict[str, str]:
     return {"value": f"{value:g}", "step": f"{value / 20:g}", "most": f"{5 * value:g}"}
 
 
-def _errors() -> list[str]:
-    """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
+def _errors() -> dict[str, str]:
+    """Return the columns of errors with what they are called: what a mesh is usually chosen by first, the sum last."""
     errors = [name for name, measure in MEASURES.items() if measure.is_error]
-    return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
+    errors.sort(key=lambda name: (not MEASURES[name].wish, name == "error"))
+    labels = {name: MEASURES[name].label for name in errors}
+    return labels | {"refitted_error": "refitted error (sum)", "error": f"{labels['error']} (sum)"}
+
+
+def _same_order(measure: str) -> list[str]:
+    """Return the measures by which meshes stand in the order of an objective: itself, and its mean if it is the sum."""
+    return [measure] + [
+        name for name, other in MEASURES.items() if other.is_error and other.searched == measure != name
+    ]
+
+
+def _known_errors(objective: FloatArray, measure: str, total_weight: float) -> dict[str, list[float]]:
+    """Return what is known of the errors of meshes by their objective alone, by measure."""
+    if measure != "error":
+        return {measure: objective.tolist()}
+    table = np.zeros((len(objective), REGIONS))
+    table[:, ERROR] = objective
+    of: dict[str, Any] = {name: MEASURES[name].of for name in _same_order(measure)}
+    return {name: of[name](table, total_weight).tolist() for name in of}
 
 
 def spoken(measure: Measure, unit: str = LENGTH, *, closed: bool = False) -> dict[str, str]:

@@ -102,7 +102,8 @@ def used(opened):
 def seen(opened):
     """The page, as it was when it was opened, for a test that only looks at it."""
     if getattr(opened, "used", False):
-        opened.page.reload()
+        opened.page.goto("about:blank")  # for its address says what it shows
+        opened.page.goto(opened.url)
         opened.page.wait_for_selector("html[data-ready]")
         opened.used = False
     yield opened
@@ -121,6 +122,15 @@ def shown(page):
     row = number(page, "solution")
     page.wait_for_selector(f"html[data-shown='{row:.0f}']")
     return int(row)
+
+
+def until(page, condition):
+    """Wait for what the page's policy lets nobody wait for inside it."""
+    for _ in range(200):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(20)
+    pytest.fail(f"never came true: {condition}")
 
 
 def number(page, name):
@@ -281,6 +291,93 @@ def test_knee_and_chosen_solution_are_marked(seen, front):
         dot = chart.locator("circle.front-dot").nth(row)
         place = f"translate({dot.get_attribute('cx')},{dot.get_attribute('cy')})"
         assert chart.locator(f"path.special.{mark}").get_attribute("transform") == place
+
+
+def drawn_heights(page):
+    """Return how high each solution stands in the chart, by its number."""
+    dots = page.locator("#chart circle.front-dot").evaluate_all(
+        "all => all.map((at) => [at.dataset.row, at.cy.baseVal.value])"
+    )
+    return {int(row): y for row, y in dots}
+
+
+@pytest.mark.parametrize("measure", ["max_error", "error"])
+def test_the_chart_shows_any_error_and_the_searches_go_by_it(visit, front, measure):
+    page = visit.page
+    assert page.input_value("#axis") == "mean_error"
+    assert page.inner_text("#axis-remarks") == ""
+    page.select_option("#axis", measure)
+    assert page.input_value("#measure") == measure
+    assert MEASURES[measure].label in page.locator("#chart .axes .name").last.text_content()
+    heights = drawn_heights(page)
+    values = {row: getattr(front[row], measure) for row in heights}
+    assert len(heights) == len(front)
+    assert sorted(heights, key=lambda row: (values[row], row)) == sorted(heights, key=lambda row: (-heights[row], row))
+    limit = front[-2].triangles
+    page.fill("#most-triangles", str(limit))
+    page.click("#by-triangles button")
+    assert shown(page) == min((s for s in front if s.triangles <= limit), key=lambda s: getattr(s, measure)).solution
+    assert ("by the max error a larger mesh may be the worse one" in page.inner_text("#axis-remarks")) == (
+        measure == "max_error"
+    )
+    page.select_option("#measure", "rms_error")
+    assert page.input_value("#axis") == "rms_error"
+
+
+def test_what_has_no_such_error_is_left_out_of_the_chart_and_named(browser, front, folder, tmp_path):
+    known = np.where(np.arange(len(front)) == 2, 5.0, np.nan)
+    stored = replace(
+        read_front(folder),
+        refitted_error=known,
+        refitted_meshes=("refitted/2.ply",) * len(front),
+        series={"start": front.F},
+    )
+    page = simplification_page(stored, front.surface, front.kept, measure="error", folder=folder, knee=3)
+    (series,) = data_of(page)["series"]
+    assert series["y"]["error"] == front.F[:, 0].tolist()
+    np.testing.assert_allclose(series["y"]["mean_error"], [s.mean_error for s in front], rtol=1e-12)
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    visit = Visit(browser, path)
+    assert visit.page.locator("#chart .legend").inner_text().endswith("start")
+    visit.page.select_option("#axis", "refitted_error")
+    assert set(drawn_heights(visit.page)) == {2}
+    remarks = visit.page.inner_text("#axis-remarks")
+    assert f"1 of {len(front)} solutions have a refitted error." in remarks
+    assert "Not drawn, as their refitted error is not known: start." in remarks
+    assert "start" not in visit.page.inner_text("#chart .legend")
+    visit.page.locator("#slider").fill("4")  # one that is not drawn
+    assert shown(visit.page) == 4
+    visit.check()
+    visit.close()
+
+
+def test_a_link_opens_the_page_where_it_was_copied(visit, front, browser, folder):
+    page = visit.page
+    entries = page.evaluate("history.length")
+    page.locator("#slider").fill("7")
+    page.locator("#slider").fill("5")
+    assert shown(page) == 5
+    until(page, "location.hash === '#solution=5'")
+    page.select_option("#axis", "max_error")
+    until(page, "location.hash === '#solution=5&axis=max_error'")
+    assert page.evaluate("history.length") == entries  # the way back is the way out
+    page.click("#copy-link")
+    until(page, "document.getElementById('link-copied').textContent !== ''")
+    other = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+    other.page.goto("about:blank")
+    other.page.goto(page.url)
+    other.page.wait_for_selector("html[data-ready]")
+    until(other.page, "state.opened")
+    assert shown(other.page) == 5
+    assert other.page.input_value("#axis") == "max_error"
+    other.page.evaluate("location.hash = '#solution=2'")
+    other.page.wait_for_selector("html[data-shown='2']")
+    other.page.evaluate("location.hash = '#solution=99&axis=nothing'")
+    until(other.page, "document.getElementById('answer').className === 'missed'")
+    assert other.page.inner_text("#answer") == f"The link names solution 99; there are 0 to {len(front) - 1}."
+    assert shown(other.page) == 2
+    other.close()
 
 
 # ------------------------------------------------------------------------------------------------------------ looking
