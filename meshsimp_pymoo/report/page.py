@@ -40,9 +40,10 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "simplification.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "body.js", "windows.js",
+    "simplification.js",
 )  # fmt: skip
-# Before the last one, where closed meshes are shown.
+# Where closed meshes are shown.
 OF_BODIES = "body.js"
 PAGE_BYTES = 15_000_000
 # The libraries, the texts and the numbers of the solutions.
@@ -188,7 +189,7 @@ def simplification_page(
     }
     return html_document(
         "simplification.html",
-        (*SCRIPTS[:-1], OF_BODIES, SCRIPTS[-1]) if view.is_closed else SCRIPTS,
+        [name for name in SCRIPTS if name != OF_BODIES or view.is_closed],
         data,
         title=f"{PurePath(source).name}, simplified",
         model={"vertices": model.n_vertices, "triangles": len(model.faces)},
