@@ -21,6 +21,7 @@ from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
+from meshsimp_pymoo.report.downloads import downloads
 from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, original_mesh, winding
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
@@ -72,11 +73,15 @@ class _Embedded:
     ----------
     vertices : (V,) int array
         Rows of the model that are in the page, ascending.
-    original : dict
+    faces : (M, 3) int array
         The triangles of the drawn original, as rows of ``vertices``.
+    line_names : tuple of str
+        What the break lines are called that chains name by their number.
+    original : dict
+        The same, embedded.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
-        of these, and its break lines as edges, rows of ``vertices``, if there are any; None where its mesh is left out.
+        of these, and its break lines, chains of rows of ``vertices``, if there are any; None where its mesh is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -84,6 +89,8 @@ class _Embedded:
     """
 
     vertices: IntArray
+    faces: IntArray
+    line_names: tuple[str, ...]
     original: dict[str, str]
     solutions: list[dict[str, Any] | None]
     scale_end: float
@@ -145,6 +152,8 @@ def simplification_page(
     # what is not known is null
     columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
+    points = model.file_points[held.vertices].astype(np.float64)
+    files = downloads(surface, points, held.faces, held.line_names)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
@@ -177,7 +186,8 @@ def simplification_page(
             "rotation": view.rotation.tolist(),
             "scale": view.scale.tolist(),
         },
-        "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
+        "points": embedded_array(points),
+        "files": files.templates,
         "paint": None if paint is None else embedded_array(paint) | {"channels": paint.shape[1]},
         "faces": held.original,
         "lines": lines,
@@ -203,6 +213,8 @@ def simplification_page(
             "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
         },
         painted=paint is not None,
+        files=files.titles,
+        refused=printable(" ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused)),
         covering=has_border,
         holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",
@@ -298,6 +310,8 @@ def _embedded(
     vertices = np.flatnonzero(used)
     solutions: list[dict[str, Any] | None] = [None] * len(kept)
     sizes: dict[int, int] = {}
+    known: Any = getattr(surface.model, "lines", None)  # which a surface of another kind need not have
+    line_names = () if known is None else tuple(dict.fromkeys(known.names))
     for row, mesh in found.items():
         largest = float(mesh.deviation.max())
         levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
@@ -305,13 +319,13 @@ def _embedded(
         triangles, deviation = embedded_faces(np.searchsorted(vertices, mesh.faces)), embedded_array(levels)
         held: dict[str, Any] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
-        chains, _ = mesh_lines(surface, mesh.faces)
+        chains, names = mesh_lines(surface, mesh.faces)
         if chains:
-            edges = np.concatenate([np.column_stack([chain[:-1], chain[1:]]) for chain in chains])
-            held["lines"] = embedded_array(np.searchsorted(vertices, edges).astype(np.uint32))
-            sizes[row] += len(held["lines"]["data"])
+            held["lines"] = _embedded_lines([np.searchsorted(vertices, chain) for chain in chains], names, line_names)
+            sizes[row] += sum(len(part["data"]) for part in held["lines"].values())
         solutions[row] = held
-    faces = embedded_faces(np.searchsorted(vertices, original))
+    original = np.searchsorted(vertices, original)
+    faces = embedded_faces(original)
     room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
     while sizes and sum(sizes.values()) > room:
         dropped = next(row for row in reversed(rows) if row in sizes)
@@ -319,7 +333,18 @@ def _embedded(
         del sizes[dropped]
     at_knee = found[knee] if knee in found else _checked(surface, kept, front, knee, measured)
     end = float(np.quantile(at_knee.deviation, SCALE_QUANTILE)) or float(front.quality["max_error"].max()) or 1.0
-    return _Embedded(vertices, faces, solutions, end, n_drawn)
+    return _Embedded(vertices, original, line_names, faces, solutions, end, n_drawn)
+
+
+def _embedded_lines(chains: Sequence[IntArray], names: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
+    """Return break lines as the browser unpacks them: their vertices one after the other, their lengths, their names."""
+    place = {name: k for k, name in enumerate(known)}
+    columns = {
+        "rows": np.concatenate(chains),
+        "sizes": [len(chain) for chain in chains],
+        "names": [place[name] for name in names],
+    }
+    return {name: embedded_array(np.asarray(values, np.uint32)) for name, values in columns.items()}
 
 
 def _original_lines(surface: Surface) -> dict[str, str] | None:

@@ -25,7 +25,7 @@ from sketching import sketch
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.errors import PictureWarning, ResultError
-from meshsimp_pymoo.formats.table import read_source, write_mesh
+from meshsimp_pymoo.formats.table import read_lines, read_source, write_mesh
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.report import figures as figures_module
 from meshsimp_pymoo.report import page as page_module
@@ -479,6 +479,55 @@ def parsed(path):
     return corners, np.arange(len(corners)).reshape(-1, 3)
 
 
+def taken(page, suffix, folder):
+    """Return the path of the file that a button downloads."""
+    with page.expect_download() as download:
+        page.click(f"#downloads button[value={suffix}]")
+    path = folder / f"page.{suffix}"
+    download.value.save_as(path)
+    return path
+
+
+def chunks(path):
+    """Return the tree of a GLB and the parts of its buffer, by accessor."""
+    content = path.read_bytes()
+    size = int.from_bytes(content[12:16], "little")
+    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
+    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
+    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]
+
+
+def words(path):
+    """Return the words of a text, numbers as such, however they are spelled, in an order of their own."""
+    found = []
+    for word in re.split(r"[\s<>\"=]+", path.read_text(encoding="utf-8")):
+        try:
+            found.append(float(word))
+        except ValueError:
+            found.append(word)
+    return sorted(found, key=str)
+
+
+def sorted_faces(faces):
+    """Return triangles, each from its smallest vertex on, sorted."""
+    rows = [tuple(np.roll(row, -int(np.argmin(row))).tolist()) for row in np.asarray(faces)]
+    return sorted(rows)
+
+
+def test_a_downloaded_glb_is_the_file_that_the_package_writes(visit, front, tmp_path):
+    front[2].save(tmp_path / "package.glb")
+    (ours, parts), (theirs, own) = chunks(taken(visit.page, "glb", tmp_path)), chunks(tmp_path / "package.glb")
+    assert ours == theirs
+    assert parts[:-1] == own[:-1]
+    faces = [sorted_faces(np.frombuffer(part[-1], "<u4").reshape(-1, 3)) for part in (parts, own)]
+    assert faces[0] == faces[1]
+    source = read_source(tmp_path / "page.glb")
+    used = np.unique(front[2].faces)
+    away = np.abs(source.points - front.model.file_points[used]).max()
+    assert 0 < away < 1e-5  # half a step of single precision from the local origin, at 23 units
+    assert source.attributes["color"].tolist() == front.model.attributes["color"][used].tolist()
+
+
 @pytest.mark.parametrize("suffix", ["ply", "obj", "stl"])
 def test_a_downloaded_mesh_has_the_triangles_and_the_error_that_the_page_says(used, front, tmp_path, suffix):
     used.page.locator("#slider").fill("6")
@@ -891,6 +940,14 @@ def lined(tmp_path_factory):
     return front, front.save(place / "out", chosen=2)
 
 
+@pytest.fixture(scope="module")
+def lined_page(browser, lined):
+    visit = Visit(browser, lined[1] / "report.html", viewport={"width": 1280, "height": 1000})
+    yield visit.page
+    visit.check()
+    visit.close()
+
+
 def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     front, folder = lined
     visit = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
@@ -917,6 +974,28 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     assert len(edges) == 2 * (len(front[0].lines[0]) - 1)
     visit.check()
     visit.close()
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "xml", "glb", "stl"])
+def test_break_lines_are_in_the_files_as_the_package_writes_them(lined_page, lined, tmp_path, suffix):
+    front, _ = lined
+    front[2].save(tmp_path / f"package.{suffix}")
+    path = taken(lined_page, suffix, tmp_path)
+    if suffix in ("glb", "stl"):
+        assert len(read_source(path).faces) == front[2].triangles
+        return
+    ours, theirs = (read_lines(tmp_path / f"{name}.{suffix}") for name in ("page", "package"))
+    assert [line.tolist() for line in ours.lines] == [line.tolist() for line in theirs.lines]
+    assert ours.names == theirs.names
+    if suffix == "ply":  # but for the order of the triangles, whose rows are 13 bytes each
+        head, body = zip(
+            *(file.read_bytes().split(b"end_header\n") for file in (path, tmp_path / "package.ply")), strict=True
+        )
+        n, m = front[2].vertices, front[2].triangles
+        assert head[0] == head[1]
+        assert body[0][: 24 * n] + body[0][24 * n + 13 * m :] == body[1][: 24 * n] + body[1][24 * n + 13 * m :]
+        return
+    assert words(path) == words(tmp_path / f"package.{suffix}")
 
 
 def test_a_page_without_break_lines_says_nothing_of_any(seen):

@@ -116,11 +116,12 @@ async function pick(row) {
     `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
-  const [faces, levels, edges] = solution
-    ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation), solution.lines ? unpackArray(solution.lines) : null])
-    : [null, null, null];
+  const [faces, levels, lines] = solution
+    ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation), solution.lines ? unpackLines(solution.lines) : []])
+    : [null, null, []];
   if (state.row !== row) return; // another one was picked meanwhile
-  state.mesh = faces && { row, faces, levels, edges };
+  const edges = lines.length ? lines.flatMap(({ rows }) => [...rows.subarray(1)].flatMap((row, k) => [rows[k], row])) : null;
+  state.mesh = faces && { row, faces, levels, lines, edges };
   document.documentElement.dataset.shown = row;
   if (state.viewer) {
     state.viewer.show(faces, edges);
@@ -211,9 +212,9 @@ part("by-error").addEventListener("submit", (event) => {
 for (const button of document.querySelectorAll("#downloads button")) {
   button.addEventListener("click", () => {
     const kind = button.value;
-    const mesh = compactMesh(state.geometry.points, state.geometry.paint, state.mesh.faces);
+    const mesh = compactMesh(state.geometry.points, state.geometry.paint, state.mesh.faces, state.mesh.lines);
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(MESH_FILES[kind](mesh));
+    link.href = URL.createObjectURL(MESH_FILES[kind](mesh, data.files[kind]));
     link.download = `${data.stem}_${columns.triangles[state.mesh.row]}.${kind}`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
