@@ -19,7 +19,7 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
@@ -30,7 +30,7 @@ from pymoo.optimize import minimize
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import Missed, ModelError, ResultError, way_to_install
-from meshsimp_pymoo.files import claim_file, draw_into, new_file
+from meshsimp_pymoo.files import as_argument, claim_file, draw_into, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
@@ -48,6 +48,7 @@ from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
     PICTURES,
+    STATEMENT,
     even_selection,
     read_front,
     write_front,
@@ -101,6 +102,9 @@ START = "adaptive thinning (start)"
 START_POINTS = 200
 # Between two solutions of a nested front the smallest within a limit is looked for to this share of its triangles.
 HALVED = 0.01
+# Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
+# largest nothing is said: these take seconds for each million vertices.
+SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -174,6 +178,16 @@ class FrontSolution(_Numbers):
 
         return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
 
+    def _quick_statement(self) -> QualityStatement:
+        """Return the statement of the mesh without what would take more than some seconds, of which it says so."""
+        from meshsimp_pymoo.report.statement import stated
+
+        if self.front.surface.n_vertices <= SPACE_VERTICES:
+            return self.accuracy()
+        folder = "" if self.front.folder is None else f" {as_argument(self.front.folder)}"
+        left_out = "Distances in space are left out, so that nobody had to wait: meshsimp quality"
+        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(f"{left_out}{folder}",))
+
     def _compared(self, *, refitted: bool = False) -> Compared:
         """Return the mesh beside its original; that of tiles is not held at once."""
         surface = self.front.surface
@@ -183,8 +197,8 @@ class FrontSolution(_Numbers):
 
     def _called(self, *, refitted: bool = False) -> dict[str, Any]:
         """Return what a statement of quality calls the mesh."""
-        stored = self.front.folder is not None and self.solution < len(self.front)
-        name = f"solution {self.solution}" + f" of {self.front.folder}" * stored
+        folder = self.front.folder
+        name = f"solution {self.solution}" + ("" if folder is None else f" of {folder.resolve().name}")
         return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
 
     @property
@@ -970,6 +984,8 @@ class Front(Sequence[FrontSolution]):
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
         """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
 
+        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one.
+
         Parameters
         ----------
         page : bool
@@ -1014,8 +1030,13 @@ class Front(Sequence[FrontSolution]):
             )
             path.write_bytes(content.encode("utf-8"))
 
-        drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
-        wanted = PICTURES if page else PICTURES[:1]
+        drawings: dict[str, Callable[[Path], object]] = {PICTURES[0]: draw_front}
+        if chosen is not None and surface.n_vertices <= STATED_VERTICES:
+            statement = cache(self[chosen]._quick_statement)
+            write = (lambda path: statement().write_data(path), lambda path: statement().write_page(path))
+            drawings |= zip(STATEMENT, write, strict=True)
+        drawings[PICTURES[1]] = draw_page  # which links to the others
+        wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
 
     def stored_mesh(self, solution: int) -> Path | None:

@@ -538,7 +538,7 @@ def _take(compared: Compared) -> _Taken:
             columns.append((values, covered, weights))
     if is_fine:
         width = largest / FINE_BINS
-        centres = (np.arange(2 * FINE_BINS) + 0.5 - FINE_BINS) * width
+        centres = np.asarray((np.arange(2 * FINE_BINS) + 0.5 - FINE_BINS) * width, np.float64)
         signed = _Values(centres, None, fine).where(fine > 0)
         both = fine + bare
         absolute = _Values(np.abs(centres), None, both).where(both > 0)
