@@ -23,18 +23,11 @@ from meshsimp_pymoo.files import new_folder
 from meshsimp_pymoo.formats.outmesh import metres_of
 from meshsimp_pymoo.report.document import html_document
 from meshsimp_pymoo.report.residuals import write_residuals
-from meshsimp_pymoo.report.statement_figures import (
-    SCALE_QUANTILE,
-    angles_figure,
-    map_figure,
-    picture,
-    residuals_figure,
-)
+from meshsimp_pymoo.report.statement_figures import SCALE_QUANTILE
 from meshsimp_pymoo.storage import STATEMENT
 from meshsimp_pymoo.surface.accuracy import (
     NORMAL_90,
     NORMAL_95,
-    SPACE_SAMPLES,
     Accuracy,
     Compared,
     accuracy_of,
@@ -204,8 +197,10 @@ Rows = list[tuple[str, str, str]]
 
 def _page(stated: QualityStatement) -> str:
     """Return the page of a statement."""
+    from meshsimp_pymoo.report.statement_figures import pictures
+
     unit, mesh = stated.unit, printable(str(stated.mesh.get("name", "mesh")))
-    compared, numbers = stated.compared, stated.numbers
+    numbers = stated.numbers
     scale_end = f"The colours end where {in_per_cent(SCALE_QUANTILE)} of the residuals are below."
     if stated.closed:
         map_said = f"Distances of the original's vertices from the mesh [{unit}]. {scale_end}"
@@ -227,11 +222,9 @@ def _page(stated: QualityStatement) -> str:
         accuracy=_accuracy_rows(stated),
         shape=_shape_rows(stated),
         method=_method(stated),
-        map=picture(map_figure(compared, numbers)),
+        pictures=pictures(stated.compared, numbers),
         map_said=map_said,
-        spread=picture(residuals_figure(numbers), vector=True),
         spread_said=f"Histogram of the residuals [{unit}], {sum(numbers.histogram.counts):,} check points.",
-        angles=picture(angles_figure(numbers), vector=True),
         angles_said=f"Histogram of the least angles of {stated.triangles:,} triangles, in degrees.",
     )
 
@@ -356,7 +349,7 @@ def stated(
     compared: Compared,
     *,
     mesh: Mapping[str, Any] | None = None,
-    space_samples: int = SPACE_SAMPLES,
+    space_samples: int | None = None,
     left_out: tuple[str, ...] = (),
 ) -> QualityStatement:
     """Measure a mesh beside its original and state what was found.
@@ -367,7 +360,7 @@ def stated(
         See :func:`~meshsimp_pymoo.surface.accuracy.compare`.
     mesh : mapping, optional
         What the mesh is called.
-    space_samples : int
+    space_samples : int, optional
         See :func:`~meshsimp_pymoo.surface.accuracy.accuracy_of`.
     left_out : tuple of str
         What is said to be left out.
