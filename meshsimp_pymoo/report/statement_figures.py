@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["angles_figure", "map_figure", "pictures", "residuals_figure"]
+__all__ = ["address_of", "angles_figure", "map_figure", "pictures", "residuals_figure"]
 
 # Signed residuals: blue where the mesh is above the original, red where it is below; the colours end where this share
 # of their sizes is below.
@@ -36,13 +36,14 @@ SALT = {"svg.hashsalt": "meshsimp", "svg.fonttype": "path"}
 def pictures(compared: Compared, numbers: Accuracy) -> dict[str, str]:
     """Return the pictures of a statement as addresses of images that are inside the page, by name."""
     return {
-        "map": _address(map_figure(compared, numbers)),
-        "spread": _address(residuals_figure(numbers), vector=True),
-        "angles": _address(angles_figure(numbers), vector=True),
+        "map": address_of(map_figure(compared, numbers)),
+        "spread": address_of(residuals_figure(numbers), vector=True),
+        "angles": address_of(angles_figure(numbers), vector=True),
     }
 
 
-def _address(figure: Figure, *, vector: bool = False) -> str:
+def address_of(figure: Figure, *, vector: bool = False) -> str:
+    """Return a figure as the address of an image that is inside the page, the same for the same figure."""
     from matplotlib import rc_context
 
     content = io.BytesIO()
