@@ -20,7 +20,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cache, cached_property
-from pathlib import Path
+from pathlib import Path, PurePath
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
@@ -30,7 +30,7 @@ from pymoo.optimize import minimize
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import Missed, ModelError, ResultError, way_to_install
-from meshsimp_pymoo.files import as_argument, claim_file, draw_into, new_file
+from meshsimp_pymoo.files import claim_file, draw_into, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
 from meshsimp_pymoo.indicators import knee, non_dominated
@@ -184,9 +184,8 @@ class FrontSolution(_Numbers):
 
         if self.front.surface.n_vertices <= SPACE_VERTICES:
             return self.accuracy()
-        folder = "" if self.front.folder is None else f" {as_argument(self.front.folder)}"
-        left_out = "Distances in space are left out, so that nobody had to wait: meshsimp quality"
-        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(f"{left_out}{folder}",))
+        left_out = "Distances in space are left out here, so that nobody had to wait; meshsimp quality takes them."
+        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(left_out,))
 
     def _compared(self, *, refitted: bool = False) -> Compared:
         """Return the mesh beside its original; that of tiles is not held at once."""
@@ -197,8 +196,7 @@ class FrontSolution(_Numbers):
 
     def _called(self, *, refitted: bool = False) -> dict[str, Any]:
         """Return what a statement of quality calls the mesh."""
-        folder = self.front.folder
-        name = f"solution {self.solution}" + ("" if folder is None else f" of {folder.resolve().name}")
+        name = f"{PurePath(self.front.name).name}, solution {self.solution}"
         return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
 
     @property

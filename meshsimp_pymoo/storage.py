@@ -27,9 +27,9 @@
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
     OUT/tiles/         alone, likewise: finished tiles (see `meshsimp_pymoo.tiles.front`)
 
-All but run.json (which holds the time taken), report.html and quality.* (which name the folder) are the same bytes
-again for the same front. Floats are written with the fewest digits that read back to the same number. Everything is
-written to a hidden folder beside OUT, flushed to the disk and then renamed, so that OUT is either complete or absent.
+All but run.json (which holds the time taken) and report.html (which names the folder) are the same bytes again for
+the same front. Floats are written with the fewest digits that read back to the same number. Everything is written to a
+hidden folder beside OUT, flushed to the disk and then renamed, so that OUT is either complete or absent.
 """
 
 from __future__ import annotations
