@@ -19,8 +19,8 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import cached_property
-from pathlib import Path
+from functools import cache, cached_property
+from pathlib import Path, PurePath
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
@@ -48,6 +48,7 @@ from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
     PICTURES,
+    STATEMENT,
     even_selection,
     read_front,
     write_front,
@@ -104,6 +105,9 @@ HALVED = 0.01
 # A level of detail has at most so much fewer triangles than the finer one before it; fewer than so many make none: to
 # draw them takes no less time.
 LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
+# Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
+# largest nothing is said: these take seconds for each million vertices.
+SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -177,6 +181,15 @@ class FrontSolution(_Numbers):
 
         return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
 
+    def _quick_statement(self) -> QualityStatement:
+        """Return the statement of the mesh without what would take more than some seconds, of which it says so."""
+        from meshsimp_pymoo.report.statement import stated
+
+        if self.front.surface.n_vertices <= SPACE_VERTICES:
+            return self.accuracy()
+        left_out = "Distances in space are left out here, so that nobody had to wait; meshsimp quality takes them."
+        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(left_out,))
+
     def _compared(self, *, refitted: bool = False) -> Compared:
         """Return the mesh beside its original; that of tiles is not held at once."""
         surface = self.front.surface
@@ -186,8 +199,7 @@ class FrontSolution(_Numbers):
 
     def _called(self, *, refitted: bool = False) -> dict[str, Any]:
         """Return what a statement of quality calls the mesh."""
-        stored = self.front.folder is not None and self.solution < len(self.front)
-        name = f"solution {self.solution}" + f" of {self.front.folder}" * stored
+        name = f"{PurePath(self.front.name).name}, solution {self.solution}"
         return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
 
     @property
@@ -1058,6 +1070,8 @@ class Front(Sequence[FrontSolution]):
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
         """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
 
+        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one.
+
         Parameters
         ----------
         page : bool
@@ -1102,8 +1116,13 @@ class Front(Sequence[FrontSolution]):
             )
             path.write_bytes(content.encode("utf-8"))
 
-        drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
-        wanted = PICTURES if page else PICTURES[:1]
+        drawings: dict[str, Callable[[Path], object]] = {PICTURES[0]: draw_front}
+        if chosen is not None and surface.n_vertices <= STATED_VERTICES:
+            statement = cache(self[chosen]._quick_statement)
+            write = (lambda path: statement().write_data(path), lambda path: statement().write_page(path))
+            drawings |= zip(STATEMENT, write, strict=True)
+        drawings[PICTURES[1]] = draw_page  # which links to the others
+        wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
 
     def stored_mesh(self, solution: int) -> Path | None:

@@ -22,6 +22,8 @@
                        (environment), when the search was begun, evaluations, moves, seconds; of a front that was
                        freed afterwards how (freeing)
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
+    OUT/quality.json   how accurate the chosen mesh is, if one was asked for; OUT/quality.html: the page to sign. Of any
+                       mesh in OUT/quality, where `meshsimp quality` writes it
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
     OUT/tiles/         alone, likewise: finished tiles (see `meshsimp_pymoo.tiles.front`)
 
@@ -104,13 +106,15 @@ SECONDS_A_CORNER = 5e-7
 COMPRESSION_SHARE = 0.05
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 PICTURES = ("front.png", "report.html")  # made once all else is in place
+STATEMENT = ("quality.json", "quality.html")  # of the chosen mesh, made likewise, if there is one
+QUALITY = "quality"  # where a statement of any mesh is written by default
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 TILES = "tiles"  # finished tiles of one
 LINES = "break_lines.geojson"  # the thinned break lines
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
-    TILES, "series.csv", LINES,
+    TILES, "series.csv", LINES, *STATEMENT, QUALITY,
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh")

@@ -770,7 +770,7 @@ def test_a_wrong_option_is_answered_in_one_line(tmp_path, capsys, options, messa
     [
         ((), r"a command is missing: simplify, pick, .*completion \(see meshsimp --help\)"),
         (("simplify", "-o", "out"), r"required: MODEL"),
-        (("melt", "roof"), r"invalid choice: 'melt' \(choose from simplify, pick, score, .*\) \(see meshsimp --help\)"),
+        (("melt", "roof"), r"invalid choice: 'melt' \(choose from simplify, pick, quality, score, .*\) \(see meshsimp --help\)"),
         (("simplyfy", "roof"), r"invalid choice: 'simplyfy' .*; did you mean simplify\?"),
         (("scan.ply",), r"did you mean meshsimp simplify scan\.ply\?"),
         (("report",), r"required: OUT \(see meshsimp report --help\)"),

@@ -28,7 +28,7 @@ from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, origina
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
-from meshsimp_pymoo.storage import StoredFront
+from meshsimp_pymoo.storage import STATEMENT, StoredFront
 from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Measure
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
@@ -242,6 +242,7 @@ def simplification_page(
         unit_sign="" if unit == LENGTH else unit,
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
+        quality=STATEMENT[1] if (front.folder / STATEMENT[1]).is_file() else "",
     )
 
 

@@ -53,7 +53,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-residuals", dest="residuals", action="store_false", help="do not write the raster of the residuals"
     )
-    parser.add_argument("--model", dest="original", metavar="MODEL", help="the original of OUT, if it is no longer where it was")
+    parser.add_argument(
+        "--model", dest="original", metavar="MODEL", help="the original of OUT, if it is no longer where it was"
+    )
     add_model(parser, Options, help="the folder of a front; with --mesh the original")
     add_settings(parser.add_argument_group("what counts, with --mesh"), Rules, only=RULES, outside="nearest")
     add_shown(parser)
@@ -70,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.report.statement import claim_folder
+    from meshsimp_pymoo.storage import QUALITY
     from meshsimp_pymoo.surface.rules import Rules
 
     wish, number = Wish(wishes_of(args), args.knee), args.solution
@@ -80,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     options, rules = settings_from(args, Options), settings_from(args, Rules)
     of_front = args.mesh is None
     _refuse(args, options, rules, said)
-    usual = Path(args.model) / "quality" if of_front else Path(f"{Path(args.mesh).stem}_quality")
+    usual = Path(args.model) / QUALITY if of_front else Path(f"{Path(args.mesh).stem}_quality")
     folder = usual if args.output is None else Path(args.output)
     claim_folder(folder, overwrite=args.overwrite)
     with said_when_compiling(args.quiet):
