@@ -45,7 +45,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -81,6 +81,7 @@ from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
 from meshsimp_pymoo.surface.smallest import facts_of_lines
+from meshsimp_pymoo.surface.solid import as_solid, check_solid
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
@@ -102,6 +103,8 @@ PICTURES = ("front.png", "report.html")  # made once all else is in place
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 TILES = "tiles"  # finished tiles of one
 LINES = "break_lines.geojson"  # the thinned break lines
+# A mesh: vertices (V, 3), faces (M, 3), attributes by name.
+MeshArrays: TypeAlias = tuple[FloatArray, IntArray, dict[str, AnyArray]]
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
@@ -242,6 +245,7 @@ def write_front(
     chosen: int | None = None,
     cut: Callable[[IntArray], Iterable[tuple[str, IntArray]]] | None = None,
     refit: Callable[[int], Refitted | None] | None = None,
+    solid: float | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
     overwrite: bool = False,
@@ -281,6 +285,9 @@ def write_front(
         The refitted mesh of the solution in this row of ``kept`` (see ``refit`` of its surface). Each mesh that is
         written is then written refitted too, as a file of its own, and ``front.csv`` has two more columns,
         REFIT_COLUMNS. None where there is none.
+    solid : float, optional
+        The chosen mesh is closed by walls and a base so far below its lowest point [file units]; see
+        :mod:`~meshsimp_pymoo.surface.solid`. What it encloses is recorded.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
         written to ``series.csv``.
@@ -316,6 +323,10 @@ def write_front(
             )
     kind = format_to_write(mesh_format)
     kind.check(model)
+    if solid is not None:
+        check_solid(surface, solid, kind)
+        if cut is not None:
+            raise ResultError(f"{model.name}: a solid is one piece; leave the pieces out, or the solid")
     look = _look(kind, surface)
     F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
     if not np.isfinite(F).all():
@@ -335,6 +346,7 @@ def write_front(
     with new_folder(folder, replace=overwrite) as partial:
         digits = max(3, len(str(len(order) - 1)))
         files: dict[int, tuple[str, list[str]]] = {}
+        facts_of_solid: dict[str, Any] = {}
         rounding, pace = Rounding(kind), SECONDS_A_CORNER
         if with_mesh:
             (partial / "meshes").mkdir()
@@ -362,7 +374,8 @@ def write_front(
                 for name, part in cut(triangles):
                     write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
             elif row == chosen:
-                write_mesh(partial / f"chosen{kind.suffix}", *arrays, **shown)
+                closed, facts_of_solid = _closed(surface, triangles, arrays, solid)
+                write_mesh(partial / f"chosen{kind.suffix}", *closed, **shown)
             better = None if refit is None else refit(int(row))
             if better is not None:
                 raised = (better.vertices, *arrays[1:])
@@ -371,7 +384,8 @@ def write_front(
                 if solution in with_mesh:
                     write_mesh(partial / fitted[1], *raised, **shown)
                 if row == chosen:
-                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **shown)
+                    closed, _ = _closed(surface, triangles, raised, solid)
+                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *closed, **shown)
             files[solution] = path, fitted
             pace = max(pace, (time.perf_counter() - begun) / size)
         lines = getattr(model, "lines", None)  # which a model of another kind need not have
@@ -421,6 +435,7 @@ def write_front(
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),
             "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
+            **({"solid": facts_of_solid} if facts_of_solid else {}),
             "versions": package_versions(),
             "environment": machine(),
         }
@@ -549,13 +564,24 @@ def _are_objectives(names: Any) -> bool:
     return True
 
 
-def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
+def write_solution(path: Path, surface: Surface, faces: IntArray, solid: float | None = None) -> None:
     """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    surface : Surface
+        The original mesh and its rules.
+    faces : (M, 3) int array
+        The triangles.
+    solid : float, optional
+        Close the mesh by walls and a base so far below its lowest point [file units].
 
     Raises
     ------
     ResultError
-        If the format cannot hold this model.
+        If the format cannot hold this model, or it cannot be made solid.
 
     Warns
     -----
@@ -565,12 +591,30 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
     """
     kind, model = format_of_output(path), surface.model
     kind.check(model)
+    if solid is not None:
+        check_solid(surface, solid, kind)
     arrays, rounding = mesh_arrays(model, faces), Rounding(kind)
     look = _look(kind, surface) | _lines_as_written(surface, faces)
     rounding.add(OutMesh(*arrays, **look), surface.view.scale)
     rounding.warn(model.name, surface.diagonal)
     warn_of_left_behind(kind, model.name, model.attributes)
-    write_mesh(path, *arrays, **look)
+    closed, _ = _closed(surface, faces, arrays, solid)
+    write_mesh(path, *closed, **look)
+
+
+def _closed(
+    surface: Surface, faces: IntArray, arrays: MeshArrays, thickness: float | None
+) -> tuple[MeshArrays, dict[str, Any]]:
+    """Return a mesh of these triangles (M, 3), in vector order, and nothing; with a thickness a solid, and its numbers.
+
+    ``arrays`` is the mesh: its vertices may have moved.
+    """
+    if thickness is None:
+        return arrays, {}
+    vertices, _, attributes = arrays
+    found = as_solid(surface, faces, thickness, vertices)
+    below = {name: values[found.source] for name, values in attributes.items()}
+    return (found.vertices, found.faces, below), {"thickness": thickness, **found.numbers}
 
 
 def _look(kind: Format, surface: Surface) -> dict[str, Any]:

@@ -24,6 +24,8 @@ examples:
       the most accurate of at most 500 triangles
   meshsimp pick out --max-error 0.1 -o small.obj
       the smallest that deviates nowhere by more than 0.1
+  meshsimp pick out --triangles 2000 --solid 5 -o print.stl
+      that mesh as a solid to print, its base 5 below the lowest point
   meshsimp pick out --knee
       only say what the best compromise is
 """
@@ -31,7 +33,7 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    from meshsimp_pymoo.cli.arguments import add_shown, add_wishes, whole
+    from meshsimp_pymoo.cli.arguments import add_shown, add_solid, add_wishes, whole
     from meshsimp_pymoo.formats.table import written_suffixes
 
     parser.add_argument("front", metavar="OUT", help="the folder of a front")
@@ -46,6 +48,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help=f"mesh to write; its suffix is its format: {', '.join(written_suffixes())} (default: nothing is written)",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
+    add_solid(parser, "the mesh")
     parser.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
     add_shown(parser)
 
@@ -66,9 +69,11 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("which solution is wanted? say limits, such as --triangles 500, or --knee, or --solution K")
     if len(said) > 1:
         raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
+    if args.solid is not None and args.output is None:
+        raise UsageError("--solid is of a file that is written; name it (-o FILE), or leave --solid out")
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     with said_when_compiling(args.quiet):
-        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
+        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, args.solid, **shown)
 
 
 def _pick(
@@ -78,6 +83,7 @@ def _pick(
     number: int | None,
     path: Path | None,
     overwrite: bool,
+    solid: float | None,
     *,
     quiet: bool,
     as_json: bool,
@@ -86,7 +92,7 @@ def _pick(
 
     from meshsimp_pymoo.cli.arguments import numbered
     from meshsimp_pymoo.cli.results import triangles_of
-    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, in_numbers, say, tell
+    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, in_numbers, say, solid_in_words, tell
     from meshsimp_pymoo.front import Front
 
     front = Front.load(folder, model=model)
@@ -99,18 +105,22 @@ def _pick(
     if solution is None:
         say(f"{folder}: {missed}; nothing is written")
         return TARGET_MISSED
+    closed = {}
     if path is not None:
-        solution.save(path, overwrite=overwrite)
+        solution.save(path, overwrite=overwrite, solid=solid)
+        closed = {} if solid is None else {"solid": {"thickness": solid, **solution.solid(solid).numbers}}
     if note := _how_far(front, folder, model, solution, wish):
         say(f"note: {note}")
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
-        said = {"mesh": mesh, "solution": number, "free": solution.free, **in_numbers(solution.quality)}
+        said = {"mesh": mesh, "solution": number, "free": solution.free, **in_numbers(solution.quality), **closed}
         tell(json.dumps(said, indent=2))
     elif not quiet:
         which = f"solution {solution.solution}" if stored else "between two solutions"
         tell(f"{which} of {folder}{', free' * solution.free}: {described(solution.quality, front.unit)}")
+        if closed:
+            tell(f"solid: {solid_in_words(closed['solid'], front.unit)}")
         tell(f"written: {path}" if path else "nothing is written; name a file with -o")
     return OK
 
