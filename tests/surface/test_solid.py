@@ -176,7 +176,7 @@ def test_free_meshes_are_closed_too_and_the_base_takes_what_its_outline_needs(na
 
 @pytest.mark.parametrize("up", UPS, ids=str)
 def test_the_base_is_below_whatever_up_is(up):
-    on = model_of("holey", up)
+    on = model_of("face:80", up)
     faces = on.triangles(subset(on.model, 0.5) | on.pinned)
     found = as_solid(on, faces, 4.0)
     check(found, on, faces, 4.0)
@@ -260,6 +260,9 @@ def test_the_chosen_mesh_is_solid_and_all_others_are_surfaces(tmp_path, capsys):
     for path in out.rglob("*.stl"):
         assert trimesh.load(path).is_watertight == (path.parent == out), path
     assert len([*out.glob("chosen*.stl")]) == 2
+    raised = as_solid(front.surface, solution.faces, 0.5, solution.refitted.vertices).volume
+    assert abs(raised - run["solid"]["volume"]) > 1e-3 * raised
+    assert trimesh.load(out / "chosen_refitted.stl").volume == pytest.approx(raised, rel=1e-6)
     # what is picked is a surface, unless it is to be solid
     picked = ["pick", str(out), "--solution", str(solution.solution), "-o"]
     assert main([*picked, str(tmp_path / "a.stl")]) == 0
