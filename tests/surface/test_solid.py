@@ -24,7 +24,7 @@ from meshsimp_pymoo.storage import write_solution
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.kinds import surface_of
 from meshsimp_pymoo.surface.measures import TRIANGLES
-from meshsimp_pymoo.surface.solid import Solid, as_solid
+from meshsimp_pymoo.surface.solid import Solid, _flattened, as_solid
 
 
 def check(found: Solid, on: HeightSurface, faces: np.ndarray, thickness: float) -> None:
@@ -183,6 +183,12 @@ def test_the_base_is_below_whatever_up_is(up):
     faces = on.triangles(subset(on.model, 0.5) | on.pinned)
     found = as_solid(on, faces, 37.123)
     check(found, on, faces, 37.123)
+
+
+@pytest.mark.parametrize("up", [*np.eye(3), *-np.eye(3)], ids=str)
+def test_along_an_axis_the_base_is_flat_to_the_last_bit(up):
+    points = np.random.default_rng(1).uniform(-60, 60, (99, 3))
+    assert {*(_flattened(points, up, -73.123) @ up).tolist()} == {-73.123}
 
 
 def test_a_refitted_mesh_is_closed_with_its_heights():
