@@ -86,6 +86,7 @@ def geodetic(georeference: Mapping[str, Any], points: FloatArray, metres: float,
     if number == GEOGRAPHIC:
         return np.column_stack([points[:, :2], heights])
     try:
+        from rasterio.crs import CRS
         from rasterio.errors import CRSError
         from rasterio.warp import transform
     except ImportError:
@@ -95,7 +96,10 @@ def geodetic(georeference: Mapping[str, Any], points: FloatArray, metres: float,
         ) from None
     system = f"EPSG:{number}" if number else str(text)
     try:
-        x, y = transform(system, f"EPSG:{GEOGRAPHIC}", points[:, 0].tolist(), points[:, 1].tolist())
+        known = CRS.from_user_input(system)
+        if not (known.is_geographic or known.is_projected):  # a site's own; those would come back as they are
+            raise CRSError("it is neither geographic nor projected")
+        x, y = transform(known, f"EPSG:{GEOGRAPHIC}", points[:, 0].tolist(), points[:, 1].tolist())
     except (CRSError, ValueError, RuntimeError) as problem:
         warn_of(f"{name}: its reference system leads to no place on Earth ({reason_of(problem)}); it stays local")
         return None
