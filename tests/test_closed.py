@@ -516,5 +516,6 @@ def test_levels_of_a_closed_model_are_closed_too(front, tmp_path):
         for said, solution in zip(record["levels"], levels, strict=True):
             mesh = as_trimesh(out / said["file"])
             assert mesh.is_watertight
-            assert mesh.volume == pytest.approx(solution.mesh.volume, rel=0.5 if options else 1e-5), "not inside out"
+            assert mesh.volume > 0.0, "not inside out"
+            assert options or mesh.volume == pytest.approx(solution.mesh.volume, rel=1e-5)
             assert (said["mean_error"] < solution.mean_error) == (bool(options) and solution.mean_error > 0.0)
