@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray, Rows
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
@@ -61,6 +61,8 @@ SCALE_QUANTILE = 0.98
 DRAWN_LINE_VERTICES = 10_000
 # How the meshes can be coloured, as the page calls it; the first ones only where the model has them.
 COLOURS = {"texture": "texture", "own": "own colours", "plain": "plain", "height": "heights", "error": "error"}
+# A surface that is longer than so many times its breadth is seen in high windows.
+BROAD = 1.15
 # The slider of the heights reaches from a tenth of the lower of their usual factor and 1 to ten times the higher one.
 HEIGHT_DECADES = 1.0
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
@@ -212,6 +214,7 @@ def simplification_page(
         heights=None if view.is_closed else _heights(view.exaggeration),
         colours={name: COLOURS[name] for name in colours},
         own_colours=own,
+        broad=not view.is_closed and _is_broad(view.extent),
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
             "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
@@ -247,6 +250,15 @@ def _heights(exaggeration: float) -> dict[str, str]:
     usual = math.log10(exaggeration)
     least, most = min(0.0, usual) - HEIGHT_DECADES, max(0.0, usual) + HEIGHT_DECADES
     return {"least": f"{least:.2f}", "most": f"{most:.2f}", "usual": f"{usual:.2f}"}
+
+
+def _is_broad(extent: FloatArray) -> bool:
+    """Return whether a surface is seen broader than high: then its windows are no higher than broad.
+
+    >>> _is_broad(np.array([30.0, 20.0, 1.0])), _is_broad(np.array([20.0, 30.0, 1.0]))
+    (True, False)
+    """
+    return bool(extent[1] <= BROAD * extent[0])
 
 
 def _errors() -> list[str]:

@@ -155,7 +155,8 @@ function pictureOfWindows() {
   pen.fillText(document.querySelector("h1").textContent, edge, 24, width - 2 * edge);
   pen.font = font(13);
   pen.fillStyle = colour("--soft");
-  pen.fillText(describe(state.row), edge, 44, width - 2 * edge);
+  const drawnHigher = part("heights") && heightFactor() !== 1 ? `; heights × ${readable(heightFactor())}` : "";
+  pen.fillText(describe(state.row) + drawnHigher, edge, 44, width - 2 * edge);
   const rectangle = (box) => [edge + box.left - views.left, head + box.top - views.top, box.width, box.height];
   const frames = ["original-window", "simplified-window"].map((id) => part(id).getBoundingClientRect());
   pen.fillStyle = colour("--window");
