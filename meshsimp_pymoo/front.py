@@ -53,6 +53,7 @@ from meshsimp_pymoo.storage import (
     write_front,
     write_solution,
 )
+from meshsimp_pymoo.surface.accuracy import Compared, compare, compare_subset
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
@@ -89,6 +90,8 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+    from meshsimp_pymoo.report.statement import QualityStatement
+
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
@@ -98,6 +101,9 @@ START = "adaptive thinning (start)"
 START_POINTS = 200
 # Between two solutions of a nested front the smallest within a limit is looked for to this share of its triangles.
 HALVED = 0.01
+# A level of detail has at most so much fewer triangles than the finer one before it; fewer than so many make none: to
+# draw them takes no less time.
+LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -152,6 +158,38 @@ class FrontSolution(_Numbers):
         """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
         return self.front.surface.refit(self.simplified, until=until)
 
+    def accuracy(self, *, refitted: bool = False) -> QualityStatement:
+        """Measure the mesh in the words of surveyors: LE90, bias, NMAD, coverage, distances in space and more.
+
+        ``solution.accuracy().save("quality")`` writes the statement as data, as a page, and of a raster its residuals.
+
+        Parameters
+        ----------
+        refitted : bool
+            Measure the mesh with its vertices where their error is least instead.
+
+        Returns
+        -------
+        QualityStatement
+            All numbers are attributes; see :class:`~meshsimp_pymoo.surface.accuracy.Accuracy`.
+        """
+        from meshsimp_pymoo.report.statement import stated
+
+        return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
+
+    def _compared(self, *, refitted: bool = False) -> Compared:
+        """Return the mesh beside its original; that of tiles is not held at once."""
+        surface = self.front.surface
+        if isinstance(surface, GridSurface) and not refitted:
+            return compare_subset(surface, self.kept | surface.pinned)
+        return compare(surface, self.refitted if refitted else self.simplified)
+
+    def _called(self, *, refitted: bool = False) -> dict[str, Any]:
+        """Return what a statement of quality calls the mesh."""
+        stored = self.front.folder is not None and self.solution < len(self.front)
+        name = f"solution {self.solution}" + f" of {self.front.folder}" * stored
+        return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
+
     @property
     def points(self) -> FloatArray:
         """The model's vertices (N, 3), as pictures show them; ``faces`` are rows of them."""
@@ -197,6 +235,22 @@ class FrontSolution(_Numbers):
             else:
                 write_solution(unfinished, self.front.surface, self.faces)
         return path
+
+    def save_compressed(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> float:
+        """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
+
+        That is no more than a twentieth of its mean error, as far as single precision lets it.
+
+        Raises
+        ------
+        ResultError
+            As :meth:`save` does, or if the format is not compressed, or the library is missing.
+        """
+        path = claim_file(path, written_suffixes(), overwrite=overwrite)
+        with new_file(path) as unfinished:
+            written = write_solution(unfinished, self.front.surface, self.faces, compressed_by=self.mean_error)
+        assert written.packed is not None
+        return written.packed.shift
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
@@ -816,6 +870,75 @@ class Front(Sequence[FrontSolution]):
     def knee(self) -> FrontSolution:
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
         return self[knee(self.F)]
+
+    def levels(
+        self,
+        count: int | None = None,
+        *,
+        triangles: Sequence[int] | None = None,
+        max_error: Sequence[float] | None = None,
+    ) -> tuple[FrontSolution, ...]:
+        """Return a ladder of levels of detail: some of the solutions, the finest first, each mesh once.
+
+        They need not be nested: each has the vertices that are best for it. :func:`~meshsimp_pymoo.save_levels` writes
+        them.
+
+        Parameters
+        ----------
+        count : int, optional
+            The most levels. Without limits the first one is the most accurate solution, or the one that the front was
+            searched for; each other one is the best of at most a quarter of the triangles of the one before. By
+            default the ladder ends where that would be fewer than 32.
+        triangles, max_error : sequence of numbers, optional
+            Limits instead, one for each level, as :meth:`best` takes them.
+
+        Raises
+        ------
+        Missed
+            If no solution meets one of the limits.
+        TypeError
+            If more than one of these is given.
+        ValueError
+            If ``count`` is less than 1, or a limit makes no sense.
+
+        Examples
+        --------
+        >>> from meshsimp_pymoo import memetic
+        >>> front = Front.from_result(minimize(MeshProblem("face:200"), memetic(12), Moves(20_000), seed=1))
+        >>> [level.triangles for level in front.levels()][:2]
+        [362, 90]
+        """
+        given = {"count": count, "triangles": triangles, "max_error": max_error}
+        said = [name for name, value in given.items() if value is not None]
+        if len(said) > 1:
+            raise TypeError(f"{said[0]} does not go with {said[1]}: each says which levels there are; leave one out")
+        if count is not None and count < 1:
+            raise ValueError(f"count is {count}; a ladder has 1 level or more")
+        if triangles is not None or max_error is not None:
+            name = said[0]
+            found = [self.best(**{name: limit}) for limit in given[name]]  # type: ignore[union-attr]
+            once = {(level.triangles, level.error): level for level in found}
+            return tuple(sorted(once.values(), key=lambda level: (-level.triangles, level.error)))
+        ladder = [self._sought()]
+        while count is None or len(ladder) < count:
+            most = ladder[-1].triangles // LEVEL_FACTOR
+            if most < (FEWEST_TRIANGLES if count is None else 1):
+                break
+            try:
+                ladder.append(self.best(triangles=most))
+            except Missed:
+                break
+        return tuple(ladder)
+
+    def _sought(self) -> FrontSolution:
+        """Return the solution that the front was searched for, or the most accurate one of a whole front."""
+        if not self.run.get("wish"):
+            return self[-1]
+        try:
+            return self.best(**self.run["wish"])
+        except Missed as missed:
+            nearest: FrontSolution = missed.nearest
+            return nearest
 
     def _between(self, triangles: int) -> FrontSolution | None:
         """Return a solution of a nested front of at most so many triangles, which it may not have had so far."""

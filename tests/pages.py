@@ -6,6 +6,7 @@ import io
 import math
 
 import numpy as np
+import pytest
 from scipy.spatial import Delaunay
 
 
@@ -26,6 +27,15 @@ def shown(page):
     row = number(page, "solution")
     page.wait_for_selector(f"html[data-shown='{row:.0f}']")
     return int(row)
+
+
+def until(page, condition):
+    """Wait for what the page's policy lets nobody wait for inside it."""
+    for _ in range(200):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(20)
+    pytest.fail(f"never came true: {condition}")
 
 
 def number(page, name):

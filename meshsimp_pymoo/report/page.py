@@ -23,12 +23,13 @@ from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
 from meshsimp_pymoo.report.colours import embedded_image, hypsometric, magma
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, slug
+from meshsimp_pymoo.report.downloads import downloads
 from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, original_mesh, winding
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import StoredFront
-from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
+from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Measure
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import mesh_lines
@@ -80,11 +81,15 @@ class _Embedded:
     ----------
     vertices : (V,) int array
         Rows of the model that are in the page, ascending.
-    original : dict
+    faces : (M, 3) int array
         The triangles of the drawn original, as rows of ``vertices``.
+    line_names : tuple of str
+        What the break lines are called that chains name by their number.
+    original : dict
+        The same, embedded.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
-        of these, and its break lines as edges, rows of ``vertices``, if there are any; None where its mesh is left out.
+        of these, and its break lines, chains of rows of ``vertices``, if there are any; None where its mesh is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -92,6 +97,8 @@ class _Embedded:
     """
 
     vertices: IntArray
+    faces: IntArray
+    line_names: tuple[str, ...]
     original: dict[str, str]
     solutions: list[dict[str, Any] | None]
     scale_end: float
@@ -161,12 +168,14 @@ def simplification_page(
     ramps = {"error": magma()} if view.is_closed else {"height": hypsometric(), "error": magma()}
     colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
     own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
+    points = model.file_points[held.vertices].astype(np.float64)
+    files = downloads(surface, points, held.faces, held.line_names)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
+    first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
         "folder": printable(as_argument(folder)),
-        "measure": measure,
         "closed": _closed_look(surface) if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [
@@ -179,7 +188,11 @@ def simplification_page(
         "refitted_meshes": front.refitted_meshes,
         "knee": knee,
         "chosen": chosen,
-        "series": [{"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()} for name, F in front.series.items()],
+        "searched": _same_order(measure),
+        "series": [
+            {"name": name, "x": F[:, 1].tolist(), "y": _known_errors(F[:, 0], measure, surface.total_weight)}
+            for name, F in front.series.items()
+        ],
         "model": {
             "vertices": model.n_vertices,
             "triangles": len(model.faces),
@@ -189,7 +202,8 @@ def simplification_page(
             "rotation": view.rotation.tolist(),
             "scale": view.scale.tolist(),
         },
-        "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
+        "points": embedded_array(points),
+        "files": files.templates,
         "paint": None if paint is None else embedded_array(paint) | {"channels": paint.shape[1]},
         "faces": held.original,
         "lines": lines,
@@ -217,16 +231,18 @@ def simplification_page(
         broad=not view.is_closed and _is_broad(view.extent),
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
-            "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
+            "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
         },
         painted=paint is not None,
+        files=files.titles,
+        refused=printable(" ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused)),
         covering=has_border,
         holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",
         further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
-        errors={
-            name: MEASURES[name].label for name in _errors() if any(one is not None for one in columns.get(name, ()))
-        },
+        errors={name: label for name, label in _errors().items() if any(v is not None for v in columns.get(name, ()))},
+        first_error=first_error,
+        unit_sign="" if unit == LENGTH else unit,
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
     )
@@ -261,10 +277,29 @@ def _is_broad(extent: FloatArray) -> bool:
     return bool(extent[1] <= BROAD * extent[0])
 
 
-def _errors() -> list[str]:
-    """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
+def _errors() -> dict[str, str]:
+    """Return the columns of errors with what they are called: what a mesh is usually chosen by first, the sum last."""
     errors = [name for name, measure in MEASURES.items() if measure.is_error]
-    return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
+    errors.sort(key=lambda name: (not MEASURES[name].wish, name == "error"))
+    labels = {name: MEASURES[name].label for name in errors}
+    return labels | {"refitted_error": "refitted error (sum)", "error": f"{labels['error']} (sum)"}
+
+
+def _same_order(measure: str) -> list[str]:
+    """Return the measures by which meshes stand in the order of an objective: itself, and its mean if it is the sum."""
+    return [measure] + [
+        name for name, other in MEASURES.items() if other.is_error and other.searched == measure != name
+    ]
+
+
+def _known_errors(objective: FloatArray, measure: str, total_weight: float) -> dict[str, list[float]]:
+    """Return what is known of the errors of meshes by their objective alone, by measure."""
+    if measure != "error":
+        return {measure: objective.tolist()}
+    table = np.zeros((len(objective), REGIONS))
+    table[:, ERROR] = objective
+    of: dict[str, Any] = {name: MEASURES[name].of for name in _same_order(measure)}
+    return {name: of[name](table, total_weight).tolist() for name in of}
 
 
 def spoken(measure: Measure, unit: str = LENGTH, *, closed: bool = False) -> dict[str, str]:
@@ -306,6 +341,8 @@ def _embedded(
     vertices = np.flatnonzero(used)
     solutions: list[dict[str, Any] | None] = [None] * len(kept)
     sizes: dict[int, int] = {}
+    known: Any = getattr(surface.model, "lines", None)  # which a surface of another kind need not have
+    line_names = () if known is None else tuple(dict.fromkeys(known.names))
     for row, mesh in found.items():
         largest = float(mesh.deviation.max())
         levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
@@ -313,13 +350,13 @@ def _embedded(
         triangles, deviation = embedded_faces(np.searchsorted(vertices, mesh.faces)), embedded_array(levels)
         held: dict[str, Any] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
-        chains, _ = mesh_lines(surface, mesh.faces)
+        chains, names = mesh_lines(surface, mesh.faces)
         if chains:
-            edges = np.concatenate([np.column_stack([chain[:-1], chain[1:]]) for chain in chains])
-            held["lines"] = embedded_array(np.searchsorted(vertices, edges).astype(np.uint32))
-            sizes[row] += len(held["lines"]["data"])
+            held["lines"] = _embedded_lines([np.searchsorted(vertices, chain) for chain in chains], names, line_names)
+            sizes[row] += sum(len(part["data"]) for part in held["lines"].values())
         solutions[row] = held
-    faces = embedded_faces(np.searchsorted(vertices, original))
+    original = np.searchsorted(vertices, original)
+    faces = embedded_faces(original)
     room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
     while sizes and sum(sizes.values()) > room:
         dropped = next(row for row in reversed(rows) if row in sizes)
@@ -327,7 +364,18 @@ def _embedded(
         del sizes[dropped]
     at_knee = found[knee] if knee in found else _checked(surface, kept, front, knee, measured)
     end = float(np.quantile(at_knee.deviation, SCALE_QUANTILE)) or float(front.quality["max_error"].max()) or 1.0
-    return _Embedded(vertices, faces, solutions, end, n_drawn)
+    return _Embedded(vertices, original, line_names, faces, solutions, end, n_drawn)
+
+
+def _embedded_lines(chains: Sequence[IntArray], names: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
+    """Return break lines as the browser unpacks them: their vertices one after the other, their lengths, their names."""
+    place = {name: k for k, name in enumerate(known)}
+    columns = {
+        "rows": np.concatenate(chains),
+        "sizes": [len(chain) for chain in chains],
+        "names": [place[name] for name in names],
+    }
+    return {name: embedded_array(np.asarray(values, np.uint32)) for name, values in columns.items()}
 
 
 def _original_lines(surface: Surface) -> dict[str, str] | None:

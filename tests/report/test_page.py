@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import Visit, launched
-from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike
+from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike, until
 from samples import freed
 from scans import bowl
 from sketching import sketch
@@ -24,7 +24,7 @@ from sketching import sketch
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.errors import PictureWarning, ResultError
-from meshsimp_pymoo.formats.table import read_source, write_mesh
+from meshsimp_pymoo.formats.table import read_lines, read_source, write_mesh
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.report import figures as figures_module
 from meshsimp_pymoo.report import page as page_module
@@ -91,7 +91,8 @@ def used(opened):
 def seen(opened):
     """The page, as it was when it was opened, for a test that only looks at it."""
     if getattr(opened, "used", False):
-        opened.page.reload()
+        opened.page.goto("about:blank")  # for its address says what it shows
+        opened.page.goto(opened.url)
         opened.page.wait_for_selector("html[data-ready]")
         opened.used = False
     yield opened
@@ -236,6 +237,93 @@ def test_knee_and_chosen_solution_are_marked(seen, front):
         assert chart.locator(f"path.special.{mark}").get_attribute("transform") == place
 
 
+def drawn_heights(page):
+    """Return how high each solution stands in the chart, by its number."""
+    dots = page.locator("#chart circle.front-dot").evaluate_all(
+        "all => all.map((at) => [at.dataset.row, at.cy.baseVal.value])"
+    )
+    return {int(row): y for row, y in dots}
+
+
+@pytest.mark.parametrize("measure", ["max_error", "error"])
+def test_the_chart_shows_any_error_and_the_searches_go_by_it(visit, front, measure):
+    page = visit.page
+    assert page.input_value("#axis") == "mean_error"
+    assert page.inner_text("#axis-remarks") == ""
+    page.select_option("#axis", measure)
+    assert page.input_value("#measure") == measure
+    assert MEASURES[measure].label in page.locator("#chart .axes .name").last.text_content()
+    heights = drawn_heights(page)
+    values = {row: getattr(front[row], measure) for row in heights}
+    assert len(heights) == len(front)
+    assert sorted(heights, key=lambda row: (values[row], row)) == sorted(heights, key=lambda row: (-heights[row], row))
+    limit = front[-2].triangles
+    page.fill("#most-triangles", str(limit))
+    page.click("#by-triangles button")
+    assert shown(page) == min((s for s in front if s.triangles <= limit), key=lambda s: getattr(s, measure)).solution
+    assert ("by the max error a larger mesh may be the worse one" in page.inner_text("#axis-remarks")) == (
+        measure == "max_error"
+    )
+    page.select_option("#measure", "rms_error")
+    assert page.input_value("#axis") == "rms_error"
+
+
+def test_what_has_no_such_error_is_left_out_of_the_chart_and_named(browser, front, folder, tmp_path):
+    known = np.where(np.arange(len(front)) == 2, 5.0, np.nan)
+    stored = replace(
+        read_front(folder),
+        refitted_error=known,
+        refitted_meshes=("refitted/2.ply",) * len(front),
+        series={"start": front.F},
+    )
+    page = simplification_page(stored, front.surface, front.kept, measure="error", folder=folder, knee=3)
+    (series,) = data_of(page)["series"]
+    assert series["y"]["error"] == front.F[:, 0].tolist()
+    np.testing.assert_allclose(series["y"]["mean_error"], [s.mean_error for s in front], rtol=1e-12)
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    visit = Visit(browser, path)
+    assert visit.page.locator("#chart .legend").inner_text().endswith("start")
+    visit.page.select_option("#axis", "refitted_error")
+    assert set(drawn_heights(visit.page)) == {2}
+    remarks = visit.page.inner_text("#axis-remarks")
+    assert f"1 of {len(front)} solutions have a refitted error." in remarks
+    assert "Not drawn, as their refitted error is not known: start." in remarks
+    assert "start" not in visit.page.inner_text("#chart .legend")
+    visit.page.locator("#slider").fill("4")  # one that is not drawn
+    assert shown(visit.page) == 4
+    visit.check()
+    visit.close()
+
+
+def test_a_link_opens_the_page_where_it_was_copied(visit, front, browser, folder):
+    page = visit.page
+    entries = page.evaluate("history.length")
+    page.locator("#slider").fill("7")
+    page.locator("#slider").fill("5")
+    assert shown(page) == 5
+    until(page, "location.hash === '#solution=5'")
+    page.select_option("#axis", "max_error")
+    until(page, "location.hash === '#solution=5&axis=max_error'")
+    assert page.evaluate("history.length") == entries  # the way back is the way out
+    page.click("#copy-link")
+    until(page, "document.getElementById('link-copied').textContent !== ''")
+    other = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+    other.page.goto("about:blank")
+    other.page.goto(page.url)
+    other.page.wait_for_selector("html[data-ready]")
+    until(other.page, "state.opened")
+    assert shown(other.page) == 5
+    assert other.page.input_value("#axis") == "max_error"
+    other.page.evaluate("location.hash = '#solution=2'")
+    other.page.wait_for_selector("html[data-shown='2']")
+    other.page.evaluate("location.hash = '#solution=99&axis=nothing'")
+    until(other.page, "document.getElementById('answer').className === 'missed'")
+    assert other.page.inner_text("#answer") == f"The link names solution 99; there are 0 to {len(front) - 1}."
+    assert shown(other.page) == 2
+    other.close()
+
+
 # ------------------------------------------------------------------------------------------------------------ looking
 
 
@@ -335,6 +423,55 @@ def parsed(path):
         return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=np.int64) - 1
     corners = np.array([words[1:] for words in lines if words[0] == "vertex"], dtype=float)
     return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+def taken(page, suffix, folder):
+    """Return the path of the file that a button downloads."""
+    with page.expect_download() as download:
+        page.click(f"#downloads button[value={suffix}]")
+    path = folder / f"page.{suffix}"
+    download.value.save_as(path)
+    return path
+
+
+def chunks(path):
+    """Return the tree of a GLB and the parts of its buffer, by accessor."""
+    content = path.read_bytes()
+    size = int.from_bytes(content[12:16], "little")
+    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
+    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
+    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]
+
+
+def words(path):
+    """Return the words of a text, numbers as such, however they are spelled, in an order of their own."""
+    found = []
+    for word in re.split(r"[\s<>\"=]+", path.read_text(encoding="utf-8")):
+        try:
+            found.append(float(word))
+        except ValueError:
+            found.append(word)
+    return sorted(found, key=str)
+
+
+def sorted_faces(faces):
+    """Return triangles, each from its smallest vertex on, sorted."""
+    rows = [tuple(np.roll(row, -int(np.argmin(row))).tolist()) for row in np.asarray(faces)]
+    return sorted(rows)
+
+
+def test_a_downloaded_glb_is_the_file_that_the_package_writes(visit, front, tmp_path):
+    front[2].save(tmp_path / "package.glb")
+    (ours, parts), (theirs, own) = chunks(taken(visit.page, "glb", tmp_path)), chunks(tmp_path / "package.glb")
+    assert ours == theirs
+    assert parts[:-1] == own[:-1]
+    faces = [sorted_faces(np.frombuffer(part[-1], "<u4").reshape(-1, 3)) for part in (parts, own)]
+    assert faces[0] == faces[1]
+    source = read_source(tmp_path / "page.glb")
+    used = np.unique(front[2].faces)
+    away = np.abs(source.points - front.model.file_points[used]).max()
+    assert 0 < away < 1e-5  # half a step of single precision from the local origin, at 23 units
+    assert source.attributes["color"].tolist() == front.model.attributes["color"][used].tolist()
 
 
 @pytest.mark.parametrize("suffix", ["ply", "obj", "stl"])
@@ -750,6 +887,14 @@ def lined(tmp_path_factory):
     return front, front.save(place / "out", chosen=2)
 
 
+@pytest.fixture(scope="module")
+def lined_page(browser, lined):
+    visit = Visit(browser, lined[1] / "report.html", viewport={"width": 1280, "height": 1000})
+    yield visit.page
+    visit.check()
+    visit.close()
+
+
 def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     front, folder = lined
     visit = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
@@ -776,6 +921,28 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     assert len(edges) == 2 * (len(front[0].lines[0]) - 1)
     visit.check()
     visit.close()
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "xml", "glb", "stl"])
+def test_break_lines_are_in_the_files_as_the_package_writes_them(lined_page, lined, tmp_path, suffix):
+    front, _ = lined
+    front[2].save(tmp_path / f"package.{suffix}")
+    path = taken(lined_page, suffix, tmp_path)
+    if suffix in ("glb", "stl"):
+        assert len(read_source(path).faces) == front[2].triangles
+        return
+    ours, theirs = (read_lines(tmp_path / f"{name}.{suffix}") for name in ("page", "package"))
+    assert [line.tolist() for line in ours.lines] == [line.tolist() for line in theirs.lines]
+    assert ours.names == theirs.names
+    if suffix == "ply":  # but for the order of the triangles, whose rows are 13 bytes each
+        head, body = zip(
+            *(file.read_bytes().split(b"end_header\n") for file in (path, tmp_path / "package.ply")), strict=True
+        )
+        n, m = front[2].vertices, front[2].triangles
+        assert head[0] == head[1]
+        assert body[0][: 24 * n] + body[0][24 * n + 13 * m :] == body[1][: 24 * n] + body[1][24 * n + 13 * m :]
+        return
+    assert words(path) == words(tmp_path / f"package.{suffix}")
 
 
 def test_a_page_without_break_lines_says_nothing_of_any(seen):
