@@ -283,6 +283,30 @@ def test_the_slider_of_heights_multiplies_and_finds_true_proportions(page):
         assert page.locator("#heights").get_attribute("aria-valuetext") == f"{factor} times as high"
 
 
+def test_the_ruler_is_as_long_as_it_says_and_the_arrow_points_north(page):
+    for azimuth, polar in ((0.0, 0.3), (2.0, 0.9)):
+        page.evaluate(f"state.viewer.look({azimuth}, {polar})")
+        page.evaluate(DRAWN)
+        said = float(page.inner_text("#ruler-length").removesuffix(" m"))
+        drawn = page.locator("#ruler-bar").bounding_box()["width"]
+        assert 25 < drawn < 0.45 * page.locator("#original-window").bounding_box()["width"]
+        # steps in the picture from what is looked at: to its right, and to the north
+        across, north = page.evaluate(
+            """(length) => { const { camera, controls, size } = state.viewer;
+            const [, , width, height] = state.viewer.window(0);
+            const at = (step) => controls.target.clone().add(step).project(camera);
+            const none = at(new THREE.Vector3());
+            const right = new THREE.Vector3(1, 0, 0).transformDirection(camera.matrixWorld);
+            return [right.multiplyScalar(length / size), new THREE.Vector3(0, 0.01, 0)].map((step) => {
+              const end = at(step); return [(end.x - none.x) * width / 2, (end.y - none.y) * height / 2]; }); }""",
+            said,
+        )
+        assert across[0] == pytest.approx(drawn, abs=1.5)
+        turned = page.evaluate("document.getElementById('north').style.transform")
+        angle = np.radians(float(turned.removeprefix("rotate(").removesuffix("deg)")))
+        np.testing.assert_allclose([np.sin(angle), np.cos(angle)], north / np.linalg.norm(north), atol=0.03)
+
+
 # ----------------------------------------------------------------------------------------------------- what is compared
 
 

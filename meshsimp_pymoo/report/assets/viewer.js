@@ -552,7 +552,7 @@ class MeshPair {
   // How far north is turned from upwards in the picture, clockwise.
   get north() {
     const arm = this.camera.position.clone().sub(this.middle);
-    return -Math.atan2(arm.x, -arm.y);
+    return Math.atan2(arm.x, (-arm.y * arm.z) / arm.length());
   }
 
   // What the canvas shows now, drawn with so many pixels to one of the page.
