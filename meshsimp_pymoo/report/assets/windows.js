@@ -238,6 +238,7 @@ function withoutWebgl(reason) {
   part("no-3d").hidden = !reason;
   part("no-3d").textContent = `The meshes cannot be shown: ${reason}. All else works.`;
   for (const needing of document.querySelectorAll(".needs-webgl")) needing.hidden = Boolean(reason);
+  part("divider").hidden = !state.viewer?.wiped;
 }
 
 // The factor of the slider of heights, whose scale is logarithmic: exactly 1 is easily found again.
