@@ -81,6 +81,7 @@ class MeshPair {
     }
     this.heights = [low[2], high[2]];
     const size = Math.max(high[0] - low[0], high[1] - low[1]) || 1;
+    this.size = size; // model units to one of the scene
     this.extent = [0, 1, 2].map((k) => (high[k] - low[k]) / size);
     const local = new Float32Array(3 * count);
     const uv = new Float32Array(2 * count);
@@ -535,6 +536,23 @@ class MeshPair {
       if (part.lines && this.linesShown) this.drawLines(part.lines, width, height);
     });
     this.onDraw();
+  }
+
+  get middle() {
+    return this.controls.target;
+  }
+
+  // Pixels of the page to a model unit across the picture, where the camera looks at.
+  get pixelsPerUnit() {
+    const { camera } = this;
+    const distance = camera.position.distanceTo(this.middle);
+    return (this.window(0)[3] * camera.zoom) / (2 * Math.tan((camera.fov * Math.PI) / 360) * distance * this.size);
+  }
+
+  // How far north is turned from upwards in the picture, clockwise.
+  get north() {
+    const arm = this.camera.position.clone().sub(this.middle);
+    return Math.atan2(arm.x, (-arm.y * arm.z) / arm.length());
   }
 
   // What the canvas shows now, drawn with so many pixels to one of the page.
