@@ -8,6 +8,7 @@ above DRAWN_VERTICES the picture of the original.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,8 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
-from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
+from meshsimp_pymoo.report.colours import embedded_image, hypsometric, magma
+from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, slug
 from meshsimp_pymoo.report.downloads import downloads
 from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, original_mesh, winding
 from meshsimp_pymoo.reprs import brief
@@ -41,8 +43,8 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "body.js", "windows.js",
-    "simplification.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "body.js",
+    "windows.js", "simplification.js",
 )  # fmt: skip
 # Where closed meshes are shown.
 OF_BODIES = "body.js"
@@ -51,13 +53,17 @@ PAGE_BYTES = 15_000_000
 FIXED_BYTES = 700_000
 # What one triangle, one deviation and one vertex take, embedded; measured on scans and terrain. Too low an estimate is
 # put right afterwards, too high a one leaves out meshes that would have fitted.
-TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES = 4.0, 1.2, 26.0
+TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES, UV_BYTES = 4.0, 1.2, 26.0, 9
 # A deviation d is embedded as the level 254 sqrt(d / largest), which keeps small ones apart.
 LEVELS, UNCOVERED_LEVEL = 254, 255
 # The colours of the error end where this share of the knee's vertices are below: a few spikes do not pale all the rest.
 SCALE_QUANTILE = 0.98
 # Of break lines with more vertices than these together, what thinning left of them is drawn on the original.
 DRAWN_LINE_VERTICES = 10_000
+# How the meshes can be coloured, as the page calls it; the first ones only where the model has them.
+COLOURS = {"texture": "texture", "own": "own colours", "plain": "plain", "height": "heights", "error": "error"}
+# The slider of the heights reaches from a tenth of the lower of their usual factor and 1 to ten times the higher one.
+HEIGHT_DECADES = 1.0
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
 RECORDED = ("algorithm", "seed", "generations", "evaluations", "moves", "interrupted")
 # A setting of more values than these (one weight a vertex) is counted on the page, not listed.
@@ -81,7 +87,7 @@ class _Embedded:
         The same, embedded.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
-        of these, and its break lines, chains of rows of ``vertices``, if there are any; None where its mesh is left out.
+        of these, and its break lines, chains of rows of ``vertices``, if it has any; None where it is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -144,7 +150,12 @@ def simplification_page(
     whole = bool(original[0].all())  # else the largest mesh would take the place of many
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
     lines = _original_lines(surface)
-    held = _embedded(surface, kept, front, original, order, knee, limit - (len(lines["data"]) if lines else 0))
+    uv, texture, word = model.attributes.get("uv"), None, ""
+    if uv is not None and model.material is not None and model.material.image:
+        texture, word = embedded_image(model.material)
+    taken = len(lines["data"]) if lines else 0
+    taken += len(texture["image"]) + UV_BYTES * int(original[0].sum()) if texture else 0
+    held = _embedded(surface, kept, front, original, order, knee, limit - taken)
     missing = sum(solution is None for solution in held.solutions)
     numbers = dict(front.quality)
     if front.refitted_error is not None:
@@ -154,6 +165,9 @@ def simplification_page(
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
     points = model.file_points[held.vertices].astype(np.float64)
     files = downloads(surface, points, held.faces, held.line_names)
+    ramps = {"error": magma()} if view.is_closed else {"height": hypsometric(), "error": magma()}
+    colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
+    own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
@@ -192,7 +206,9 @@ def simplification_page(
         "faces": held.original,
         "lines": lines,
         "solutions": held.solutions,
-        "colours": magma(),
+        "texture": texture
+        and texture | {"uv": embedded_array(np.asarray(uv)[held.vertices].astype(np.float32).astype(float))},
+        "colours": ramps,
         "uncovered_colour": [int(UNCOVERED[k : k + 2], 16) for k in (1, 3, 5)],
         "scale_end": held.scale_end,
         "scale_quantile": SCALE_QUANTILE,
@@ -206,8 +222,10 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing)],
+        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing), *([word] if word else [])],
         heights=None if view.is_closed else _heights(view.exaggeration),
+        colours={name: COLOURS[name] for name in colours},
+        own_colours=own,
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
             "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
@@ -241,9 +259,10 @@ def _closed_look(surface: Surface) -> dict[str, Any]:
 
 
 def _heights(exaggeration: float) -> dict[str, str]:
-    """Return what the slider of the heights is made of."""
-    value = float(f"{exaggeration:.2g}")
-    return {"value": f"{value:g}", "step": f"{value / 20:g}", "most": f"{5 * value:g}"}
+    """Return the ends of the slider of the heights and where it stands: logarithms of the factor."""
+    usual = math.log10(exaggeration)
+    least, most = min(0.0, usual) - HEIGHT_DECADES, max(0.0, usual) + HEIGHT_DECADES
+    return {"least": f"{least:.2f}", "most": f"{most:.2f}", "usual": f"{usual:.2f}"}
 
 
 def _errors() -> dict[str, str]:
@@ -337,7 +356,7 @@ def _embedded(
 
 
 def _embedded_lines(chains: Sequence[IntArray], names: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
-    """Return break lines as the browser unpacks them: their vertices one after the other, their lengths, their names."""
+    """Return break lines as the browser unpacks them: the vertices of all, how many each has, their names."""
     place = {name: k for k, name in enumerate(known)}
     columns = {
         "rows": np.concatenate(chains),

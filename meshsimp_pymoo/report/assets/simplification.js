@@ -14,6 +14,8 @@ function spell(value) {
   return size >= 1e9 || size < 1e-4 ? d3.format(".6~e")(value) : sixDigits(value);
 }
 
+const sizeOf = (row) =>
+  `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
 const named = (column) => measures[column]?.label ?? column.replace("_", " ");
 const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
@@ -22,7 +24,7 @@ const percent = (share) => `${d3.format(share < 1e-3 ? ".2~r" : share < 0.0995 ?
 
 // -------------------------------------------------------------------------------------------------------- picking
 
-const state = { row: null, mesh: null, viewer: null, geometry: null };
+const state = { row: null, mesh: null, pinned: null, viewer: null, geometry: null };
 
 function describe(row) {
   const name = part("axis").value;
@@ -91,7 +93,7 @@ function step(by) {
 
 document.addEventListener("keydown", (event) => {
   const onChart = part("chart").contains(event.target);
-  if (event.target !== document.body && !onChart) return;
+  if (event.target !== document.body && event.target.tagName !== "BUTTON" && !onChart) return;
   if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
   const moves = { ArrowRight: 1, ArrowLeft: -1 };
   if (onChart) Object.assign(moves, { ArrowUp: -1, ArrowDown: 1, Home: -count, End: count });
@@ -112,8 +114,7 @@ async function pick(row) {
   const file = `${data.stem}_${columns.triangles[row]}.ply`;
   part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
   const solution = data.solutions[row];
-  part("simplified-title").textContent =
-    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
+  part("simplified-title").textContent = sizeOf(row);
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
   const [faces, levels, lines] = solution
@@ -123,10 +124,7 @@ async function pick(row) {
   const edges = lines.length ? lines.flatMap(({ rows }) => [...rows.subarray(1)].flatMap((row, k) => [rows[k], row])) : null;
   state.mesh = faces && { row, faces, levels, lines, edges };
   document.documentElement.dataset.shown = row;
-  if (state.viewer) {
-    state.viewer.show(faces, edges);
-    paintErrors();
-  }
+  showMesh();
 }
 
 function refitted(row) {
@@ -304,7 +302,6 @@ part("copy-link").addEventListener("click", async () => {
 });
 
 if (data.closed?.open) part("inside-key").style.background = data.closed.open.inside;
-colourBar();
 measureBy(part("axis").value);
 pick(data.chosen === null ? data.knee : data.chosen);
 openViewer().then(() => {
