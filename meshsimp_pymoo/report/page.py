@@ -43,7 +43,7 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "body.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "painter.js", "viewer.js", "body.js",
     "windows.js", "simplification.js",
 )  # fmt: skip
 # Where closed meshes are shown.
