@@ -309,9 +309,12 @@ class SoftwareRenderer {
           }
           if (isLit) {
             if (normals) {
-              const turned = [0, 1, 2].map((k) => sa * normals[3 * a + k] + sb * normals[3 * b + k] + sc * normals[3 * c + k]);
-              const size = (Math.hypot(...turned) || 1) * (material.side === THREE.DoubleSide || material.side === THREE.BackSide ? Math.sign(area) : 1);
-              light(turned[0] / size, turned[1] / size, turned[2] / size, shade);
+              const [i, j, k] = [3 * a, 3 * b, 3 * c];
+              const nx = sa * normals[i] + sb * normals[j] + sc * normals[k];
+              const ny = sa * normals[i + 1] + sb * normals[j + 1] + sc * normals[k + 1];
+              const nz = sa * normals[i + 2] + sb * normals[j + 2] + sc * normals[k + 2];
+              const size = (Math.sqrt(nx * nx + ny * ny + nz * nz) || 1) * Math.sign(area); // to the viewer
+              light(nx / size, ny / size, nz / size, shade);
             }
             const falls = normals ? shade : flat;
             [r, g, blue] = [r * falls[0], g * falls[1], blue * falls[2]];
@@ -325,11 +328,11 @@ class SoftwareRenderer {
   // Normals in the frame of the camera: heights may be multiplied.
   turnedNormals(normals, toView) {
     const m = toView;
-    const columns = [0, 4, 8].map((k) => [m[k], m[k + 1], m[k + 2]]);
-    const stretch = columns.map((column) => column.reduce((sum, value) => sum + value * value, 0) || 1);
+    const [sx, sy, sz] = [0, 4, 8].map((k) => m[k] ** 2 + m[k + 1] ** 2 + m[k + 2] ** 2 || 1);
     const found = new Float32Array(normals.length);
     for (let i = 0; i < normals.length; i += 3) {
-      for (let k = 0; k < 3; k++) found[i + k] = columns.reduce((sum, column, j) => sum + (column[k] * normals[i + j]) / stretch[j], 0);
+      const [x, y, z] = [normals[i] / sx, normals[i + 1] / sy, normals[i + 2] / sz];
+      for (let k = 0; k < 3; k++) found[i + k] = m[k] * x + m[k + 4] * y + m[k + 8] * z;
     }
     return found;
   }
