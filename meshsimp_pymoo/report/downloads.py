@@ -1,4 +1,4 @@
-"""The files that a page makes of its meshes: what the package writes of one triangle, for the page to put the others in.
+"""The files that a page makes of its meshes: what the package writes of one triangle, in which the page puts others.
 
 So the page knows of a format only where the numbers stand; reference system, unit, local origin, axes and names are
 said in the package's own words.
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, shared_frame, written_formats

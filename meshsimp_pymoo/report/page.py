@@ -43,7 +43,7 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "body.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "painter.js", "viewer.js", "body.js",
     "windows.js", "simplification.js",
 )  # fmt: skip
 # Where closed meshes are shown.
@@ -89,7 +89,7 @@ class _Embedded:
         The same, embedded.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
-        of these, and its break lines, chains of rows of ``vertices``, if there are any; None where its mesh is left out.
+        of these, and its break lines, chains of rows of ``vertices``, if it has any; None where it is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -165,11 +165,11 @@ def simplification_page(
     # what is not known is null
     columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
+    points = model.file_points[held.vertices].astype(np.float64)
+    files = downloads(surface, points, held.faces, held.line_names)
     ramps = {"error": magma()} if view.is_closed else {"height": hypsometric(), "error": magma()}
     colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
     own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
-    points = model.file_points[held.vertices].astype(np.float64)
-    files = downloads(surface, points, held.faces, held.line_names)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
@@ -370,7 +370,7 @@ def _embedded(
 
 
 def _embedded_lines(chains: Sequence[IntArray], names: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
-    """Return break lines as the browser unpacks them: their vertices one after the other, their lengths, their names."""
+    """Return break lines as the browser unpacks them: the vertices of all, how many each has, their names."""
     place = {name: k for k, name in enumerate(known)}
     columns = {
         "rows": np.concatenate(chains),
