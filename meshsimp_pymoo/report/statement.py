@@ -279,7 +279,8 @@ def _accuracy_rows(stated: QualityStatement) -> Rows:
     rows: Rows = [("Check points", points, f"vertices of the original, {weighed}{left_out}")]
     if not stated.closed:
         costs = {"nearest": "they count with their distance to the mesh", "ignore": "they count as 0"}
-        rows.append(("Not covered", f"{stated.uncovered:,}", costs[stated.outside] if stated.uncovered else ""))
+        rows.append(("Not covered", f"{stated.uncovered:,}", costs.get(stated.outside, "") if stated.uncovered else ""))
+    if not math.isnan(stated.coverage):
         rows.append(("Coverage", in_per_cent(stated.coverage), "of the original's area in the plane"))
     rows += [
         ("LE90, as counted", length(stated.le90), "90 % of the check points are no farther off"),
@@ -289,7 +290,7 @@ def _accuracy_rows(stated: QualityStatement) -> Rows:
         ("RMSE", length(stated.rms_error), "root mean square"),
         ("Mean absolute error", length(stated.mean_error), ""),
     ]
-    if not stated.closed:
+    if not math.isnan(stated.bias):
         rows += [
             ("Bias", length(stated.bias), "mean of original minus mesh, where it is covered"),
             ("Standard deviation", length(stated.standard_deviation), "about the bias"),
