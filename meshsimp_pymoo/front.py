@@ -59,6 +59,7 @@ from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
+    LENGTH,
     MAXIMUM,
     MEASURES,
     OF_LINES,
@@ -322,7 +323,9 @@ class FrontSolution(_Numbers):
 
         figure = Figure(figsize=(5.0, 4.2), dpi=90, layout="constrained")
         self.plot(figure.subplots()).set_title(
-            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}", fontsize=10
+            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}"
+            + f" {self.front.unit}" * (self.front.unit != LENGTH),
+            fontsize=10,
         )
         return _png(figure)
 
@@ -1211,7 +1214,9 @@ class Front(Sequence[FrontSolution]):
         shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name in also]
         shown = [name for name in shown if not all(np.isnan(getattr(q, name)) for q in self.quality)]
         names = sorted(shown, key=lambda name: MEASURES[name].is_error)
-        header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
+        unit = "" if self.unit == LENGTH else f" [{html.escape(self.unit)}]"
+        labels = [MEASURES[name].label + unit * MEASURES[name].is_error for name in names]
+        header = "".join(f"<th>{label}</th>" for label in ("solution", *labels))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]

@@ -81,13 +81,13 @@ from meshsimp_pymoo.formats.table import (
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
 from meshsimp_pymoo.surface.kinds import stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
+from meshsimp_pymoo.surface.measures import COUNTED, LENGTH, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
 from meshsimp_pymoo.surface.smallest import facts_of_lines
 from meshsimp_pymoo.surface.solid import as_solid, check_solid
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
-from meshsimp_pymoo.surface.units import metres_per_model_unit
+from meshsimp_pymoo.surface.units import length_unit, metres_per_model_unit
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
@@ -429,11 +429,13 @@ def write_front(
             arrays_of |= stored_arrays(surface)
         write_npz(partial / "front.npz", F=F[order], **arrays_of)
         shape = getattr(model, "shape", None)  # of a height grid
+        unit = length_unit(model.georeference)
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
                 "file": path_from(target, model.name),
                 "hash": model.hash,
+                **({} if unit == LENGTH else {"unit": unit}),
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
                 "up": surface.view.rotation[2],

@@ -224,7 +224,7 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing), *([word] if word else [])],
+        thinned=[*_what_was_searched(front.run, unit), *_what_is_thinned(model, held, missing), *([word] if word else [])],
         heights=None if view.is_closed else _heights(view.exaggeration),
         colours={name: COLOURS[name] for name in colours},
         own_colours=own,
@@ -436,11 +436,11 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     return files
 
 
-def _what_was_searched(run: Mapping[str, Any]) -> Iterator[str]:
+def _what_was_searched(run: Mapping[str, Any], unit: str) -> Iterator[str]:
     if run.get("wish"):
         yield (
-            f"What was searched is the mesh with {in_words(run['wish'])}. The others came along: a search for the "
-            "whole front would find better ones far from it."
+            f"What was searched is the mesh with {in_words(run['wish'], unit)}. The others came along: a search for "
+            "the whole front would find better ones far from it."
         )
 
 
