@@ -124,6 +124,9 @@ class Format(NamedTuple):
         Whether it says from which origin its coordinates count; then single precision loses nothing that matters.
     keeps : tuple of str, optional
         The attributes of vertices that it holds when written, among them "uv", with which the material goes; None: all.
+    pack : callable, optional
+        ``pack(mesh, most)`` returns the mesh compressed so that no vertex moves by more than so many metres, as far as
+        the library can; ``write`` then writes that. A ResultError if the library is missing.
     refuse : callable, optional
         ``refuse(model)`` raises a ResultError if it cannot hold meshes of this model.
     one_height : bool
@@ -154,6 +157,7 @@ class Format(NamedTuple):
     single: Callable[[OutMesh], FloatArray] | None = None
     states_origin: bool = False
     keeps: tuple[str, ...] | None = ()
+    pack: Callable[[OutMesh, float], OutMesh] | None = None
     refuse: Callable[[Held], None] | None = None
     one_height: bool = False
     needs: str = ""

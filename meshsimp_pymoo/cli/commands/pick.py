@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from meshsimp_pymoo.cli.requests import Wish
@@ -47,6 +48,11 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"mesh to write; its suffix is its format: {', '.join(written_suffixes())} (default: nothing is written)",
     )
+    parser.add_argument(
+        "--compress",
+        action="store_true",
+        help="compress a GLB (Draco): vertices move by at most a twentieth of the mean error",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
     add_solid(parser, "the mesh")
     parser.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
@@ -72,8 +78,11 @@ def run(args: argparse.Namespace) -> int:
     if args.solid is not None and args.output is None:
         raise UsageError("--solid is of a file that is written; name it (-o FILE), or leave --solid out")
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
+    if args.compress and path is None:
+        raise UsageError("--compress is of the mesh that is written; name its file (-o FILE.glb)")
     with said_when_compiling(args.quiet):
-        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, args.solid, **shown)
+        how = {"overwrite": args.overwrite, "solid": args.solid}
+        return _pick(args.front, args.model, wish, args.solution, path, how, compress=args.compress, **shown)
 
 
 def _pick(
@@ -82,9 +91,9 @@ def _pick(
     wish: Wish,
     number: int | None,
     path: Path | None,
-    overwrite: bool,
-    solid: float | None,
+    how: Mapping[str, Any],
     *,
+    compress: bool,
     quiet: bool,
     as_json: bool,
 ) -> int:
@@ -105,23 +114,30 @@ def _pick(
     if solution is None:
         say(f"{folder}: {missed}; nothing is written")
         return TARGET_MISSED
-    closed = {}
+    moved: dict[str, float] = {}
+    closed: dict[str, Any] = {}
     if path is not None:
-        solution.save(path, overwrite=overwrite, solid=solid)
-        closed = {} if solid is None else {"solid": {"thickness": solid, **solution.solid(solid).numbers}}
+        if compress:
+            moved["moved_by_at_most_m"] = solution.save_compressed(path, **how)
+        else:
+            solution.save(path, **how)
+        thickness = how["solid"]
+        closed = {} if thickness is None else {"solid": {"thickness": thickness, **solution.solid(thickness).numbers}}
     if note := _how_far(front, folder, model, solution, wish):
         say(f"note: {note}")
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
-        said = {"mesh": mesh, "solution": number, "free": solution.free, **in_numbers(solution.quality), **closed}
+        said = {"mesh": mesh, "solution": number, "free": solution.free, **moved}
+        said |= in_numbers(solution.quality) | closed
         tell(json.dumps(said, indent=2))
     elif not quiet:
         which = f"solution {solution.solution}" if stored else "between two solutions"
         tell(f"{which} of {folder}{', free' * solution.free}: {described(solution.quality, front.unit)}")
         if closed:
             tell(f"solid: {solid_in_words(closed['solid'], front.unit)}")
-        tell(f"written: {path}" if path else "nothing is written; name a file with -o")
+        off = f" (compressed; vertices moved by at most {moved['moved_by_at_most_m']:.2g} m)" if moved else ""
+        tell(f"written: {path}{off}" if path else "nothing is written; name a file with -o")
     return OK
 
 
