@@ -627,7 +627,8 @@ class MeshWriter:
         written = mesh if solid is None else solid
         if not self.compress or self.kind.pack is None:
             return written
-        return self.kind.pack(written, COMPRESSION_SHARE * error * metres_per_model_unit(self.surface.model.georeference))
+        metres = metres_per_model_unit(self.surface.model.georeference)
+        return self.kind.pack(written, COMPRESSION_SHARE * error * metres)
 
     def warn(self) -> None:
         """Say what is lost by single precision, and what the format does not hold."""
@@ -674,8 +675,9 @@ def write_solution(
     mesh, closed = writer.mesh(faces), None
     if solid is not None:
         check_solid(surface, solid, writer.kind)
-        arrays, _ = _closed(surface, faces, (mesh.vertices, mesh.faces, mesh.attributes), solid)
-        closed = replace(mesh, **dict(zip(("vertices", "faces", "attributes"), arrays, strict=True)))
+        own = mesh.vertices, mesh.faces, mesh.attributes
+        (vertices, triangles, attributes), _ = _closed(surface, faces, own, solid)
+        closed = replace(mesh, vertices=vertices, faces=triangles, attributes=attributes)
     written = writer.write(path, mesh, compressed_by or 0.0, closed)
     writer.warn()
     return written
