@@ -223,7 +223,7 @@ def test_what_is_below_has_the_colours_of_what_it_is_below(tmp_path):
     colours = np.random.default_rng(1).integers(0, 256, (80, 4), np.uint8)
     on = surface(replace(source, attributes={"color": colours, "tag": np.arange(80)}))
     faces = on.triangles(np.ones(on.n_vertices, bool))
-    write_solution(tmp_path / "a.ply", on, faces, 1.0)
+    write_solution(tmp_path / "a.ply", on, faces, solid=1.0)
     found = read_source(tmp_path / "a.ply")
     upper = {tuple(point[:2]): tag for point, tag in zip(source.points.tolist(), range(80), strict=True)}
     assert [upper[tuple(point[:2])] for point in found.points.tolist()] == found.attributes["tag"].tolist()
@@ -248,7 +248,7 @@ def test_what_has_no_base_is_refused_in_one_line(tmp_path):
     for kind in written_formats().values():
         if kind.one_height:
             with pytest.raises(ResultError, match=rf"{kind.title} holds surfaces with one height .*such as stl"):
-                write_solution(tmp_path / f"a{kind.suffix}", on, on.model.faces, 1.0)
+                write_solution(tmp_path / f"a{kind.suffix}", on, on.model.faces, solid=1.0)
 
 
 # ------------------------------------------------------------------------------------------------------------ the shell
