@@ -19,8 +19,8 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import cached_property
-from pathlib import Path
+from functools import cache, cached_property
+from pathlib import Path, PurePath
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
@@ -48,11 +48,13 @@ from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
     PICTURES,
+    STATEMENT,
     even_selection,
     read_front,
     write_front,
     write_solution,
 )
+from meshsimp_pymoo.surface.accuracy import Compared, compare, compare_subset
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
@@ -71,6 +73,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
+from meshsimp_pymoo.surface.solid import Solid, as_solid
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
     Refitted,
@@ -89,6 +92,8 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+    from meshsimp_pymoo.report.statement import QualityStatement
+
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
@@ -101,6 +106,9 @@ HALVED = 0.01
 # A level of detail has at most so much fewer triangles than the finer one before it; fewer than so many make none: to
 # draw them takes no less time.
 LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
+# Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
+# largest nothing is said: these take seconds for each million vertices.
+SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -155,6 +163,46 @@ class FrontSolution(_Numbers):
         """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
         return self.front.surface.refit(self.simplified, until=until)
 
+    def accuracy(self, *, refitted: bool = False) -> QualityStatement:
+        """Measure the mesh in the words of surveyors: LE90, bias, NMAD, coverage, distances in space and more.
+
+        ``solution.accuracy().save("quality")`` writes the statement as data, as a page, and of a raster its residuals.
+
+        Parameters
+        ----------
+        refitted : bool
+            Measure the mesh with its vertices where their error is least instead.
+
+        Returns
+        -------
+        QualityStatement
+            All numbers are attributes; see :class:`~meshsimp_pymoo.surface.accuracy.Accuracy`.
+        """
+        from meshsimp_pymoo.report.statement import stated
+
+        return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
+
+    def _quick_statement(self) -> QualityStatement:
+        """Return the statement of the mesh without what would take more than some seconds, of which it says so."""
+        from meshsimp_pymoo.report.statement import stated
+
+        if self.front.surface.n_vertices <= SPACE_VERTICES:
+            return self.accuracy()
+        left_out = "Distances in space are left out here, so that nobody had to wait; meshsimp quality takes them."
+        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(left_out,))
+
+    def _compared(self, *, refitted: bool = False) -> Compared:
+        """Return the mesh beside its original; that of tiles is not held at once."""
+        surface = self.front.surface
+        if isinstance(surface, GridSurface) and not refitted:
+            return compare_subset(surface, self.kept | surface.pinned)
+        return compare(surface, self.refitted if refitted else self.simplified)
+
+    def _called(self, *, refitted: bool = False) -> dict[str, Any]:
+        """Return what a statement of quality calls the mesh."""
+        name = f"{PurePath(self.front.name).name}, solution {self.solution}"
+        return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
+
     @property
     def points(self) -> FloatArray:
         """The model's vertices (N, 3), as pictures show them; ``faces`` are rows of them."""
@@ -181,27 +229,40 @@ class FrontSolution(_Numbers):
         """The simplified mesh in the frame of the model's file, with its colours and attributes."""
         return mesh_of(self.front.surface, self.faces)
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
         A mesh that the front's folder holds in this format is copied, unless it names files beside it.
 
+        Parameters
+        ----------
+        path : path
+            The file.
+        overwrite : bool
+            Replace a file that exists.
+        solid : float, optional
+            Close the mesh of a height surface for printing: by walls along its outline and holes, and a flat base so
+            far below its lowest point [file units].
+
         Raises
         ------
         ResultError
-            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
+            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, it cannot be written, or
+            the surface cannot be made solid: it is closed already, or its coordinates are no lengths.
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         suffix = path.suffix.lower()
-        stored = self.front.stored_mesh(self.solution)
+        stored = self.front.stored_mesh(self.solution) if solid is None else None
         with new_file(path) as unfinished:
             if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.surface, self.faces)
+                write_solution(unfinished, self.front.surface, self.faces, solid=solid)
         return path
 
-    def save_compressed(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> float:
+    def save_compressed(
+        self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None
+    ) -> float:
         """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
 
         That is no more than a twentieth of its mean error, as far as single precision lets it.
@@ -213,9 +274,23 @@ class FrontSolution(_Numbers):
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         with new_file(path) as unfinished:
-            written = write_solution(unfinished, self.front.surface, self.faces, compressed_by=self.mean_error)
+            written = write_solution(
+                unfinished, self.front.surface, self.faces, solid=solid, compressed_by=self.mean_error
+            )
         assert written.packed is not None
         return written.packed.shift
+
+    def solid(self, thickness: float) -> Solid:
+        """Return the mesh closed by walls and a flat base, so far below its lowest point [file units].
+
+        See :mod:`meshsimp_pymoo.surface.solid`.
+
+        Raises
+        ------
+        ResultError
+            If the surface is closed already, or its coordinates are no lengths.
+        """
+        return as_solid(self.front.surface, self.faces, thickness)
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
@@ -950,6 +1025,7 @@ class Front(Sequence[FrontSolution]):
         chosen: int | FrontSolution | None = None,
         piece: int | None = None,
         refit: bool | Mapping[int, Refitted] = False,
+        solid: float | None = None,
         pictures: bool = True,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
@@ -975,6 +1051,9 @@ class Front(Sequence[FrontSolution]):
             Write each of the meshes once more refitted, and their error to ``front.csv``: with its best heights, see
             :func:`~meshsimp_pymoo.surface.height.refit_heights`, or of a closed surface its best vertices. Or only
             those of these solutions, found already.
+        solid : float, optional
+            Close the chosen mesh for printing, by walls and a flat base so far below its lowest point [file units]; all
+            other meshes stay surfaces.
         pictures : bool
             Go on to :meth:`draw`, once all else is in place.
         page : bool
@@ -1011,6 +1090,7 @@ class Front(Sequence[FrontSolution]):
             chosen=row,
             cut=None if piece is None else lambda faces: pieces(self.model, faces, piece),
             refit=fitted if refit is not False else None,
+            solid=solid,
             series=self.series,
             run=record,
             overwrite=overwrite,
@@ -1022,6 +1102,8 @@ class Front(Sequence[FrontSolution]):
 
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
         """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
+
+        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one.
 
         Parameters
         ----------
@@ -1067,8 +1149,13 @@ class Front(Sequence[FrontSolution]):
             )
             path.write_bytes(content.encode("utf-8"))
 
-        drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
-        wanted = PICTURES if page else PICTURES[:1]
+        drawings: dict[str, Callable[[Path], object]] = {PICTURES[0]: draw_front}
+        if chosen is not None and surface.n_vertices <= STATED_VERTICES:
+            statement = cache(self[chosen]._quick_statement)
+            write = (lambda path: statement().write_data(path), lambda path: statement().write_page(path))
+            drawings |= zip(STATEMENT, write, strict=True)
+        drawings[PICTURES[1]] = draw_page  # which links to the others
+        wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
 
     def stored_mesh(self, solution: int) -> Path | None:

@@ -21,16 +21,13 @@ import numpy.typing as npt
 
 from meshsimp_pymoo.errors import printable
 
-__all__ = ["embedded_array", "embedded_faces", "html_document", "magma"]
+__all__ = ["embedded_array", "embedded_faces", "html_document"]
 
 ASSETS = Path(__file__).with_name("assets")
 COMPRESSION = 9
 
 # What the browser calls the types of embedded arrays.
 KINDS = {"u1": "u1", "u2": "u2", "u4": "u4", "f8": "f8"}
-
-# Colours of the error in all pictures: pale where it is small. The darkest ones would be lost on a dark page.
-COLOUR_MAP, DARKEST, COLOURS = "magma_r", 0.9, 128
 
 
 def html_document(template: str, scripts: Sequence[str], data: Any, **values: Any) -> str:
@@ -104,15 +101,6 @@ def embedded_faces(faces: npt.NDArray[Any]) -> dict[str, str]:
     a, b, c = a[order], b[order], c[order]
     columns = np.concatenate([np.diff(a, prepend=0), b - a, c - a])
     return embedded_array(columns.astype(np.uint16 if columns.max(initial=0) < 2**16 else np.uint32))
-
-
-@cache
-def magma() -> list[list[int]]:
-    """Return the colours of the error, from none to the end of the scale: (r, g, b) from 0 to 255."""
-    from matplotlib import colormaps
-
-    rgb = colormaps[COLOUR_MAP](np.linspace(0.0, DARKEST, COLOURS))[:, :3]
-    return np.rint(255 * rgb).astype(int).tolist()
 
 
 @cache
