@@ -676,8 +676,10 @@ def write_solution(
     mesh, closed = writer.mesh(faces), None
     if solid is not None:
         check_solid(surface, solid, writer.kind)
-        arrays, _ = _closed(surface, faces, (mesh.vertices, mesh.faces, mesh.attributes), solid)
-        closed = replace(mesh, **dict(zip(("vertices", "faces", "attributes"), arrays, strict=True)))
+        (vertices, triangles, attributes), _ = _closed(
+            surface, faces, (mesh.vertices, mesh.faces, mesh.attributes), solid
+        )
+        closed = replace(mesh, vertices=vertices, faces=triangles, attributes=attributes)
     written = writer.write(path, mesh, compressed_by or 0.0, closed)
     writer.warn()
     return written

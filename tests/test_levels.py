@@ -26,7 +26,7 @@ from meshsimp_pymoo.formats.earth import LEAST_RADIUS, earth_centred, sagitta
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import format_to_write, read_source, written_formats
-from meshsimp_pymoo.levels import HEIGHT, LARGEST, PIXELS, WIDTH, forms
+from meshsimp_pymoo.levels import HEIGHT, LARGEST, PIXELS, WIDTH
 from meshsimp_pymoo.storage import COMPRESSION_SHARE
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
@@ -187,7 +187,7 @@ def test_a_flat_triangle_lies_below_the_earth_by_no_more_than_its_sagitta():
 # ------------------------------------------------------------------------------------------------------------ files
 
 
-@pytest.mark.parametrize("form", [form for form in forms() if form != "3d-tiles"])
+@pytest.mark.parametrize("form", [name for name, kind in written_formats().items() if not kind.needs])
 def test_a_folder_has_a_file_for_each_level_in_any_format(front, tmp_path, form):
     record = save_levels(front, tmp_path / "levels", form=form)
     levels = front.levels()
