@@ -55,7 +55,7 @@ DEFAULT = ("--generations", "2", "--population", "8")
 QUICK = ("--generations", "3", "--population", "12", *PAPERS)
 # The presets that the shell offers.
 ALGORITHMS = [name for name, preset in PRESETS.items() if preset.whole_front]
-COMMANDS = ("simplify", "pick", "levels", "score", "info", "run", "report", "warm", "completion")
+COMMANDS = ("simplify", "pick", "levels", "quality", "score", "info", "run", "report", "warm", "completion")
 
 
 @pytest.fixture

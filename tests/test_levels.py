@@ -13,6 +13,7 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import trimesh
 from node import run_script
 from PIL import Image
 from scipy.spatial import cKDTree
@@ -23,8 +24,9 @@ from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
 from meshsimp_pymoo.formats.earth import LEAST_RADIUS, earth_centred, sagitta
 from meshsimp_pymoo.formats.material import Material
-from meshsimp_pymoo.formats.table import read_source, written_formats
-from meshsimp_pymoo.levels import HEIGHT, LARGEST, PIXELS, WIDTH, forms
+from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.table import format_to_write, read_source, written_formats
+from meshsimp_pymoo.levels import HEIGHT, LARGEST, PIXELS, WIDTH
 from meshsimp_pymoo.storage import COMPRESSION_SHARE
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
@@ -185,7 +187,7 @@ def test_a_flat_triangle_lies_below_the_earth_by_no_more_than_its_sagitta():
 # ------------------------------------------------------------------------------------------------------------ files
 
 
-@pytest.mark.parametrize("form", [form for form in forms() if form != "3d-tiles"])
+@pytest.mark.parametrize("form", [name for name, kind in written_formats().items() if not kind.needs])
 def test_a_folder_has_a_file_for_each_level_in_any_format(front, tmp_path, form):
     record = save_levels(front, tmp_path / "levels", form=form)
     levels = front.levels()
@@ -220,6 +222,26 @@ def test_our_reader_takes_the_finest_level_and_says_that_there_are_others(tmp_pa
         again = read_source(tmp_path / "levels.glb")
     assert again.georeference == {"epsg": 32610, "unit": "metre"}
     assert np.array_equal(again.points[again.faces], corners_of(front.levels()[0]))
+
+
+def test_levels_in_glb_have_normals_as_long_as_one_that_look_out(tmp_path):
+    front = front_of(far(epsg=32610, unit="metre"))
+    save_levels(front, tmp_path / "levels", form="glb")
+    path = tmp_path / "levels" / "level-1.glb"
+    mesh = trimesh.load(path, force="mesh", process=False)
+    content = path.read_bytes()
+    length = int.from_bytes(content[12:16], "little")
+    tree = json.loads(content[20 : 20 + length])
+    (primitive,) = tree["meshes"][0]["primitives"]
+    view = tree["bufferViews"][tree["accessors"][primitive["attributes"]["NORMAL"]]["bufferView"]]
+    stored = np.frombuffer(content, "<f4", view["byteLength"] // 4, 28 + length + view["byteOffset"]).reshape(-1, 3)
+    np.testing.assert_allclose(np.linalg.norm(stored, axis=1), 1.0, atol=1e-6)
+    expected = np.zeros_like(mesh.vertices)
+    for face, normal, area in zip(mesh.faces, mesh.face_normals, mesh.area_faces, strict=True):
+        expected[face] += normal * area
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    np.testing.assert_allclose(stored, expected, atol=1e-5)
+    assert (stored[:, 1] > 0).all(), "up is Y"
 
 
 # --------------------------------------------------------------------------------------------------- other programs
@@ -380,6 +402,34 @@ def test_the_reader_of_google_unpacks_what_was_compressed_as_near_as_it_is_state
     sizes = [(tmp_path / name / "level-0.glb").stat().st_size for name in ("levels", "plain")]
     assert sizes[0] < 0.5 * sizes[1]
     assert [level["triangles"] for level in record["levels"]] == [level["triangles"] for level in plain["levels"]]
+
+
+@pytest.mark.usefixtures("draco")
+def test_draco_says_what_it_drops_and_what_its_bits_turn_over(tmp_path):
+    points = np.array([[0.0, 0, 0], [100, 0, 0], [100, 100, 0], [50, 50 + 1e-3, 0], [0, 100, 0], [0, 100, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [3, 2, 4]])
+    pack = format_to_write("glb").pack
+    with pytest.warns(ModelWarning, match=r"Draco's 8 bits turn over or flatten 1 of 4 triangles"):
+        packed = pack(OutMesh(points[:5], faces, {}, name="thin"), 1.0).packed
+    assert packed.bits == 8
+    assert packed.shift <= 100 / 255
+    assert packed.shift >= np.abs(np.rint(points[:5] / 100 * 255) * 100 / 255 - points[:5]).max()
+    with pytest.warns(ModelWarning, match=r"1 triangle\(s\) without area stay behind"):
+        assert len(pack(OutMesh(points, np.vstack([faces, [[3, 3, 4]]]), {}), 1e-5).packed.faces) == 4
+
+
+@pytest.mark.usefixtures("draco")
+def test_bits_are_as_few_as_the_error_lets_them():
+    rng = np.random.default_rng(5)
+    points = rng.random((60, 3)) * [900.0, 700.0, 100.0]
+    faces = rng.permutation(60).reshape(-1, 3)
+    pack = format_to_write("glb").pack
+    for most in (1.0, 0.1, 0.01, 1e-3):
+        packed = pack(OutMesh(points, faces, {}), most).packed
+        assert packed.shift <= most
+        step = 2.0 ** -(packed.bits - 1) * np.ptp(points, axis=0).max()
+        assert packed.bits == 8 or step * math.sqrt(3) / 2 > most, "one bit less is too few"
+    assert pack(OutMesh(points, faces, {}), 0.0).packed.bits == 24
 
 
 @pytest.mark.usefixtures("draco")

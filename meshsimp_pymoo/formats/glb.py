@@ -164,7 +164,7 @@ def _pack(mesh: OutMesh, most: float) -> OutMesh:
     said = {key: found.get_attribute_by_type(DRACO_KINDS[key]) for key in own}
     columns = {key: attribute["data"] for key, attribute in said.items()}
     ids = {key: int(attribute["unique_id"]) for key, attribute in said.items()}
-    was, shift = _nearest(points, found.points)
+    was, shift = _nearest(upright(mesh)[0], found.points)
     if lost := len(mesh.faces) - len(found.faces):
         warn_of(f"{mesh.name}: {lost:,} triangle(s) without area stay behind: Draco holds none")
     if folded := _turned_over(points[was], found.points, np.asarray(found.faces)):
@@ -227,7 +227,7 @@ def _as_stored(mesh: OutMesh) -> FloatArray:
 
 
 def _normals(mesh: OutMesh) -> FloatArray:
-    """Return unit normals (V, 3) of the vertices: the mean of their triangles' by area, and up where that is nothing."""
+    """Return unit normals (V, 3) of the vertices: the mean of their triangles' by area; up where that is nothing."""
     import numpy as np
 
     points, faces = upright(mesh)[0], np.asarray(mesh.faces)
