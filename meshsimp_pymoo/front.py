@@ -19,8 +19,8 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import cached_property
-from pathlib import Path
+from functools import cache, cached_property
+from pathlib import Path, PurePath
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
@@ -48,11 +48,13 @@ from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
     PICTURES,
+    STATEMENT,
     even_selection,
     read_front,
     write_front,
     write_solution,
 )
+from meshsimp_pymoo.surface.accuracy import Compared, compare, compare_subset
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
@@ -89,15 +91,26 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+    from meshsimp_pymoo.report.document import Framed
+    from meshsimp_pymoo.report.statement import QualityStatement
+
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
+# What a page in a notebook may take, which is saved with it.
+NOTEBOOK_BYTES = 4_000_000
 # What the front that a search started from is called, and how many of its thousands of points are drawn.
 START = "adaptive thinning (start)"
 START_POINTS = 200
 # Between two solutions of a nested front the smallest within a limit is looked for to this share of its triangles.
 HALVED = 0.01
+# A level of detail has at most so much fewer triangles than the finer one before it; fewer than so many make none: to
+# draw them takes no less time.
+LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
+# Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
+# largest nothing is said: these take seconds for each million vertices.
+SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -152,6 +165,46 @@ class FrontSolution(_Numbers):
         """Return the same triangles with vertices where their error is least, as far as ``perf_counter() = until``."""
         return self.front.surface.refit(self.simplified, until=until)
 
+    def accuracy(self, *, refitted: bool = False) -> QualityStatement:
+        """Measure the mesh in the words of surveyors: LE90, bias, NMAD, coverage, distances in space and more.
+
+        ``solution.accuracy().save("quality")`` writes the statement as data, as a page, and of a raster its residuals.
+
+        Parameters
+        ----------
+        refitted : bool
+            Measure the mesh with its vertices where their error is least instead.
+
+        Returns
+        -------
+        QualityStatement
+            All numbers are attributes; see :class:`~meshsimp_pymoo.surface.accuracy.Accuracy`.
+        """
+        from meshsimp_pymoo.report.statement import stated
+
+        return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
+
+    def _quick_statement(self) -> QualityStatement:
+        """Return the statement of the mesh without what would take more than some seconds, of which it says so."""
+        from meshsimp_pymoo.report.statement import stated
+
+        if self.front.surface.n_vertices <= SPACE_VERTICES:
+            return self.accuracy()
+        left_out = "Distances in space are left out here, so that nobody had to wait; meshsimp quality takes them."
+        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(left_out,))
+
+    def _compared(self, *, refitted: bool = False) -> Compared:
+        """Return the mesh beside its original; that of tiles is not held at once."""
+        surface = self.front.surface
+        if isinstance(surface, GridSurface) and not refitted:
+            return compare_subset(surface, self.kept | surface.pinned)
+        return compare(surface, self.refitted if refitted else self.simplified)
+
+    def _called(self, *, refitted: bool = False) -> dict[str, Any]:
+        """Return what a statement of quality calls the mesh."""
+        name = f"{PurePath(self.front.name).name}, solution {self.solution}"
+        return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
+
     @property
     def points(self) -> FloatArray:
         """The model's vertices (N, 3), as pictures show them; ``faces`` are rows of them."""
@@ -197,6 +250,22 @@ class FrontSolution(_Numbers):
             else:
                 write_solution(unfinished, self.front.surface, self.faces)
         return path
+
+    def save_compressed(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> float:
+        """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
+
+        That is no more than a twentieth of its mean error, as far as single precision lets it.
+
+        Raises
+        ------
+        ResultError
+            As :meth:`save` does, or if the format is not compressed, or the library is missing.
+        """
+        path = claim_file(path, written_suffixes(), overwrite=overwrite)
+        with new_file(path) as unfinished:
+            written = write_solution(unfinished, self.front.surface, self.faces, compressed_by=self.mean_error)
+        assert written.packed is not None
+        return written.packed.shift
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
@@ -817,6 +886,75 @@ class Front(Sequence[FrontSolution]):
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
         return self[knee(self.F)]
 
+    def levels(
+        self,
+        count: int | None = None,
+        *,
+        triangles: Sequence[int] | None = None,
+        max_error: Sequence[float] | None = None,
+    ) -> tuple[FrontSolution, ...]:
+        """Return a ladder of levels of detail: some of the solutions, the finest first, each mesh once.
+
+        They need not be nested: each has the vertices that are best for it. :func:`~meshsimp_pymoo.save_levels` writes
+        them.
+
+        Parameters
+        ----------
+        count : int, optional
+            The most levels. Without limits the first one is the most accurate solution, or the one that the front was
+            searched for; each other one is the best of at most a quarter of the triangles of the one before. By
+            default the ladder ends where that would be fewer than 32.
+        triangles, max_error : sequence of numbers, optional
+            Limits instead, one for each level, as :meth:`best` takes them.
+
+        Raises
+        ------
+        Missed
+            If no solution meets one of the limits.
+        TypeError
+            If more than one of these is given.
+        ValueError
+            If ``count`` is less than 1, or a limit makes no sense.
+
+        Examples
+        --------
+        >>> from meshsimp_pymoo import memetic
+        >>> front = Front.from_result(minimize(MeshProblem("face:200"), memetic(12), Moves(20_000), seed=1))
+        >>> [level.triangles for level in front.levels()][:2]
+        [362, 90]
+        """
+        given = {"count": count, "triangles": triangles, "max_error": max_error}
+        said = [name for name, value in given.items() if value is not None]
+        if len(said) > 1:
+            raise TypeError(f"{said[0]} does not go with {said[1]}: each says which levels there are; leave one out")
+        if count is not None and count < 1:
+            raise ValueError(f"count is {count}; a ladder has 1 level or more")
+        if triangles is not None or max_error is not None:
+            name = said[0]
+            found = [self.best(**{name: limit}) for limit in given[name]]  # type: ignore[union-attr]
+            once = {(level.triangles, level.error): level for level in found}
+            return tuple(sorted(once.values(), key=lambda level: (-level.triangles, level.error)))
+        ladder = [self._sought()]
+        while count is None or len(ladder) < count:
+            most = ladder[-1].triangles // LEVEL_FACTOR
+            if most < (FEWEST_TRIANGLES if count is None else 1):
+                break
+            try:
+                ladder.append(self.best(triangles=most))
+            except Missed:
+                break
+        return tuple(ladder)
+
+    def _sought(self) -> FrontSolution:
+        """Return the solution that the front was searched for, or the most accurate one of a whole front."""
+        if not self.run.get("wish"):
+            return self[-1]
+        try:
+            return self.best(**self.run["wish"])
+        except Missed as missed:
+            nearest: FrontSolution = missed.nearest
+            return nearest
+
     def _between(self, triangles: int) -> FrontSolution | None:
         """Return a solution of a nested front of at most so many triangles, which it may not have had so far."""
         if not isinstance(self._kept, Nested):
@@ -935,6 +1073,8 @@ class Front(Sequence[FrontSolution]):
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
         """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
 
+        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one.
+
         Parameters
         ----------
         page : bool
@@ -979,9 +1119,55 @@ class Front(Sequence[FrontSolution]):
             )
             path.write_bytes(content.encode("utf-8"))
 
-        drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
-        wanted = PICTURES if page else PICTURES[:1]
+        drawings: dict[str, Callable[[Path], object]] = {PICTURES[0]: draw_front}
+        if chosen is not None and surface.n_vertices <= STATED_VERTICES:
+            statement = cache(self[chosen]._quick_statement)
+            write = (lambda path: statement().write_data(path), lambda path: statement().write_page(path))
+            drawings |= zip(STATEMENT, write, strict=True)
+        drawings[PICTURES[1]] = draw_page  # which links to the others
+        wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
+
+    def show(self, *, height: int = 1000, limit: int = NOTEBOOK_BYTES) -> Framed:
+        """Return the page of the front for a notebook: every mesh beside the original, to turn, compare and take home.
+
+        It is the page that :meth:`draw` writes, inside the output of the cell: it needs no widget, no kernel once it is
+        there, no file and no network.
+
+        Parameters
+        ----------
+        height : int
+            Of its frame [pixels].
+        limit : int
+            Size that is not exceeded if it can be helped, by leaving out meshes [bytes]; notebooks keep what they show.
+
+        Returns
+        -------
+        Framed
+            What a notebook shows as the last value of a cell.
+
+        Raises
+        ------
+        ResultError
+            If the model of a stored front is not where its record says.
+        """
+        from tempfile import TemporaryDirectory
+
+        from meshsimp_pymoo.report.document import Framed
+        from meshsimp_pymoo.report.page import simplification_page
+
+        with TemporaryDirectory() as unstored:
+            folder = self.folder or self.save(Path(unstored) / "front", meshes=0, pictures=False)
+            content = simplification_page(
+                read_front(folder),
+                self.surface,
+                self.kept,
+                measure=self.objectives[0],
+                folder=None,
+                knee=knee(self.F),
+                limit=limit,
+            )
+        return Framed(content, height)
 
     def stored_mesh(self, solution: int) -> Path | None:
         """Return the file of a solution's mesh in the front's folder; None if it was not written."""

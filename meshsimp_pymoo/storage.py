@@ -22,6 +22,8 @@
                        (environment), when the search was begun, evaluations, moves, seconds; of a front that was
                        freed afterwards how (freeing)
     OUT/front.png      the front beside some of its meshes; OUT/report.html: the page to look and choose
+    OUT/quality.json   how accurate the chosen mesh is, if one was asked for; OUT/quality.html: the page to sign. Of any
+                       mesh in OUT/quality, where `meshsimp quality` writes it
     OUT/checkpoint.npz alone, while a search goes on or after it was killed (see `meshsimp_pymoo.search.checkpoint`)
     OUT/tiles/         alone, likewise: finished tiles (see `meshsimp_pymoo.tiles.front`)
 
@@ -69,10 +71,12 @@ from meshsimp_pymoo.formats.table import (
     Rounding,
     format_of_output,
     format_to_write,
+    listed,
     shared_frame,
     warn_of_left_behind,
     write_lines,
     write_mesh,
+    written_formats,
 )
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
 from meshsimp_pymoo.surface.kinds import stored_arrays
@@ -82,6 +86,7 @@ from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
 from meshsimp_pymoo.surface.smallest import facts_of_lines
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
+from meshsimp_pymoo.surface.units import metres_per_model_unit
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
@@ -97,15 +102,19 @@ MAY_BE_EMPTY = (*OF_MESH, *OF_LINES, "refitted_error")
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 # What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
 SECONDS_A_CORNER = 5e-7
+# How far compression may move a vertex, as a share of the mean error of its mesh.
+COMPRESSION_SHARE = 0.05
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 PICTURES = ("front.png", "report.html")  # made once all else is in place
+STATEMENT = ("quality.json", "quality.html")  # of the chosen mesh, made likewise, if there is one
+QUALITY = "quality"  # where a statement of any mesh is written by default
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 TILES = "tiles"  # finished tiles of one
 LINES = "break_lines.geojson"  # the thinned break lines
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
-    TILES, "series.csv", LINES,
+    TILES, "series.csv", LINES, *STATEMENT, QUALITY,
 )  # fmt: skip
 CHOSEN = ("chosen", "chosen_refitted")  # stems of the files of the solution that was asked for
 PACKAGES = ("meshsimp-pymoo", "pymoo", "moocore", "numpy", "scipy", "numba", "trimesh")
@@ -166,7 +175,9 @@ class StoredFront:
         return np.column_stack([self.quality["error"], self.quality["triangles"]]).astype(np.float64)
 
 
-def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+def claim_output(
+    folder: str | os.PathLike[str], *, overwrite: bool = False, is_own: Callable[[str], bool] | None = None
+) -> Path:
     """Check, before any work, that results can be written to this folder; nothing is left behind.
 
     Parameters
@@ -176,6 +187,8 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     overwrite : bool
         Accept a folder that holds results of this package already; they are replaced when the new ones are
         complete.
+    is_own : callable, optional
+        Tells of the name of an entry whether it is one of these results; by default those of a search.
 
     Returns
     -------
@@ -194,14 +207,8 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     if target.exists():
         if not overwrite:
             raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
-        foreign = sorted(
-            e.name
-            for e in target.iterdir()
-            if e.name not in OWN_ENTRIES
-            and e.stem not in CHOSEN
-            and not _of_unfinished(e.name)
-            and not is_put_beside(e.name)
-        )
+        known = is_own or _is_own
+        foreign = sorted(e.name for e in target.iterdir() if not (known(e.name) or is_put_beside(e.name)))
         if foreign:
             raise ResultError(
                 f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
@@ -217,6 +224,10 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
             f"{folder}: cannot be written in {parent} ({reason_of(problem)}); name another folder"
         ) from None
     return folder
+
+
+def _is_own(name: str) -> bool:
+    return name in OWN_ENTRIES or Path(name).stem in CHOSEN or _of_unfinished(name)
 
 
 def is_unfinished(folder: str | os.PathLike[str]) -> bool:
@@ -549,13 +560,86 @@ def _are_objectives(names: Any) -> bool:
     return True
 
 
-def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
-    """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
+class MeshWriter:
+    """Writes meshes of a surface in one format and one frame, and says once what is lost by it.
+
+    Parameters
+    ----------
+    kind : Format
+        The format.
+    surface : Surface
+        The original mesh and its rules.
+    compress : bool
+        Whether they are compressed, so that no vertex moves by more than COMPRESSION_SHARE of the mean error.
 
     Raises
     ------
     ResultError
-        If the format cannot hold this model.
+        If the format cannot hold this model, or is none that is compressed.
+    """
+
+    def __init__(self, kind: Format, surface: Surface, *, compress: bool = False) -> None:
+        kind.check(surface.model)
+        if compress and kind.pack is None:
+            known = listed((other.name for other in written_formats().values() if other.pack is not None), "or")
+            raise ResultError(f"{kind.name} is not compressed; write {known}, or leave --compress out")
+        self.kind, self.surface, self.compress = kind, surface, compress
+        self._look = _look(kind, surface)
+        self._rounding = Rounding(kind)
+
+    def mesh(self, faces: IntArray, vertices: FloatArray | None = None) -> OutMesh:
+        """Return a mesh, its triangles (M, 3) in vector order, with its own or other vertices, as it is to be written.
+
+        It is not packed.
+        """
+        own, triangles, attributes = mesh_arrays(self.surface.model, faces)
+        shown = self._look | _lines_as_written(self.surface, faces)
+        return OutMesh(own if vertices is None else vertices, triangles, attributes, **shown)
+
+    def write(self, path: Path, mesh: OutMesh, error: float) -> OutMesh:
+        """Write a mesh of this mean error [model units], packed if it is to be, and return what was written."""
+        mesh = self.packed(mesh, error)
+        assert self.kind.write is not None
+        self.kind.write(path, mesh)
+        return mesh
+
+    def packed(self, mesh: OutMesh, error: float) -> OutMesh:
+        """Return a mesh of this mean error [model units] as it is written, and take note of what is lost by it."""
+        self._rounding.add(mesh, self.surface.view.scale)
+        if not self.compress or self.kind.pack is None:
+            return mesh
+        return self.kind.pack(mesh, COMPRESSION_SHARE * error * metres_per_model_unit(self.surface.model.georeference))
+
+    def warn(self) -> None:
+        """Say what is lost by single precision, and what the format does not hold."""
+        model = self.surface.model
+        self._rounding.warn(model.name, self.surface.diagonal)
+        warn_of_left_behind(self.kind, model.name, model.attributes)
+
+
+def write_solution(path: Path, surface: Surface, faces: IntArray, *, compressed_by: float | None = None) -> OutMesh:
+    """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    surface : Surface
+        The original mesh and its rules.
+    faces : (M, 3) int array
+        The triangles.
+    compressed_by : float, optional
+        The mean error of the mesh [model units]: it is compressed as far as that lets it.
+
+    Returns
+    -------
+    OutMesh
+        What was written.
+
+    Raises
+    ------
+    ResultError
+        If the format cannot hold this model, or is none that is compressed.
 
     Warns
     -----
@@ -563,14 +647,10 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
         If single precision moves vertices by more than rounding or turns triangles over, or the format does not hold
         all that is known of the vertices.
     """
-    kind, model = format_of_output(path), surface.model
-    kind.check(model)
-    arrays, rounding = mesh_arrays(model, faces), Rounding(kind)
-    look = _look(kind, surface) | _lines_as_written(surface, faces)
-    rounding.add(OutMesh(*arrays, **look), surface.view.scale)
-    rounding.warn(model.name, surface.diagonal)
-    warn_of_left_behind(kind, model.name, model.attributes)
-    write_mesh(path, *arrays, **look)
+    writer = MeshWriter(format_of_output(path), surface, compress=compressed_by is not None)
+    written = writer.write(path, writer.mesh(faces), compressed_by or 0.0)
+    writer.warn()
+    return written
 
 
 def _look(kind: Format, surface: Surface) -> dict[str, Any]:

@@ -245,9 +245,9 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
         )
         for name in ("free_height", "no_centroids")
     },
-    ("--format landxml", CLOSED): (
-        _is_closed_and(lambda request: request.output.format == "landxml"),
-        "LandXML holds surfaces with one height at each place; write another format, such as ply",
+    ("--format {format}", CLOSED): (
+        _is_closed_and(lambda request: written_formats()[request.output.format].one_height),
+        "{title} holds surfaces with one height at each place; write another format, such as ply",
     ),
 }
 
@@ -255,7 +255,14 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
 def _filled(words: str, request: Request) -> str:
     spelled = MEASURES[request.measure].minimised if request.measure else ""
     wished = [OBJECTIVES[SEARCHED[name]].minimised for name in request.wish.limits if name in SEARCHED]
-    return words.format(wish=request.wish.options, measure=spelled, wished=listed(wished, "or") if wished else "")
+    kind = written_formats()[request.output.format]
+    return words.format(
+        wish=request.wish.options,
+        measure=spelled,
+        wished=listed(wished, "or") if wished else "",
+        format=kind.name,
+        title=kind.title,
+    )
 
 
 def _part(kind: type[Part], args: argparse.Namespace, **others: Any) -> Part:

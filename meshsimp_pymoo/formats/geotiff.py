@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from meshsimp_pymoo.errors import (
     reason_of,
 )
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.table import Format, register
+from meshsimp_pymoo.formats.table import Format, guarded, register
 
 if TYPE_CHECKING:
     import numpy as np
@@ -221,7 +221,7 @@ def _environment() -> Any:
 
 
 @contextlib.contextmanager
-def _guarded(name: str) -> Iterator[None]:
+def _guarded(name: str, done: str = "read as a GeoTIFF", way_out: str = "export it again") -> Iterator[None]:
     """Say in one line what GDAL and rasterio say, and ignore their warnings."""
     import logging
 
@@ -240,7 +240,7 @@ def _guarded(name: str) -> Iterator[None]:
         raise
     except Exception as error:  # GDAL's own errors, and what its answers break in a damaged file
         raise_if_memory(error)
-        raise ModelError(f"{name}: cannot be read as a GeoTIFF ({reason_of(error)}); export it again") from error
+        raise ModelError(f"{name}: cannot be {done} ({reason_of(error)}); {way_out}") from error
 
 
 @contextlib.contextmanager
@@ -386,15 +386,74 @@ def _georeference(raster: Any, band: int) -> dict[str, Any]:
     return facts
 
 
-register(
-    Format(
-        "geotiff",
-        (".tif", ".tiff"),
-        "GeoTIFF",
-        "grid",
-        read=_read,
-        extra="geo",
-        open_heights=_open_heights,
-        count_samples=_count_samples,
-    )
+def write_raster(
+    path: Path,
+    bands: Iterable[tuple[int, FloatArray]],
+    *,
+    shape: tuple[int, int],
+    transform: tuple[float, ...],
+    crs: str | None,
+    unit: str,
+    title: str,
+    tags: Mapping[str, str],
+    name: str,
+) -> None:
+    """Write one band of single precision, NaN where there is nothing, as a GeoTIFF.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    bands : iterable of (int, (r, columns) array)
+        First row and values of some rows, from the north; together all of them.
+    shape : (int, int)
+        Rows and columns.
+    transform : (6,) floats
+        As in `_read`.
+    crs : str, optional
+        The reference system as WKT.
+    unit : str
+        Unit of the values; empty where it is not known.
+    title : str
+        What they are.
+    tags : mapping of str to str
+        What else the file says of itself.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    ModelError
+        If rasterio is not installed, or the file cannot be written.
+    """
+    with guarded(_FORMAT, name), _guarded(name, "written", "name another folder"), _environment():
+        import affine
+        import numpy as np
+        import rasterio
+        from rasterio.windows import Window as Part
+
+        # on even rows GDAL's choice of strips would be one row each: tiles of thousands of samples open sooner
+        how = {"compress": "deflate", "predictor": 3, "blockysize": min(16, shape[0]), "BIGTIFF": "IF_SAFER"}
+        with rasterio.open(
+            str(path.resolve()), "w", driver="GTiff", height=shape[0], width=shape[1], count=1, dtype="float32",
+            nodata=math.nan, crs=crs, transform=affine.Affine(*transform), **how,
+        ) as raster:  # fmt: skip
+            raster.update_tags(TIFFTAG_IMAGEDESCRIPTION=title, **tags)
+            raster.set_band_description(1, title)
+            if unit:
+                raster.set_band_unit(1, unit)
+            for first, values in bands:
+                raster.write(values.astype(np.float32), 1, window=Part(0, first, values.shape[1], len(values)))
+
+
+_FORMAT = Format(
+    "geotiff",
+    (".tif", ".tiff"),
+    "GeoTIFF",
+    "grid",
+    read=_read,
+    extra="geo",
+    open_heights=_open_heights,
+    count_samples=_count_samples,
 )
+register(_FORMAT)

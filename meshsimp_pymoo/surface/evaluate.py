@@ -114,6 +114,7 @@ def beside_mesh(
 ) -> tuple[float, bool, int]:
     """Return d_p of a sample at (x, y, z) in no emitted triangle, whether one covers it all the same, and its segment.
 
+    Where one covers it, d_p has a sign: negative for a sample below the mesh.
     The mesh's outline are the segments ``ends`` with their ranks ``key`` and ``boxes``; ``guess`` is any of them, and
     ``stack`` has room for 64 nodes.
     """
@@ -133,7 +134,7 @@ def beside_mesh(
     is_covered = is_near and wa >= -COVER_TOLERANCE and wb >= -COVER_TOLERANCE and wc >= -COVER_TOLERANCE
     if is_covered:
         # Within rounding of the border, as on the sides of a turned rectangle.
-        d = abs(wa * site_z[a] + wb * site_z[b] + wc * site_z[c] - z)
+        d = z - (wa * site_z[a] + wb * site_z[b] + wc * site_z[c])
     else:
         dz = (1.0 - t) * site_z[a] + t * site_z[b] - z
         d = np.sqrt(d2 * unit * unit + dz * dz) if nearest else 0.0
@@ -166,9 +167,10 @@ def _measure_bare(
     guess = 0
     for q in range(n_bare):
         i = bare[q]
-        d, is_covered, guess = beside_mesh(
+        above, is_covered, guess = beside_mesh(
             site_xy, site_z, ends, key, boxes, stack, unit, nearest, xy[2 * i], xy[2 * i + 1], z[i], guess
         )
+        d = abs(above)
         if not is_covered:
             row[UNCOVERED] += 1
         w = weight[i] if len(weight) > 0 else 1.0

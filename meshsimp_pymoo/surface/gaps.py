@@ -7,6 +7,8 @@ that its heights are read band by band.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
@@ -25,8 +27,9 @@ from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import on_threads
 
 # Columns of the table of rows: sum, sum of squares and maximum of the deviations, uncovered samples; and between the
-# row and the next the sum of the deviations and the number of faces, both times the widths of cells.
-_SUM, _SQUARES, _MAXIMUM, _UNCOVERED, _BETWEEN, _FACES = range(6)
+# row and the next the sum of the deviations, the number of faces and that of those whose centroid is covered, each
+# times the widths of cells.
+_SUM, _SQUARES, _MAXIMUM, _UNCOVERED, _BETWEEN, _FACES, _COVERED = range(7)
 
 
 def emitted_of(grid: HeightGrid, xy: FloatArray, records: IntArray, rules: Rules) -> BoolArray:
@@ -83,7 +86,7 @@ def tabulated_with_gaps(
     # rounding.
     starts = np.zeros(grid.shape[0], np.int64)
     _find_starts(grid.x[columns.start], grid.y[rows], flat, records, exact_area, starts[rows])
-    table = np.zeros((grid.shape[0], 6))
+    table = np.zeros((grid.shape[0], _COVERED + 1))
     bounds = np.linspace(rows.start, rows.stop, n_threads + 1).astype(int)
     how = grid.unit, nearest, exact_area
 
@@ -102,13 +105,13 @@ def tabulated_with_gaps(
             if first < bounds[part]:
                 first, band = first + 1, band[1:]
             low, high = np.searchsorted(at, [first * n_columns, end * n_columns])
-            sizes = np.zeros(band.shape if high > low else (0, 0))
-            covers = np.zeros(sizes.shape, np.bool_)
+            residuals = np.zeros(band.shape if high > low else (0, 0))
+            covers = np.zeros(residuals.shape, np.bool_)
             _measure_rows_with_gaps(
                 grid.x, grid.y[first:end], band, lattice.bits[first:end], flat, z, records, emitted, ends, key, boxes,
-                starts[first:end], *how, table[first:end], sizes, covers,
+                starts[first:end], *how, table[first:end], residuals, covers,
             )  # fmt: skip
-            deviation[low:high] = sizes.ravel()[at[low:high] - first * n_columns]
+            deviation[low:high] = np.abs(residuals.ravel()[at[low:high] - first * n_columns])
             covered[low:high] = covers.ravel()[at[low:high] - first * n_columns]
 
     on_threads(do, range(n_threads), n_threads=n_threads)
@@ -123,6 +126,51 @@ def tabulated_with_gaps(
     elif isinstance(centroids, Between):
         surface_error = measure_between(centroids, flat, z, records, len(records), emitted, grid.unit, nearest, False)
     return row, deviation, covered, surface_error
+
+
+def residual_bands_with_gaps(
+    grid: HeightGrid, mesh: tuple[FloatArray, FloatArray, IntArray, BoolArray], nearest: bool
+) -> Iterator[tuple[int, FloatArray, BoolArray]]:
+    """Do what :func:`~meshsimp_pymoo.surface.weld.residual_bands` does; the mesh is as in the function above."""
+    xy, z, records, shown = mesh
+    flat, emitted = np.ascontiguousarray(xy).ravel(), shown.astype(np.uint8)
+    rows, columns = grid.span
+    lattice, exact_area = grid.lattice, grid.exact_ranges[0]
+    assert lattice is not None
+    ends, key, boxes = _outline(flat, records, emitted)
+    starts = np.zeros(grid.shape[0], np.int64)
+    _find_starts(grid.x[columns.start], grid.y[rows], flat, records, exact_area, starts[rows])
+    for first, band in grid.bands():
+        end = first + len(band)
+        residuals, covers = np.full(band.shape, np.nan), np.zeros(band.shape, np.bool_)
+        table = np.zeros((len(band), _COVERED + 1))
+        _measure_rows_with_gaps(
+            grid.x, grid.y[first:end], band, lattice.bits[first:end], flat, z, records, emitted, ends, key, boxes,
+            starts[first:end], grid.unit, nearest, exact_area, table, residuals, covers,
+        )  # fmt: skip
+        yield first, residuals, covers
+
+
+def covered_share(grid: HeightGrid, mesh: tuple[FloatArray, FloatArray, IntArray, BoolArray], cells: Cells) -> float:
+    """Return the share of the area of the faces of a grid with gaps whose centroids a mesh covers."""
+    xy, z, records, shown = mesh
+    flat, emitted = np.ascontiguousarray(xy).ravel(), shown.astype(np.uint8)
+    lattice = grid.lattice
+    assert lattice is not None
+    ends, key, boxes = _outline(flat, records, emitted)
+    rows, columns = grid.span
+    starts = np.zeros(grid.shape[0], np.int64)
+    _find_starts(grid.x[columns.start], grid.y[rows], flat, records, cells.exact_area, starts[rows])
+    table, above = np.zeros((grid.shape[0], _COVERED + 1)), np.empty((0, grid.shape[1]))
+    for first, band in grid.bands(first=rows.start, end=rows.stop):
+        north, end = first - len(above), first + len(band)
+        _measure_cells_with_gaps(
+            cells.x, cells.y[north:], cells.width, np.concatenate([above, band]), lattice.bits[north:end],
+            flat, z, records, emitted, ends, key, boxes, starts[north:end],
+            grid.unit, False, cells.exact_area, table[north:end],
+        )  # fmt: skip
+        above = band[-1:]
+    return float((cells.height @ table[:-1, _COVERED]) / (cells.height @ table[:-1, _FACES]))
 
 
 @entry
@@ -176,12 +224,15 @@ def _measure_rows_with_gaps(
     nearest: bool,
     exact_area: float,
     table: np.ndarray,
-    sizes: np.ndarray,
+    residuals: np.ndarray,
     covers: np.ndarray,
 ) -> None:
-    """Fill the table's first columns for each row; and all deviations and what is covered, if there is room."""
+    """Fill the table's first columns for each row; and all residuals and what is covered, if there is room.
+
+    A residual is by how much a sample lies above the mesh; of one that no triangle covers what it costs.
+    """
     stack = np.empty(64, np.int64)
-    wanted = len(sizes) > 0
+    wanted = len(residuals) > 0
     guess = 0
     flat_bits = bits.ravel()
     n_bytes = bits.shape[1]
@@ -198,15 +249,16 @@ def _measure_rows_with_gaps(
             px = x[c]
             t = locate(xy, mesh, t, px, py, exact_area)
             if emitted[t // RECORD] != 0:
-                d = abs(height_on(xy, z, mesh, t, px, py) - heights[r, c])
+                above = heights[r, c] - height_on(xy, z, mesh, t, px, py)
                 is_covered = True
             else:
-                d, is_covered, guess = beside_mesh(
+                above, is_covered, guess = beside_mesh(
                     xy, z, ends, key, boxes, stack, unit, nearest, px, py, heights[r, c], guess
                 )
                 uncovered += not is_covered
+            d = abs(above)
             if wanted:
-                sizes[r, c] = d
+                residuals[r, c] = above
                 covers[r, c] = is_covered
             total += d
             squares += d * d
@@ -246,6 +298,7 @@ def _measure_cells_with_gaps(
         t = starts[r]
         total = 0.0
         faces = 0.0
+        covered = 0.0
         for c in range(len(width)):
             nw = is_there(flat_bits, n_bytes, r, c)
             ne = is_there(flat_bits, n_bytes, r, c + 1)
@@ -276,9 +329,14 @@ def _measure_cells_with_gaps(
                 t = locate(xy, mesh, t, px, py, exact_area)
                 if emitted[t // RECORD] != 0:
                     d = abs(height_on(xy, z, mesh, t, px, py) - middle)
+                    is_covered = True
                 else:
-                    d, _, guess = beside_mesh(xy, z, ends, key, boxes, stack, unit, nearest, px, py, middle, guess)
-                total += width[c] * d
+                    d, is_covered, guess = beside_mesh(
+                        xy, z, ends, key, boxes, stack, unit, nearest, px, py, middle, guess
+                    )
+                total += width[c] * abs(d)
                 faces += width[c]
+                covered += width[c] if is_covered else 0.0
         table[r, _BETWEEN] = total
         table[r, _FACES] = faces
+        table[r, _COVERED] = covered

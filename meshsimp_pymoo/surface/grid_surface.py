@@ -8,7 +8,9 @@ as much memory as a model in one piece.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -22,14 +24,37 @@ from meshsimp_pymoo.plane.faces import border_vertices, canonical_faces, one_rin
 from meshsimp_pymoo.reprs import in_short
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
-from meshsimp_pymoo.surface.measures import REGIONS
+from meshsimp_pymoo.surface.measures import REGIONS, Quality
 from meshsimp_pymoo.surface.model import OpenModel, build_model
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
 from meshsimp_pymoo.surface.surface import Refitted, Scored, Simplified, Surface, View
-from meshsimp_pymoo.surface.weld import WeldedMesh, measured, tabulated, weld
+from meshsimp_pymoo.surface.weld import WeldedMesh, coverage, measured, residual_bands, tabulated, weld
 
 #: Rules that may be anything. The others are as they are where nothing is said.
 FREE_RULES = ("footprint", "outside")
+
+
+@dataclass(frozen=True, eq=False)
+class Banded:
+    """The mesh of a subset, of whose original not all samples are held at once.
+
+    Attributes
+    ----------
+    faces : (M, 3) int array
+        Its triangles as vertices of the grid.
+    quality : Quality
+        Its numbers.
+    coverage : float
+        Share of the area of the grid's faces whose centroids it covers.
+    bands : callable
+        Yields, from north to south, vertices (n,), by how much each lies above the mesh (n,), or its deviation where no
+        triangle covers it, and whether one does (n,).
+    """
+
+    faces: IntArray
+    quality: Quality
+    coverage: float
+    bands: Callable[[], Iterator[tuple[IntArray, FloatArray, BoolArray]]]
 
 
 class GridSurface:
@@ -204,19 +229,43 @@ class GridSurface:
         quality, deviation, covered = measured(grid, mesh, at, n_threads=os.cpu_count() or 1)
         return Simplified(self._faces_of(mesh), quality, deviation, covered)
 
+    def banded(self, kept: BoolArray) -> Banded:
+        """Return the mesh of one subset (N,), and its residuals band by band, in bounded memory.
+
+        Raises
+        ------
+        ValueError
+            If no triangle is emitted, as all lie in gaps.
+        """
+        grid, mesh = self.model, self._welded(kept)
+        quality, *_ = measured(grid, mesh, np.empty(0, np.int64), n_threads=os.cpu_count() or 1)
+
+        def bands() -> Iterator[tuple[IntArray, FloatArray, BoolArray]]:
+            columns = grid.shape[1]
+            for first, residuals, covered in residual_bands(grid, mesh):
+                there = ~np.isnan(residuals)
+                samples = first * columns + np.flatnonzero(there)
+                yield grid.vertices(samples), residuals[there], covered[there]
+
+        return Banded(self._faces_of(mesh), quality, coverage(grid, mesh), bands)
+
     def of_faces(self, faces: IntArray, *, rows: IntArray | None = None) -> Simplified:
         """Refuse: free meshes are made and measured with a model in one piece."""
         raise ModelError(f"{self.model.name}: meshes of tiles are Delaunay, not free; simplify it in one piece")
 
     def score(self, points: FloatArray, faces: IntArray) -> Scored:
         """Measure any mesh in the frame of the file by the same error, with the grid as a model in one piece."""
-        model, row_of = self._whole
-        found = HeightSurface(model, self.rules).score(points, faces)
+        whole, row_of = self.whole
+        found = whole.score(points, faces)
         return Scored(found.quality, found.deviation[row_of], found.covered[row_of])
 
     @cached_property
-    def _whole(self) -> tuple[OpenModel, IntArray]:
-        """The grid as a model in one piece, and the row of each vertex in it."""
+    def whole(self) -> tuple[HeightSurface, IntArray]:
+        """The surface of the grid as a model in one piece, and the row of each vertex in it."""
+        model, row_of = self._in_one_piece()
+        return HeightSurface(model, self.rules), row_of
+
+    def _in_one_piece(self) -> tuple[OpenModel, IntArray]:
         grid = self.model
         if grid.model is not None and grid.row_of is not None:
             return grid.model, grid.row_of

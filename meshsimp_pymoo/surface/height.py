@@ -110,7 +110,8 @@ class HeightSurface(ModelSurface):
         return self._ground
 
     @cached_property
-    def _between(self) -> Between:
+    def between(self) -> Between:
+        """Where meshes are measured between the vertices: the centroids of the original faces."""
         return between_vertices(self.model)
 
     def bounded(self, most: float, *, own: float = 0.0) -> HeightSurface:
@@ -199,7 +200,7 @@ class HeightSurface(ModelSurface):
         ValueError
             If no triangle is emitted: fewer than 3 vertices, all on one line, or all triangles outside the footprint.
         """
-        faces, numbers, deviation, covered, between = self._triangulated(kept, self._between)
+        faces, numbers, deviation, covered, between = self._triangulated(kept, self.between)
         of_mesh = measured_angles(self.points[:, :2], faces)
         of_mesh |= line_errors(self._ground, self.model.lines, self.points, faces, planar=True)
         quality = as_quality(numbers, self.total_weight, surface_error=between, **of_mesh)
@@ -264,7 +265,7 @@ class HeightSurface(ModelSurface):
 
         Those of the model's that are ``own`` vertices of the mesh do not deviate where it covers them.
         """
-        ground, between, n = self._ground, self._between, self.n_vertices
+        ground, between, n = self._ground, self.between, self.n_vertices
         both = ground._replace(xy=np.r_[ground.xy, between.xy], z=np.r_[ground.z, between.z])
         deviation, covered = mesh_deviation(both, vertices, faces, planar=own is not None)
         of_mesh = {"surface_error": float((between.share * deviation[n:]).sum())}
@@ -334,7 +335,7 @@ class HeightSurface(ModelSurface):
         return self
 
     def __getstate__(self) -> dict[str, Any]:
-        unstored = ("_ground", "_between", "view")
+        unstored = ("_ground", "between", "view")
         return {name: value for name, value in self.__dict__.items() if name not in unstored} | {"_free": {}}
 
 

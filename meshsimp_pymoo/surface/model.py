@@ -16,7 +16,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import AnyArray, Csr, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, ModelWarning, warn_of
 from meshsimp_pymoo.formats.material import Material
-from meshsimp_pymoo.formats.source import SourceMesh
+from meshsimp_pymoo.formats.source import RasterPart, SourceMesh
 from meshsimp_pymoo.plane.faces import border_vertices, one_rings
 from meshsimp_pymoo.plane.footprint import Footprint, make_footprint
 from meshsimp_pymoo.plane.order import find_corners, unit_square, vector_order
@@ -268,6 +268,8 @@ class OpenModel(Mesh):
         What all faces look like, as far as the file says.
     lines : ModelLines, optional
         Break lines, whose vertices are among the points; see :func:`~meshsimp_pymoo.surface.lining.lined_model`.
+    raster : RasterPart, optional
+        Of a height grid: which samples ``source_index`` counts.
     """
 
     name: str
@@ -292,6 +294,7 @@ class OpenModel(Mesh):
     scale: FloatArray = field(default_factory=lambda: np.ones(3))
     material: Material | None = field(default=None, repr=False)
     lines: ModelLines | None = field(default=None, repr=False)
+    raster: RasterPart | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         weighted = "" if self.weights is None else ", weighted"
@@ -486,6 +489,7 @@ def build_model(
         found={what: n for what, n in found.items() if n},
         scale=scale,
         material=source.material,
+        raster=source.raster,
     )
 
 

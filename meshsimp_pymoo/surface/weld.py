@@ -22,8 +22,9 @@ from meshsimp_pymoo.plane.triangulation import LAST_INDEX, RECORD, height_on, lo
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.centroids import Between
 from meshsimp_pymoo.surface.evaluate import measure_between
-from meshsimp_pymoo.surface.gaps import emitted_of, tabulated_with_gaps
+from meshsimp_pymoo.surface.gaps import covered_share, emitted_of, residual_bands_with_gaps, tabulated_with_gaps
 from meshsimp_pymoo.surface.grid import Cells, HeightGrid
+from meshsimp_pymoo.surface.ground import make_ground
 from meshsimp_pymoo.surface.measures import (
     ERROR,
     MAXIMUM,
@@ -36,7 +37,7 @@ from meshsimp_pymoo.surface.measures import (
     as_quality,
 )
 from meshsimp_pymoo.surface.rules import DEFAULT, Rules
-from meshsimp_pymoo.surface.score import measured_angles
+from meshsimp_pymoo.surface.score import measured_angles, mesh_deviation
 from meshsimp_pymoo.workers import on_threads
 
 
@@ -178,11 +179,11 @@ def tabulated(
                 row, band = row + 1, band[1:]
             rows = slice(row, row + len(band))
             low, high = np.searchsorted(at, [row * n_columns, (row + len(band)) * n_columns])
-            sizes = np.empty(band.shape if high > low else (0, 0))
+            residuals = np.empty(band.shape if high > low else (0, 0))
             t = _measure_rows(
-                grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table[rows], sizes
+                grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table[rows], residuals
             )
-            deviation[low:high] = sizes.ravel()[at[low:high] - row * n_columns]
+            deviation[low:high] = np.abs(residuals.ravel()[at[low:high] - row * n_columns])
 
     on_threads(do, range(n_threads), n_threads=n_threads)
     row = np.full(REGIONS, np.nan)
@@ -197,6 +198,46 @@ def tabulated(
             centroids, flat, mesh.z, mesh.records, len(mesh.records), emitted, grid.unit, True, False
         )
     return row, deviation, np.ones(len(at), bool), surface_error
+
+
+def residual_bands(grid: HeightGrid, mesh: WeldedMesh) -> Iterator[tuple[int, FloatArray, BoolArray]]:
+    """Measure a mesh at all samples again, band by band from the north.
+
+    Yields
+    ------
+    first : int
+        The first row of the band.
+    residuals : (r, C) float array
+        By how much each sample lies above the mesh; where no triangle covers it, what it costs, as a deviation; NaN
+        where there is no sample [file units].
+    covered : (r, C) bool array
+        Whether a triangle covers it.
+    """
+    if grid.lattice is not None:
+        yield from residual_bands_with_gaps(grid, (mesh.xy, mesh.z, mesh.records, mesh.emitted), mesh.nearest)
+        return
+    flat, t = np.ascontiguousarray(mesh.xy).ravel(), 0
+    for first, band in grid.bands():
+        rows = slice(first, first + len(band))
+        residuals, table = np.empty(band.shape), np.empty((len(band), 4))
+        t = _measure_rows(
+            grid.x, grid.y[rows], band, flat, mesh.z, mesh.records, t, grid.exact_ranges[0], table, residuals
+        )
+        yield first, residuals, np.ones(band.shape, bool)
+
+
+def coverage(grid: HeightGrid, mesh: WeldedMesh) -> float:
+    """Return the share of the area of the grid's faces whose centroids a mesh covers: 1 where it has no gaps."""
+    if grid.lattice is None:
+        return 1.0
+    between = grid.between
+    if isinstance(between, Cells):
+        return covered_share(grid, (mesh.xy, mesh.z, mesh.records, mesh.emitted), between)
+    assert grid.model is not None
+    ground = make_ground(grid.model, Rules())._replace(xy=between.xy, z=between.z, nearest=False)
+    vertices = np.column_stack([mesh.xy * grid.unit, mesh.z])
+    _, covered = mesh_deviation(ground, vertices, mesh.unsorted_faces)
+    return float(between.share[covered].sum())
 
 
 def pieces(grid: HeightGrid, faces: IntArray, size: int) -> Iterator[tuple[str, IntArray]]:
@@ -240,17 +281,17 @@ def _measure_rows(
     start: int,
     exact_area: float,
     table: np.ndarray,
-    sizes: np.ndarray,
+    residuals: np.ndarray,
 ) -> int:
     """Fill sum, sum of squares and maximum of the deviations of each row; return a triangle near the last row's begin.
 
-    If there is room for them in ``sizes``, all deviations too.
+    If there is room for them in ``residuals``, by how much each sample lies above the mesh too.
 
     In each row the surface is linear along x within a triangle, but it is worked out at every sample from the
     triangle's corners, as everywhere.
     """
     begin = start
-    wanted = len(sizes) > 0
+    wanted = len(residuals) > 0
     for r in range(len(y)):
         t = begin
         py = y[r]
@@ -262,9 +303,10 @@ def _measure_rows(
             t = locate(xy, mesh, t, px, py, exact_area)
             if c == 0:
                 begin = t
-            d = abs(height_on(xy, z, mesh, t, px, py) - heights[r, c])
+            above = heights[r, c] - height_on(xy, z, mesh, t, px, py)
             if wanted:
-                sizes[r, c] = d
+                residuals[r, c] = above
+            d = abs(above)
             total += d
             squares += d * d
             maximum = max(maximum, d)

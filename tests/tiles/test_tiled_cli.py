@@ -51,6 +51,7 @@ def out(path, few_moves, sketched, tmp_path_factory):
 
 def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
     expected = {"front.csv", "front.png", "report.html", "front.npz", "meshes", "chosen.ply", "run.json"}
+    expected |= {"quality.json", "quality.html"}
     assert {entry.name for entry in out.iterdir()} == expected
     assert (out / "front.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((out / "meshes").iterdir())) == 4

@@ -45,6 +45,11 @@ def add(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=f"mesh to write; its suffix is its format: {', '.join(written_suffixes())} (default: nothing is written)",
     )
+    parser.add_argument(
+        "--compress",
+        action="store_true",
+        help="compress a GLB (Draco): vertices move by at most a twentieth of the mean error",
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
     parser.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
     add_shown(parser)
@@ -67,8 +72,10 @@ def run(args: argparse.Namespace) -> int:
     if len(said) > 1:
         raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
+    if args.compress and path is None:
+        raise UsageError("--compress is of the mesh that is written; name its file (-o FILE.glb)")
     with said_when_compiling(args.quiet):
-        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, **shown)
+        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, args.compress, **shown)
 
 
 def _pick(
@@ -78,6 +85,7 @@ def _pick(
     number: int | None,
     path: Path | None,
     overwrite: bool,
+    compress: bool,
     *,
     quiet: bool,
     as_json: bool,
@@ -99,19 +107,24 @@ def _pick(
     if solution is None:
         say(f"{folder}: {missed}; nothing is written")
         return TARGET_MISSED
-    if path is not None:
+    moved: dict[str, float] = {}
+    if path is not None and compress:
+        moved["moved_by_at_most_m"] = solution.save_compressed(path, overwrite=overwrite)
+    elif path is not None:
         solution.save(path, overwrite=overwrite)
     if note := _how_far(front, folder, model, solution, wish):
         say(f"note: {note}")
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
-        said = {"mesh": mesh, "solution": number, "free": solution.free, **in_numbers(solution.quality)}
+        said = {"mesh": mesh, "solution": number, "free": solution.free, **moved}
+        said |= in_numbers(solution.quality)
         tell(json.dumps(said, indent=2))
     elif not quiet:
         which = f"solution {solution.solution}" if stored else "between two solutions"
         tell(f"{which} of {folder}{', free' * solution.free}: {described(solution.quality, front.unit)}")
-        tell(f"written: {path}" if path else "nothing is written; name a file with -o")
+        off = f" (compressed; vertices moved by at most {moved['moved_by_at_most_m']:.2g} m)" if moved else ""
+        tell(f"written: {path}{off}" if path else "nothing is written; name a file with -o")
     return OK
 
 

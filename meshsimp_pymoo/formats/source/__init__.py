@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,16 @@ VERTEX_BYTES, FACE_BYTES = 150, 300
 
 # Fewer vertices leave nothing to simplify.
 LEAST_VERTICES = 4
+
+
+class RasterPart(NamedTuple):
+    """Which part of a raster was read: its rows and columns, where it begins in the file, and how wide the file is."""
+
+    rows: int
+    columns: int
+    row: int
+    column: int
+    file_columns: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +76,8 @@ class SourceMesh:
         Of a height grid: columns, rows, and how far both are apart; NaN where that is uneven [file units].
     is_closed : bool
         Whether it is known to be a closed surface, as built-in ones are, so that nobody need be told.
+    raster : RasterPart, optional
+        Of a height grid: which samples `rows` counts.
     """
 
     points: FloatArray
@@ -80,6 +92,7 @@ class SourceMesh:
     material: Material | None = None
     grid: tuple[int, int, float, float] | None = None
     is_closed: bool = False
+    raster: RasterPart | None = None
 
     def __post_init__(self) -> None:
         if len(self.rows) != len(self.points):

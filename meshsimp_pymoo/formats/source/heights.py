@@ -12,7 +12,7 @@ import numpy.typing as npt
 from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray
 from meshsimp_pymoo.errors import ModelError, NoHeightGrid
 from meshsimp_pymoo.formats.options import Options, Window
-from meshsimp_pymoo.formats.source import SourceMesh, build_source
+from meshsimp_pymoo.formats.source import RasterPart, SourceMesh, build_source
 from meshsimp_pymoo.formats.source.missing import is_nodata, warn_of_nodata
 from meshsimp_pymoo.memory import check_free
 from meshsimp_pymoo.reprs import brief
@@ -297,7 +297,8 @@ def grid_mesh(
     (n_rows, n_columns), (row, column) = z.shape, corner
     across = _spacing(*place(np.full(n_columns, row), column + np.arange(n_columns)))
     down = _spacing(*place(row + np.arange(n_rows), np.full(n_rows, column)))
-    return replace(source, grid=(n_columns, n_rows, across, down))
+    part = RasterPart(n_rows, n_columns, row, column, file_columns)
+    return replace(source, grid=(n_columns, n_rows, across, down), raster=part)
 
 
 def _spacing(x: FloatArray, y: FloatArray) -> float:
