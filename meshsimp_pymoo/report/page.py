@@ -225,7 +225,11 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run, unit), *_what_is_thinned(model, held, missing), *([word] if word else [])],
+        thinned=[
+            *_what_was_searched(front.run, unit),
+            *_what_is_thinned(model, held, missing),
+            *([word] if word else []),
+        ],
         heights=None if view.is_closed else _heights(view.exaggeration),
         colours={name: COLOURS[name] for name in colours},
         own_colours=own,
