@@ -19,6 +19,7 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
     storage        the folder of a front
     report/        pictures and the page of one front; the statement of quality of one mesh, the raster of its residuals
     front          Front: a sequence of solutions to choose from, whole models' or tiles'
+    levels         a front as levels of detail: files, one glTF, 3D Tiles
     tiles/         height grids too big for one piece
     comparison/    the study: YAML files, the runs they ask for, tables, findings
     warming        what has to be compiled once on a machine

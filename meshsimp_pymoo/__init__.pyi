@@ -13,6 +13,7 @@ from meshsimp_pymoo.indicators import Coverage as Coverage
 from meshsimp_pymoo.indicators import HypervolumeRatio as HypervolumeRatio
 from meshsimp_pymoo.indicators import MultiplicativeEpsilon as MultiplicativeEpsilon
 from meshsimp_pymoo.indicators import merged_front as merged_front
+from meshsimp_pymoo.levels import save_levels as save_levels
 from meshsimp_pymoo.opening import open_grid as open_grid
 from meshsimp_pymoo.problem import MeshProblem as MeshProblem
 from meshsimp_pymoo.report.figures import plot_error as plot_error

@@ -74,6 +74,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
+from meshsimp_pymoo.surface.solid import Solid, as_solid
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
     Refitted,
@@ -92,17 +93,23 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+    from meshsimp_pymoo.report.document import Framed
     from meshsimp_pymoo.report.statement import QualityStatement
 
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
+# What a page in a notebook may take, which is saved with it.
+NOTEBOOK_BYTES = 4_000_000
 # What the front that a search started from is called, and how many of its thousands of points are drawn.
 START = "adaptive thinning (start)"
 START_POINTS = 200
 # Between two solutions of a nested front the smallest within a limit is looked for to this share of its triangles.
 HALVED = 0.01
+# A level of detail has at most so much fewer triangles than the finer one before it; fewer than so many make none: to
+# draw them takes no less time.
+LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
 # Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
 # largest nothing is said: these take seconds for each million vertices.
 SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
@@ -226,25 +233,68 @@ class FrontSolution(_Numbers):
         """The simplified mesh in the frame of the model's file, with its colours and attributes."""
         return mesh_of(self.front.surface, self.faces)
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
         A mesh that the front's folder holds in this format is copied, unless it names files beside it.
 
+        Parameters
+        ----------
+        path : path
+            The file.
+        overwrite : bool
+            Replace a file that exists.
+        solid : float, optional
+            Close the mesh of a height surface for printing: by walls along its outline and holes, and a flat base so
+            far below its lowest point [file units].
+
         Raises
         ------
         ResultError
-            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
+            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, it cannot be written, or
+            the surface cannot be made solid: it is closed already, or its coordinates are no lengths.
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         suffix = path.suffix.lower()
-        stored = self.front.stored_mesh(self.solution)
+        stored = self.front.stored_mesh(self.solution) if solid is None else None
         with new_file(path) as unfinished:
             if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.surface, self.faces)
+                write_solution(unfinished, self.front.surface, self.faces, solid=solid)
         return path
+
+    def save_compressed(
+        self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None
+    ) -> float:
+        """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
+
+        That is no more than a twentieth of its mean error, as far as single precision lets it.
+
+        Raises
+        ------
+        ResultError
+            As :meth:`save` does, or if the format is not compressed, or the library is missing.
+        """
+        path = claim_file(path, written_suffixes(), overwrite=overwrite)
+        with new_file(path) as unfinished:
+            written = write_solution(
+                unfinished, self.front.surface, self.faces, solid=solid, compressed_by=self.mean_error
+            )
+        assert written.packed is not None
+        return written.packed.shift
+
+    def solid(self, thickness: float) -> Solid:
+        """Return the mesh closed by walls and a flat base, so far below its lowest point [file units].
+
+        See :mod:`meshsimp_pymoo.surface.solid`.
+
+        Raises
+        ------
+        ResultError
+            If the surface is closed already, or its coordinates are no lengths.
+        """
+        return as_solid(self.front.surface, self.faces, thickness)
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
@@ -867,6 +917,75 @@ class Front(Sequence[FrontSolution]):
         """Return the best compromise; see :func:`meshsimp_pymoo.indicators.knee`."""
         return self[knee(self.F)]
 
+    def levels(
+        self,
+        count: int | None = None,
+        *,
+        triangles: Sequence[int] | None = None,
+        max_error: Sequence[float] | None = None,
+    ) -> tuple[FrontSolution, ...]:
+        """Return a ladder of levels of detail: some of the solutions, the finest first, each mesh once.
+
+        They need not be nested: each has the vertices that are best for it. :func:`~meshsimp_pymoo.save_levels` writes
+        them.
+
+        Parameters
+        ----------
+        count : int, optional
+            The most levels. Without limits the first one is the most accurate solution, or the one that the front was
+            searched for; each other one is the best of at most a quarter of the triangles of the one before. By
+            default the ladder ends where that would be fewer than 32.
+        triangles, max_error : sequence of numbers, optional
+            Limits instead, one for each level, as :meth:`best` takes them.
+
+        Raises
+        ------
+        Missed
+            If no solution meets one of the limits.
+        TypeError
+            If more than one of these is given.
+        ValueError
+            If ``count`` is less than 1, or a limit makes no sense.
+
+        Examples
+        --------
+        >>> from meshsimp_pymoo import memetic
+        >>> front = Front.from_result(minimize(MeshProblem("face:200"), memetic(12), Moves(20_000), seed=1))
+        >>> [level.triangles for level in front.levels()][:2]
+        [362, 90]
+        """
+        given = {"count": count, "triangles": triangles, "max_error": max_error}
+        said = [name for name, value in given.items() if value is not None]
+        if len(said) > 1:
+            raise TypeError(f"{said[0]} does not go with {said[1]}: each says which levels there are; leave one out")
+        if count is not None and count < 1:
+            raise ValueError(f"count is {count}; a ladder has 1 level or more")
+        if triangles is not None or max_error is not None:
+            name = said[0]
+            found = [self.best(**{name: limit}) for limit in given[name]]  # type: ignore[union-attr]
+            once = {(level.triangles, level.error): level for level in found}
+            return tuple(sorted(once.values(), key=lambda level: (-level.triangles, level.error)))
+        ladder = [self._sought()]
+        while count is None or len(ladder) < count:
+            most = ladder[-1].triangles // LEVEL_FACTOR
+            if most < (FEWEST_TRIANGLES if count is None else 1):
+                break
+            try:
+                ladder.append(self.best(triangles=most))
+            except Missed:
+                break
+        return tuple(ladder)
+
+    def _sought(self) -> FrontSolution:
+        """Return the solution that the front was searched for, or the most accurate one of a whole front."""
+        if not self.run.get("wish"):
+            return self[-1]
+        try:
+            return self.best(**self.run["wish"])
+        except Missed as missed:
+            nearest: FrontSolution = missed.nearest
+            return nearest
+
     def _between(self, triangles: int) -> FrontSolution | None:
         """Return a solution of a nested front of at most so many triangles, which it may not have had so far."""
         if not isinstance(self._kept, Nested):
@@ -912,6 +1031,7 @@ class Front(Sequence[FrontSolution]):
         chosen: int | FrontSolution | None = None,
         piece: int | None = None,
         refit: bool | Mapping[int, Refitted] = False,
+        solid: float | None = None,
         pictures: bool = True,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
@@ -937,6 +1057,9 @@ class Front(Sequence[FrontSolution]):
             Write each of the meshes once more refitted, and their error to ``front.csv``: with its best heights, see
             :func:`~meshsimp_pymoo.surface.height.refit_heights`, or of a closed surface its best vertices. Or only
             those of these solutions, found already.
+        solid : float, optional
+            Close the chosen mesh for printing, by walls and a flat base so far below its lowest point [file units]; all
+            other meshes stay surfaces.
         pictures : bool
             Go on to :meth:`draw`, once all else is in place.
         page : bool
@@ -973,6 +1096,7 @@ class Front(Sequence[FrontSolution]):
             chosen=row,
             cut=None if piece is None else lambda faces: pieces(self.model, faces, piece),
             refit=fitted if refit is not False else None,
+            solid=solid,
             series=self.series,
             run=record,
             overwrite=overwrite,
@@ -1039,6 +1163,47 @@ class Front(Sequence[FrontSolution]):
         drawings[PICTURES[1]] = draw_page  # which links to the others
         wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
+
+    def show(self, *, height: int = 1000, limit: int = NOTEBOOK_BYTES) -> Framed:
+        """Return the page of the front for a notebook: every mesh beside the original, to turn, compare and take home.
+
+        It is the page that :meth:`draw` writes, inside the output of the cell: it needs no widget, no kernel once it is
+        there, no file and no network.
+
+        Parameters
+        ----------
+        height : int
+            Of its frame [pixels].
+        limit : int
+            Size that is not exceeded if it can be helped, by leaving out meshes [bytes]; notebooks keep what they show.
+
+        Returns
+        -------
+        Framed
+            What a notebook shows as the last value of a cell.
+
+        Raises
+        ------
+        ResultError
+            If the model of a stored front is not where its record says.
+        """
+        from tempfile import TemporaryDirectory
+
+        from meshsimp_pymoo.report.document import Framed
+        from meshsimp_pymoo.report.page import simplification_page
+
+        with TemporaryDirectory() as unstored:
+            folder = self.folder or self.save(Path(unstored) / "front", meshes=0, pictures=False)
+            content = simplification_page(
+                read_front(folder),
+                self.surface,
+                self.kept,
+                measure=self.objectives[0],
+                folder=None,
+                knee=knee(self.F),
+                limit=limit,
+            )
+        return Framed(content, height)
 
     def stored_mesh(self, solution: int) -> Path | None:
         """Return the file of a solution's mesh in the front's folder; None if it was not written."""

@@ -43,11 +43,11 @@ import platform
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -71,10 +71,12 @@ from meshsimp_pymoo.formats.table import (
     Rounding,
     format_of_output,
     format_to_write,
+    listed,
     shared_frame,
     warn_of_left_behind,
     write_lines,
     write_mesh,
+    written_formats,
 )
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
 from meshsimp_pymoo.surface.kinds import stored_arrays
@@ -83,8 +85,9 @@ from meshsimp_pymoo.surface.measures import COUNTED, LENGTH, MEASURES, OF_LINES,
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
 from meshsimp_pymoo.surface.smallest import facts_of_lines
+from meshsimp_pymoo.surface.solid import as_solid, check_solid
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
-from meshsimp_pymoo.surface.units import length_unit
+from meshsimp_pymoo.surface.units import length_unit, metres_per_model_unit
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
@@ -100,6 +103,8 @@ MAY_BE_EMPTY = (*OF_MESH, *OF_LINES, "refitted_error")
 MOST_COUNTED = 2**53  # no mesh has so many triangles
 # What writing a mesh takes at first thought, for each vertex of the model and triangle of the mesh [s].
 SECONDS_A_CORNER = 5e-7
+# How far compression may move a vertex, as a share of the mean error of its mesh.
+COMPRESSION_SHARE = 0.05
 MESHES_BY_DEFAULT = 100  # a front of the usual population in full; of a longer one an even selection of this many
 PICTURES = ("front.png", "report.html")  # made once all else is in place
 STATEMENT = ("quality.json", "quality.html")  # of the chosen mesh, made likewise, if there is one
@@ -107,6 +112,8 @@ QUALITY = "quality"  # where a statement of any mesh is written by default
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 TILES = "tiles"  # finished tiles of one
 LINES = "break_lines.geojson"  # the thinned break lines
+# A mesh: vertices (V, 3), faces (M, 3), attributes by name.
+MeshArrays: TypeAlias = tuple[FloatArray, IntArray, dict[str, AnyArray]]
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
@@ -171,7 +178,9 @@ class StoredFront:
         return np.column_stack([self.quality["error"], self.quality["triangles"]]).astype(np.float64)
 
 
-def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+def claim_output(
+    folder: str | os.PathLike[str], *, overwrite: bool = False, is_own: Callable[[str], bool] | None = None
+) -> Path:
     """Check, before any work, that results can be written to this folder; nothing is left behind.
 
     Parameters
@@ -181,6 +190,8 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     overwrite : bool
         Accept a folder that holds results of this package already; they are replaced when the new ones are
         complete.
+    is_own : callable, optional
+        Tells of the name of an entry whether it is one of these results; by default those of a search.
 
     Returns
     -------
@@ -199,14 +210,8 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
     if target.exists():
         if not overwrite:
             raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
-        foreign = sorted(
-            e.name
-            for e in target.iterdir()
-            if e.name not in OWN_ENTRIES
-            and e.stem not in CHOSEN
-            and not _of_unfinished(e.name)
-            and not is_put_beside(e.name)
-        )
+        known = is_own or _is_own
+        foreign = sorted(e.name for e in target.iterdir() if not (known(e.name) or is_put_beside(e.name)))
         if foreign:
             raise ResultError(
                 f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
@@ -222,6 +227,10 @@ def claim_output(folder: str | os.PathLike[str], *, overwrite: bool = False) -> 
             f"{folder}: cannot be written in {parent} ({reason_of(problem)}); name another folder"
         ) from None
     return folder
+
+
+def _is_own(name: str) -> bool:
+    return name in OWN_ENTRIES or Path(name).stem in CHOSEN or _of_unfinished(name)
 
 
 def is_unfinished(folder: str | os.PathLike[str]) -> bool:
@@ -247,6 +256,7 @@ def write_front(
     chosen: int | None = None,
     cut: Callable[[IntArray], Iterable[tuple[str, IntArray]]] | None = None,
     refit: Callable[[int], Refitted | None] | None = None,
+    solid: float | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
     overwrite: bool = False,
@@ -286,6 +296,9 @@ def write_front(
         The refitted mesh of the solution in this row of ``kept`` (see ``refit`` of its surface). Each mesh that is
         written is then written refitted too, as a file of its own, and ``front.csv`` has two more columns,
         REFIT_COLUMNS. None where there is none.
+    solid : float, optional
+        The chosen mesh is closed by walls and a base so far below its lowest point [file units]; see
+        :mod:`~meshsimp_pymoo.surface.solid`. What it encloses is recorded.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
         written to ``series.csv``.
@@ -321,6 +334,10 @@ def write_front(
             )
     kind = format_to_write(mesh_format)
     kind.check(model)
+    if solid is not None:
+        check_solid(surface, solid, kind)
+        if cut is not None:
+            raise ResultError(f"{model.name}: a solid is one piece; leave the pieces out, or the solid")
     look = _look(kind, surface)
     F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
     if not np.isfinite(F).all():
@@ -340,6 +357,7 @@ def write_front(
     with new_folder(folder, replace=overwrite) as partial:
         digits = max(3, len(str(len(order) - 1)))
         files: dict[int, tuple[str, list[str]]] = {}
+        facts_of_solid: dict[str, Any] = {}
         rounding, pace = Rounding(kind), SECONDS_A_CORNER
         if with_mesh:
             (partial / "meshes").mkdir()
@@ -367,7 +385,8 @@ def write_front(
                 for name, part in cut(triangles):
                     write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
             elif row == chosen:
-                write_mesh(partial / f"chosen{kind.suffix}", *arrays, **shown)
+                closed, facts_of_solid = _closed(surface, triangles, arrays, solid)
+                write_mesh(partial / f"chosen{kind.suffix}", *closed, **shown)
             better = None if refit is None else refit(int(row))
             if better is not None:
                 raised = (better.vertices, *arrays[1:])
@@ -376,7 +395,8 @@ def write_front(
                 if solution in with_mesh:
                     write_mesh(partial / fitted[1], *raised, **shown)
                 if row == chosen:
-                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **shown)
+                    closed, _ = _closed(surface, triangles, raised, solid)
+                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *closed, **shown)
             files[solution] = path, fitted
             pace = max(pace, (time.perf_counter() - begun) / size)
         lines = getattr(model, "lines", None)  # which a model of another kind need not have
@@ -428,6 +448,7 @@ def write_front(
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),
             "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
+            **({"solid": facts_of_solid} if facts_of_solid else {}),
             "versions": package_versions(),
             "environment": machine(),
         }
@@ -556,13 +577,95 @@ def _are_objectives(names: Any) -> bool:
     return True
 
 
-def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
-    """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
+class MeshWriter:
+    """Writes meshes of a surface in one format and one frame, and says once what is lost by it.
+
+    Parameters
+    ----------
+    kind : Format
+        The format.
+    surface : Surface
+        The original mesh and its rules.
+    compress : bool
+        Whether they are compressed, so that no vertex moves by more than COMPRESSION_SHARE of the mean error.
 
     Raises
     ------
     ResultError
-        If the format cannot hold this model.
+        If the format cannot hold this model, or is none that is compressed.
+    """
+
+    def __init__(self, kind: Format, surface: Surface, *, compress: bool = False) -> None:
+        kind.check(surface.model)
+        if compress and kind.pack is None:
+            known = listed((other.name for other in written_formats().values() if other.pack is not None), "or")
+            raise ResultError(f"{kind.name} is not compressed; write {known}, or leave --compress out")
+        self.kind, self.surface, self.compress = kind, surface, compress
+        self._look = _look(kind, surface)
+        self._rounding = Rounding(kind)
+
+    def mesh(self, faces: IntArray, vertices: FloatArray | None = None) -> OutMesh:
+        """Return a mesh, its triangles (M, 3) in vector order, with its own or other vertices, as it is to be written.
+
+        It is not packed.
+        """
+        own, triangles, attributes = mesh_arrays(self.surface.model, faces)
+        shown = self._look | _lines_as_written(self.surface, faces)
+        return OutMesh(own if vertices is None else vertices, triangles, attributes, **shown)
+
+    def write(self, path: Path, mesh: OutMesh, error: float, solid: OutMesh | None = None) -> OutMesh:
+        """Write a mesh of this mean error [model units], packed if it is to be, and return what was written."""
+        written = self.packed(mesh, error, solid)
+        assert self.kind.write is not None
+        self.kind.write(path, written)
+        return written
+
+    def packed(self, mesh: OutMesh, error: float, solid: OutMesh | None = None) -> OutMesh:
+        """Return a mesh of this mean error [model units] as it is written, and take note of what is lost by it.
+
+        Or the solid that was made of it, whose walls and base say nothing of what is lost.
+        """
+        self._rounding.add(mesh, self.surface.view.scale)
+        written = mesh if solid is None else solid
+        if not self.compress or self.kind.pack is None:
+            return written
+        metres = metres_per_model_unit(self.surface.model.georeference)
+        return self.kind.pack(written, COMPRESSION_SHARE * error * metres)
+
+    def warn(self) -> None:
+        """Say what is lost by single precision, and what the format does not hold."""
+        model = self.surface.model
+        self._rounding.warn(model.name, self.surface.diagonal)
+        warn_of_left_behind(self.kind, model.name, model.attributes)
+
+
+def write_solution(
+    path: Path, surface: Surface, faces: IntArray, *, solid: float | None = None, compressed_by: float | None = None
+) -> OutMesh:
+    """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    surface : Surface
+        The original mesh and its rules.
+    faces : (M, 3) int array
+        The triangles.
+    solid : float, optional
+        Close the mesh by walls and a base so far below its lowest point [file units].
+    compressed_by : float, optional
+        The mean error of the mesh [model units]: it is compressed as far as that lets it.
+
+    Returns
+    -------
+    OutMesh
+        What was written.
+
+    Raises
+    ------
+    ResultError
+        If the format cannot hold this model, or is none that is compressed, or it cannot be made solid.
 
     Warns
     -----
@@ -570,14 +673,31 @@ def write_solution(path: Path, surface: Surface, faces: IntArray) -> None:
         If single precision moves vertices by more than rounding or turns triangles over, or the format does not hold
         all that is known of the vertices.
     """
-    kind, model = format_of_output(path), surface.model
-    kind.check(model)
-    arrays, rounding = mesh_arrays(model, faces), Rounding(kind)
-    look = _look(kind, surface) | _lines_as_written(surface, faces)
-    rounding.add(OutMesh(*arrays, **look), surface.view.scale)
-    rounding.warn(model.name, surface.diagonal)
-    warn_of_left_behind(kind, model.name, model.attributes)
-    write_mesh(path, *arrays, **look)
+    writer = MeshWriter(format_of_output(path), surface, compress=compressed_by is not None)
+    mesh, closed = writer.mesh(faces), None
+    if solid is not None:
+        check_solid(surface, solid, writer.kind)
+        own = mesh.vertices, mesh.faces, mesh.attributes
+        (vertices, triangles, attributes), _ = _closed(surface, faces, own, solid)
+        closed = replace(mesh, vertices=vertices, faces=triangles, attributes=attributes)
+    written = writer.write(path, mesh, compressed_by or 0.0, closed)
+    writer.warn()
+    return written
+
+
+def _closed(
+    surface: Surface, faces: IntArray, arrays: MeshArrays, thickness: float | None
+) -> tuple[MeshArrays, dict[str, Any]]:
+    """Return a mesh of these triangles (M, 3), in vector order, and nothing; with a thickness a solid, and its numbers.
+
+    ``arrays`` is the mesh: its vertices may have moved.
+    """
+    if thickness is None:
+        return arrays, {}
+    vertices, _, attributes = arrays
+    found = as_solid(surface, faces, thickness, vertices)
+    below = {name: values[found.source] for name, values in attributes.items()}
+    return (found.vertices, found.faces, below), {"thickness": thickness, **found.numbers}
 
 
 def _look(kind: Format, surface: Surface) -> dict[str, Any]:

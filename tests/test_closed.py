@@ -139,7 +139,7 @@ def test_the_summary_of_a_closed_surface_is_json(ball, tmp_path, capsys):
     assert said["most_accurate"] == {**said["most_accurate"], "error": 0.0, "triangles": 320}
 
 
-@pytest.mark.parametrize("name", [name for name in written_formats() if name != "landxml"])
+@pytest.mark.parametrize("name", [kind.name for kind in written_formats().values() if kind.read])
 def test_every_format_holds_a_closed_mesh_watertight_and_wound_as_the_original(front, tmp_path, name):
     solution = front.best(triangles=250)
     path = tmp_path / f"small{written_formats()[name].suffix}"
@@ -313,7 +313,11 @@ PAIRS = {
     ("--pin", "hull"): r"pin='hull' .* closed",
     ("--pin", "border"): r"pin='border' .* closed",
     ("--break-lines", "outline"): r"no outline and no holes .*--break-lines outline",
-    ("--format", "landxml"): r"--format landxml .*--surface closed",
+    **{
+        ("--format", kind.name): rf"--format {kind.name} .*--surface closed.*: {kind.title} holds"
+        for kind in written_formats().values()
+        if kind.one_height
+    },
     ("--max-edge", "3"): r"max_edge .*point clouds",
     ("--tile", "64", *CLOSED): r"--surface does not go with tiles",
     ("--tile", "64"): r"closed surface.*tiles",
@@ -503,3 +507,19 @@ def test_a_search_of_a_closed_surface_compiles_nothing_more(ball, tmp_path, monk
     assert run("simplify", ball, "-o", tmp_path / "out", "--moves", "2000", "--quiet", "--no-page") == 0
     assert compiled == []
     assert finished == [list(CLOSED_SEARCH)]
+
+
+def test_levels_of_a_closed_model_are_closed_too(front, tmp_path):
+    front.save(tmp_path / "out", meshes=0, pictures=False)
+    levels = front.levels(3)
+    for options in ((), ("--refit",)):
+        out = tmp_path / f"levels{len(options)}"
+        assert run("levels", tmp_path / "out", "-o", out, "--levels", 3, "--format", "glb", "-q", *options) == 0
+        record = json.loads((out / "levels.json").read_text())
+        assert record["geometric_error"].startswith("the largest distance")
+        for said, solution in zip(record["levels"], levels, strict=True):
+            mesh = as_trimesh(out / said["file"])
+            assert mesh.is_watertight
+            assert mesh.volume > 0.0, "not inside out"
+            assert options or mesh.volume == pytest.approx(solution.mesh.volume, rel=1e-5)
+            assert (said["mean_error"] < solution.mean_error) == (bool(options) and solution.mean_error > 0.0)

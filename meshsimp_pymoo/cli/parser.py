@@ -15,7 +15,7 @@ from meshsimp_pymoo.discovery import modules_in
 from meshsimp_pymoo.errors import UsageError, nearest
 
 # The order in which the commands are listed; one that is not named here comes last.
-ORDER = ("simplify", "pick", "quality", "score", "info", "run", "report", "warm", "completion")
+ORDER = ("simplify", "pick", "levels", "quality", "score", "info", "run", "report", "warm", "completion")
 MODELS = """\
 MODEL is a file - a mesh, a height grid or a point cloud; `meshsimp info --help` lists
 the formats - or a built-in model such as jacksboro:11, face:5000 or roof;

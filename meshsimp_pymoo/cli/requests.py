@@ -104,6 +104,7 @@ class Output:
     format: str = "ply"
     meshes: int | None = 100
     refit: bool = False
+    solid: float | None = None
     page: bool = True
     quiet: bool = False
     json: bool = False
@@ -160,7 +161,8 @@ class Request:
         """What of it is worth a place in the record of what was searched, beside options and rules."""
         search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
         free = asdict(self.free) if self.free.free else {"free": False}
-        return search | {"algorithm": self.algorithm} | free | self.wanted | {"refit": self.output.refit}
+        solid = {} if self.output.solid is None else {"solid": self.output.solid}
+        return search | {"algorithm": self.algorithm} | free | self.wanted | {"refit": self.output.refit} | solid
 
 
 def request_of(args: argparse.Namespace) -> Request:
@@ -245,9 +247,21 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
         )
         for name in ("free_height", "no_centroids")
     },
-    ("--format landxml", CLOSED): (
-        _is_closed_and(lambda request: request.output.format == "landxml"),
-        "LandXML holds surfaces with one height at each place; write another format, such as ply",
+    ("--solid", "a front alone"): (
+        lambda request: request.output.solid is not None and not (request.wish.limits or request.wish.knee),
+        "it is for the chosen mesh; say which is wanted (--triangles N, --pick knee), or make it later (meshsimp pick)",
+    ),
+    ("--solid", "--format {format}"): (
+        lambda request: request.output.solid is not None and written_formats()[request.output.format].one_height,
+        "{title} holds surfaces with one height at each place, and a solid has two; write another format, such as stl",
+    ),
+    ("--solid", CLOSED): (
+        _is_closed_and(lambda request: request.output.solid is not None),
+        "it needs no base; leave --solid out",
+    ),
+    ("--format {format}", CLOSED): (
+        _is_closed_and(lambda request: written_formats()[request.output.format].one_height),
+        "{title} holds surfaces with one height at each place; write another format, such as ply",
     ),
 }
 
@@ -255,7 +269,14 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
 def _filled(words: str, request: Request) -> str:
     spelled = MEASURES[request.measure].minimised if request.measure else ""
     wished = [OBJECTIVES[SEARCHED[name]].minimised for name in request.wish.limits if name in SEARCHED]
-    return words.format(wish=request.wish.options, measure=spelled, wished=listed(wished, "or") if wished else "")
+    kind = written_formats()[request.output.format]
+    return words.format(
+        wish=request.wish.options,
+        measure=spelled,
+        wished=listed(wished, "or") if wished else "",
+        format=kind.name,
+        title=kind.title,
+    )
 
 
 def _part(kind: type[Part], args: argparse.Namespace, **others: Any) -> Part:

@@ -1,18 +1,24 @@
-"""DXF: the lines and polylines of a drawing, by ezdxf; no models.
+"""DXF: the lines and polylines of a drawing, by ezdxf, and a surface with its break lines; models are not read.
 
 A drawing has a height for everything, which is 0 where nobody thought of one: a line that has height 0 throughout is
 read without heights.
+
+A surface is written as the entities ``3DFACE`` of one layer: Civil 3D and other survey programs build a surface of
+them with these very edges, and GDAL, QGIS and FreeCAD open them, too. Break lines are 3D polylines of another layer.
 """
 
 from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ModelError, printable, reason_of, warn_of
-from meshsimp_pymoo.formats.table import LINES, Format, register
+from meshsimp_pymoo.formats.outmesh import OutMesh, metres_of
+from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import FloatArray
@@ -27,6 +33,13 @@ FILE_BYTES = 60
 SAGITTA = 1e-4
 # The entities that are lines.
 ENTITIES = ("LINE", "LWPOLYLINE", "POLYLINE")
+
+# What is written: AutoCAD 2000's edition, the first that says units.
+EDITION = "R2000"
+SURFACE_LAYER, LINE_LAYER = "TIN", "BREAKLINES"
+# $INSUNITS of units of so many metres; of others, degrees among them, a drawing has no units.
+INSUNITS = {1.0: 6, 1000.0: 7, 0.3048: 2, 1200 / 3937: 21}
+NO_UNITS = 0
 
 
 def _read_lines(path: Path, name: str) -> SourceLines:
@@ -85,4 +98,85 @@ def _vertices(entity: Any) -> FloatArray:
     return np.array([tuple(corner) for corner in found], np.float64).reshape(-1, 3)
 
 
-register(Format("dxf", (".dxf",), "DXF", sort=LINES, extra="lines", read_lines=_read_lines))
+def _write(path: Path, mesh: OutMesh) -> None:
+    """Write a drawing of faces and polylines.
+
+    The library makes all but the faces: as its objects 200 000 of them take half a minute.
+    """
+    import io
+
+    import ezdxf
+    import numpy as np
+
+    with _same_bytes():
+        drawing = ezdxf.new(EDITION, units=INSUNITS.get(metres_of(mesh.georeference.get("unit")) or 0.0, NO_UNITS))
+        drawing.layers.add(SURFACE_LAYER, color=3)
+        space = drawing.modelspace()
+        if mesh.lines:
+            drawing.layers.add(LINE_LAYER, color=1)
+        for line in mesh.lines:
+            space.add_polyline3d(mesh.vertices[line].tolist(), dxfattribs={"layer": LINE_LAYER})
+        low, high = mesh.vertices.min(axis=0).tolist(), mesh.vertices.max(axis=0).tolist()
+        # what is seen first: all of it, wherever it is on Earth
+        height, center = max(np.subtract(high, low)[:2].tolist()), np.add(low, high)[:2] / 2
+        drawing.set_modelspace_vport(height or 1.0, center.tolist())
+        space.reset_extents(low, high)
+        drawing.header["$EXTMIN"], drawing.header["$EXTMAX"] = (
+            low,
+            high,
+        )  # which the library does not take from a 0, 0, 0
+        handles = drawing.entitydb.handles
+        first = int(str(handles), 16)
+        handles.reset(f"{first + len(mesh.faces):X}")
+        text = io.StringIO()
+        drawing.write(text)
+    head, opening, rest = text.getvalue().partition(_tag(2, "ENTITIES"))
+    path.write_bytes((head + opening + _faces(mesh, first, space.layout_key) + rest).encode("utf-8"))
+
+
+@contextmanager
+def _same_bytes() -> Iterator[None]:
+    """Let the library write dates and identifiers that never change."""
+    from ezdxf import options
+
+    before = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        options.write_fixed_meta_data_for_testing = before
+
+
+def _faces(mesh: OutMesh, first: int, owner: str) -> str:
+    """Return the faces as entities of a space, with handles from the first on; the fourth corner is the third."""
+    corners = [
+        "".join(_tag(10 * (axis + 1) + corner, repr(value)) for axis, value in enumerate(point))
+        for corner in range(4)
+        for point in mesh.vertices.tolist()
+    ]
+    n = len(mesh.vertices)
+    head = _tag(0, "3DFACE") + _tag(5, "{:X}")
+    body = _tag(330, owner) + _tag(100, "AcDbEntity") + _tag(8, SURFACE_LAYER) + _tag(100, "AcDbFace")
+    return "".join(
+        head.format(handle) + body + corners[a] + corners[n + b] + corners[2 * n + c] + corners[3 * n + c]
+        for handle, (a, b, c) in enumerate(mesh.faces.tolist(), start=first)
+    )
+
+
+def _tag(code: int, value: str) -> str:
+    """Return a value with its group code, as text has them."""
+    return f"{code:>3}\n{value}\n"
+
+
+register(
+    Format(
+        "dxf",
+        (".dxf",),
+        "DXF",
+        extra="lines",
+        write=_write,
+        needs="ezdxf",
+        read_lines=_read_lines,
+        holds_lines=True,
+    )
+)

@@ -1,4 +1,6 @@
-"""GeoJSON: lines with or without heights, in and out; no models.
+"""GeoJSON: lines with or without heights, in and out, and surfaces with their break lines; models are not read.
+
+A surface is written as a feature for each triangle, a polygon with heights; break lines are features behind them.
 
 Of a file without a ``crs`` the format's later edition [1]_ says that it is WGS 84. Most files of surveys say nothing,
 and are in the system of the model: none is taken to be stated then.
@@ -11,12 +13,13 @@ References
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ModelError, reason_of
-from meshsimp_pymoo.formats.table import LINES, Format, register
+from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.formats.source.lines import SourceLines
@@ -44,7 +47,10 @@ def _read_lines(path: Path, name: str) -> SourceLines:
     try:
         tree = json.loads(read_text(path, name), parse_constant=_refuse_constant)
         lines, names, others = [], [], Counter[str]()
-        for called, geometry in _features(tree):
+        for called, geometry, is_triangle in _features(tree):
+            if is_triangle:
+                others["triangles"] += 1
+                continue
             parts = list(_parts(geometry, others))
             for part, of_part in zip(parts, part_names(called, len(parts)), strict=True):
                 names.append(of_part)
@@ -61,19 +67,23 @@ def _refuse_constant(word: str) -> float:
     raise ValueError(f"{word} is no number of JSON")
 
 
-def _features(tree: Any) -> Iterator[tuple[str, Any]]:
-    """Yield what messages call each feature, and its geometry; a bare geometry is a feature."""
+def _features(tree: Any) -> Iterator[tuple[str, Any, bool]]:
+    """Yield what messages call each feature, its geometry, and whether it is a triangle of a surface that was written.
+
+    A bare geometry is a feature.
+    """
     from meshsimp_pymoo.formats.source.lines import spelled_name
+    from meshsimp_pymoo.formats.source.triangles import TRIANGLE
 
     features = tree["features"] if tree["type"] == "FeatureCollection" else [tree]
     for number, feature in enumerate(features, start=1):
         if feature["type"] != "Feature":
-            yield spelled_name("geometry", number), feature
+            yield spelled_name("geometry", number), feature, False
             continue
         known = {str(key).lower(): value for key, value in (feature.get("properties") or {}).items()}
         known.setdefault("id", feature.get("id"))
         named = [known[key] for key in NAMES if isinstance(known.get(key), (str, int))]
-        yield spelled_name("feature", number, *named[:1]), feature["geometry"]
+        yield spelled_name("feature", number, *named[:1]), feature["geometry"], TRIANGLE in known
 
 
 def _parts(geometry: Any, others: Counter[str]) -> Iterator[list[Any]]:
@@ -128,25 +138,58 @@ def _system(tree: Mapping[str, Any]) -> dict[str, Any]:
 
 def _write_lines(path: Path, lines: SourceLines) -> None:
     """Write a feature for each line, one in a row of the file, with its name."""
+    places = [line.tolist() for line in lines.lines]
+    _put(path, _line_features(places, lines.names), lines.georeference)
+
+
+def _write(path: Path, mesh: OutMesh) -> None:
+    """Write a feature for each triangle, its ring counter-clockwise as seen from above, and one for each line."""
+    import numpy as np
+
+    from meshsimp_pymoo.formats.source.triangles import properties
+
+    places = mesh.vertices.tolist()
+    named = [f"[{x!r}, {y!r}, {z!r}]" for x, y, z in places]
+    said = properties(mesh)
+    values = zip(*(column.tolist() for column in said.values()), strict=True)
+    form = ", ".join(f'"{name}": {{!r}}' for name in said)
+    features = [
+        f'{{"type": "Feature", "properties": {{{form.format(*own)}}}, "geometry": {{"type": "Polygon", '
+        f'"coordinates": [[{named[a]}, {named[b]}, {named[c]}, {named[a]}]]}}}}'
+        for own, (a, b, c) in zip(values, np.asarray(mesh.faces).tolist(), strict=True)
+    ]
+    lines = [[places[row] for row in line.tolist()] for line in mesh.lines]
+    features += _line_features(lines, mesh.line_names or [""] * len(lines))
+    _put(path, features, mesh.georeference)
+
+
+def _line_features(lines: Iterable[list[list[float]]], names: Iterable[str]) -> list[str]:
     import json
 
     from meshsimp_pymoo.formats.source.lines import given_name
-    from meshsimp_pymoo.formats.source.metric import epsg_number
 
-    number = epsg_number(lines.georeference)
-    named = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{number}"}}
-    head = '{"type": "FeatureCollection",' + (f' "crs": {json.dumps(named)},' if number else "")
-    features = [
+    return [
         json.dumps(
             {
                 "type": "Feature",
                 "properties": {"name": given_name(called)},
-                "geometry": {"type": "LineString", "coordinates": line.tolist()},
+                "geometry": {"type": "LineString", "coordinates": line},
             },
             allow_nan=False,
         )
-        for called, line in zip(lines.names, lines.lines, strict=True)
+        for called, line in zip(names, lines, strict=True)
     ]
+
+
+def _put(path: Path, features: list[str], georeference: Mapping[str, Any]) -> None:
+    """Write features, one in a row, and the reference system, where its number is known."""
+    import json
+
+    from meshsimp_pymoo.formats.source.metric import epsg_number
+
+    number = epsg_number(georeference)
+    named = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{number}"}}
+    head = '{"type": "FeatureCollection",' + (f' "crs": {json.dumps(named)},' if number else "")
     path.write_bytes((head + ' "features": [\n' + ",\n".join(features) + "\n]}\n").encode("utf-8"))
 
 
@@ -155,8 +198,10 @@ register(
         "geojson",
         (".geojson", ".json"),
         "GeoJSON",
-        sort=LINES,
+        write=_write,
+        one_height=True,
         read_lines=_read_lines,
         write_lines=_write_lines,
+        holds_lines=True,
     )
 )

@@ -1,7 +1,7 @@
-"""glTF 2.0: Y up, in metres, single precision from an origin that the file states, its images inside it (GLB).
+"""glTF 2.0, packed into one file (GLB) or not: what is read, and the words that reading and writing share.
 
-A file of ours says in the ``extras`` of its one node how its coordinates came about, and goes back into the frame of
-its model; files of others are read as they lie, and written as they lay.
+A file of ours says in the ``extras`` of its nodes how its coordinates came about, and goes back into the frame of its
+model; files of others are read as they lie, and written as they lay.
 """
 
 from __future__ import annotations
@@ -10,19 +10,18 @@ import math
 import re
 import struct
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
-from meshsimp_pymoo.errors import ModelError, ResultError, reason_of, warn_of
+from meshsimp_pymoo.errors import ModelError, reason_of, warn_of
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import Options
-from meshsimp_pymoo.formats.outmesh import OutMesh, metres_of
-from meshsimp_pymoo.formats.table import Format, Held, register
+from meshsimp_pymoo.formats.table import Format, register
 
 if TYPE_CHECKING:
-    from meshsimp_pymoo.arrays import AnyArray, FloatArray
+    from meshsimp_pymoo.arrays import FloatArray
     from meshsimp_pymoo.formats.source import SourceMesh
 
 # The numbers of the types, of what a buffer is for, and of what primitives are made of.
@@ -40,14 +39,14 @@ UPRIGHT = {
 # What extras repeat of a georeference, and what it is; and what they say of a unit that nobody knows.
 STATED = {"epsg": int, "crs": str, "unit": str, "height_unit": str, "scale": list}
 UNKNOWN = "unknown"
-# Single precision holds distances between these [m].
-LEAST_EXTENT, MOST_EXTENT = 1e-30, 1e30
+# What all nodes of one frame state alike.
+FRAME = ("origin", "axes", "metres_per_unit", *STATED)
 
 
 # ------------------------------------------------------------------------------------------------------------ reading
 
 
-def _read(path: Path, name: str, options: Options) -> SourceMesh:
+def read_gltf(path: Path, name: str, options: Options) -> SourceMesh:
     """Read all meshes of the scene as they lie there; a file of ours goes back into the frame that it states."""
     import dataclasses
 
@@ -190,6 +189,9 @@ def _triangles(tree: dict[str, Any], name: str) -> list[dict[str, Any]]:
         for key in further:
             others[key] = others.get(key, 0) + 1
     words = [f"{key} of {count} primitive(s)" for key, count in sorted(others.items())]
+    levels = [node.get("extensions", {}).get("MSFT_lod", {}).get("ids", []) for node in tree.get("nodes", [])]
+    if coarser := sum(map(len, levels)):
+        words.append(f"{coarser} coarser level(s) of detail")
     if len(triangles) < len(primitives):
         words.append(f"{len(primitives) - len(triangles)} primitive(s) that are no triangles")
     if words:
@@ -269,9 +271,11 @@ def _stated_frame(tree: dict[str, Any]) -> _Frame | None:
     import numpy as np
 
     stated = [node.get("extras") for node in tree.get("nodes", []) if "mesh" in node]
-    if not stated or not isinstance(stated[0], dict) or any(extras != stated[0] for extras in stated):
+    if not stated or not all(isinstance(extras, dict) for extras in stated):
         return None
-    extras = stated[0]
+    extras = {key: stated[0].get(key) for key in FRAME}
+    if any({key: other.get(key) for key in FRAME} != extras for other in stated):
+        return None
     axes, scale = extras.get("axes"), extras.get("metres_per_unit")
     if not isinstance(axes, list) or tuple(axes) not in UPRIGHT.values():
         return None
@@ -282,17 +286,17 @@ def _stated_frame(tree: dict[str, Any]) -> _Frame | None:
         facts.pop("scale", None)
     if facts.get("unit") == UNKNOWN:
         del facts["unit"]
-    return _Frame(_turn(axes), np.array(scale, np.float64), facts)
+    return _Frame(turned(axes), np.array(scale, np.float64), facts)
 
 
 def _are_lengths(values: list[Any]) -> bool:
     return all(type(value) in (int, float) and 0 < value < math.inf for value in values)
 
 
-def _turn(axes: Sequence[str]) -> FloatArray:
+def turned(axes: Sequence[str]) -> FloatArray:
     """Return the rotation whose rows are axes with signs.
 
-    >>> _turn(["x", "z", "-y"]).tolist()
+    >>> turned(["x", "z", "-y"]).tolist()
     [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]
     """
     import numpy as np
@@ -303,167 +307,4 @@ def _turn(axes: Sequence[str]) -> FloatArray:
     return turn
 
 
-# ------------------------------------------------------------------------------------------------------------ writing
-
-
-def _refuse(model: Held) -> None:
-    """Refuse a model of a size that single precision cannot hold."""
-    import numpy as np
-
-    extent = float(np.ptp(model.file_points, axis=0).max())
-    if not LEAST_EXTENT < extent < MOST_EXTENT:
-        raise ResultError(
-            f"{model.name}: GLB holds single precision, and this model is {extent:.3g} wide; write another format, "
-            "such as ply"
-        )
-
-
-def _metres_per_unit(georeference: Mapping[str, Any]) -> FloatArray:
-    """Return what units of the file's x, y and z are in metres, 1 where that is not known.
-
-    A ``scale`` makes units of height of those of the plane, such as degrees.
-
-    >>> _metres_per_unit({"unit": "degree", "scale": [55_600.0, 111_400.0], "height_unit": "metre"}).tolist()
-    [55600.0, 111400.0, 1.0]
-    >>> _metres_per_unit({"unit": "metre", "height_unit": "foot"}).tolist()
-    [1.0, 1.0, 0.3048]
-    """
-    import numpy as np
-
-    plane = metres_of(georeference.get("unit")) or 1.0
-    height = metres_of(georeference.get("height_unit")) or plane
-    scale = georeference.get("scale")
-    return np.array([plane, plane, height] if scale is None else [scale[0] * height, scale[1] * height, height])
-
-
-def _axes(mesh: OutMesh) -> tuple[str, ...]:
-    """Return which axes of the file lie along X, Y and Z: those of a glTF as they are, else so that Y is up."""
-    import numpy as np
-
-    stated = tuple(mesh.georeference.get("axes", ()))
-    if stated in UPRIGHT.values():
-        return stated
-    up = np.array([0.0, 0.0, 1.0]) if mesh.up is None else np.asarray(mesh.up, np.float64)
-    k = int(np.argmax(np.abs(up)))
-    return UPRIGHT["-" * bool(up[k] < 0) + "xyz"[k]]
-
-
-def _origin(mesh: OutMesh) -> FloatArray:
-    """Return what the coordinates count from."""
-    import numpy as np
-
-    from meshsimp_pymoo.formats.source.precision import local_origin
-
-    return local_origin(np.asarray(mesh.vertices, dtype=np.float64)) if mesh.origin is None else mesh.origin
-
-
-def _single(mesh: OutMesh) -> FloatArray:
-    """Return the vertices from there, in metres."""
-    import numpy as np
-
-    return (np.asarray(mesh.vertices, dtype=np.float64) - _origin(mesh)) * _metres_per_unit(mesh.georeference)
-
-
-def _write(path: Path, mesh: OutMesh) -> None:
-    """Write a GLB of one node with one mesh, whose coordinates are those from the origin."""
-    import json
-
-    import numpy as np
-
-    origin, scale = _origin(mesh), _metres_per_unit(mesh.georeference)
-    axes = _axes(mesh)
-    turn = _turn(axes)
-    points = (_single(mesh) @ turn.T).astype("<f4") + np.float32(0)  # no -0.0
-    uv, material = mesh.uv, mesh.material if mesh.uv is None else mesh.material or Material()
-    columns: list[tuple[str, AnyArray, dict[str, Any]]] = [
-        (
-            "POSITION",
-            points,
-            {
-                "componentType": GLTF_FLOAT,
-                "type": "VEC3",
-                "min": points.min(axis=0).tolist(),
-                "max": points.max(axis=0).tolist(),
-            },
-        )
-    ]
-    if (color := mesh.attributes.get("color")) is not None:
-        rgba = np.full((len(points), 4), 255, np.uint8)
-        rgba[:, : color.shape[1]] = color
-        columns.append(("COLOR_0", rgba, {"componentType": GLTF_UBYTE, "type": "VEC4", "normalized": True}))
-    if uv is not None:  # counted from the upper left corner
-        flipped = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]).astype("<f4")
-        columns.append(("TEXCOORD_0", flipped, {"componentType": GLTF_FLOAT, "type": "VEC2"}))
-    parts: list[tuple[bytes, dict[str, int]]] = [
-        (values.tobytes(), {"target": GLTF_VERTICES}) for _, values, _ in columns
-    ]
-    parts.append((np.asarray(mesh.faces).astype("<u4").tobytes(), {"target": GLTF_INDICES}))
-    accessors = [{"bufferView": k, "count": len(points)} | form for k, (_, _, form) in enumerate(columns)]
-    accessors.append(
-        {"bufferView": len(columns), "count": 3 * len(mesh.faces), "componentType": GLTF_UINT, "type": "SCALAR"}
-    )
-    primitive: dict[str, Any] = {
-        "attributes": {key: k for k, (key, _, _) in enumerate(columns)},
-        "indices": len(columns),
-        "mode": GLTF_TRIANGLES,
-    }
-    looks: dict[str, Any] = {}
-    if material is not None:
-        primitive["material"] = 0
-        looks["materials"] = [_described(material, has_image=mesh.has_image)]
-    if material is not None and mesh.has_image:
-        looks |= {"textures": [{"source": 0}], "images": [{"bufferView": len(parts), "mimeType": material.media_type}]}
-        parts.append((material.image, {}))
-    binary = [content + b"\0" * (-len(content) % 4) for content, _ in parts]
-    starts = np.cumsum([0, *map(len, binary)]).tolist()
-    views = [
-        {"buffer": 0, "byteOffset": first, "byteLength": len(content)} | use
-        for first, (content, use) in zip(starts, parts, strict=False)
-    ]
-    known = {key: mesh.georeference[key] for key in STATED if mesh.georeference.get(key)}
-    extras = {
-        "origin": (np.asarray(origin, np.float64) + 0.0).tolist(),
-        "axes": list(axes),
-        "metres_per_unit": scale.tolist(),
-        "unit": UNKNOWN,
-    } | known
-    tree = {
-        "asset": {"version": "2.0", "generator": "meshsimp_pymoo"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "translation": (turn @ (origin * scale) + 0.0).tolist(), "extras": extras}],
-        "meshes": [{"primitives": [primitive]}],
-        **looks,
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": starts[-1]}],
-    }
-    text = json.dumps(tree, separators=(",", ":"), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    length = 12 + 8 + len(text) + 8 + starts[-1]
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", starts[-1], b"BIN\0")
-    path.write_bytes(b"".join([struct.pack("<4sII", b"glTF", 2, length), chunks, *binary]))
-
-
-def _described(material: Material, *, has_image: bool) -> dict[str, Any]:
-    surface: dict[str, Any] = {"baseColorFactor": list(material.color), "metallicFactor": 0.0}
-    if has_image:
-        surface["baseColorTexture"] = {"index": 0}
-    blended = {"alphaMode": "BLEND"} if material.color[3] < 1 else {}
-    return {"name": material.name, "pbrMetallicRoughness": surface} | blended
-
-
-register(
-    Format(
-        "glb",
-        (".glb",),
-        "GLB",
-        read=_read,
-        write=_write,
-        single=_single,
-        states_origin=True,
-        keeps=("color", "uv"),
-        refuse=_refuse,
-    )
-)
-register(Format("gltf", (".gltf",), "glTF", read=_read))
+register(Format("gltf", (".gltf",), "glTF", read=read_gltf))

@@ -44,24 +44,12 @@ MEASURES = {
 
 
 def _refuse(model: Held) -> None:
-    """Refuse coordinates that are no lengths, and a mesh with faces that do not look up along the z of its file."""
-    from meshsimp_pymoo.arrays import Rows
-
+    """Refuse coordinates that are no lengths."""
     unit = model.georeference.get("unit")
     if unit and metres_of(unit) is None:
         raise ResultError(
             f"{model.name}: a LandXML surface has lengths for coordinates, and the unit of these is {unit!r}; write "
             "another format, such as ply, or project the model first (gdalwarp -t_srs)"
-        )
-    if isinstance(model.faces, Rows):  # of a grid that is read by windows, where all look up
-        return
-    a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
-    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    if (area < 0).any() or not (area > 0).any():
-        wrong = int((area < 0).sum()) or len(area)
-        raise ResultError(
-            f"{model.name}: a LandXML surface has its heights along z, and {wrong:,} of {len(area):,} faces of this "
-            "one do not look up along it; write another format, such as ply"
         )
 
 
@@ -219,6 +207,7 @@ register(
         "LandXML",
         write=_write,
         refuse=_refuse,
+        one_height=True,
         read_lines=_read_lines,
         holds_lines=True,
     )

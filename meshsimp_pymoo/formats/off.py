@@ -89,9 +89,13 @@ def _read(path: Path, name: str, options: Options) -> SourceMesh:
 
 
 def _write(path: Path, mesh: OutMesh) -> None:
-    from meshsimp_pymoo.formats.source.scenes import EXACT_DIGITS, export
+    """Write positions so that they read back equal; trimesh's own writer rounds what is next to 0."""
+    import numpy as np
 
-    export(path, mesh, digits=EXACT_DIGITS)
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(mesh.vertices, np.float64).tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in np.asarray(mesh.faces).tolist()]
+    head = f"OFF\n{len(mesh.vertices)} {len(mesh.faces)} 0\n"
+    path.write_bytes((head + "\n".join(rows) + "\n").encode("ascii"))
 
 
 register(Format("off", (".off",), "OFF", bare_points=True, read=_read, write=_write))

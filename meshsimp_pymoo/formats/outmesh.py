@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,42 @@ def metres_of(unit: Any) -> float | None:
     return METRES.get(str(unit or "").lower())
 
 
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """What compression made of a mesh, whose vertices may be in another order then.
+
+    Attributes
+    ----------
+    content : bytes
+        The compressed mesh.
+    columns : dict of str to (V, k) array
+        What it unpacks to: the attributes of the vertices as they are stored, by the format's names.
+    faces : (M, 3) int array
+        The triangles that it unpacks to.
+    ids : dict of str to int
+        What it calls each of the attributes.
+    bits : int
+        Bits of a coordinate.
+    shift : float
+        The longest way by which a vertex moved [m].
+    """
+
+    content: bytes
+    columns: dict[str, AnyArray]
+    faces: IntArray
+    ids: dict[str, int]
+    bits: int
+    shift: float
+
+    @property
+    def said(self) -> dict[str, float]:
+        """What is said of it beside the mesh, as plain data."""
+        return {"bits": self.bits, "moved_by_at_most_m": self.shift}
+
+    def __repr__(self) -> str:
+        return f"<Packed: {len(self.faces):,} triangles in {len(self.content):,} bytes, {self.shift:.3g} m off>"
+
+
 @brief
 @dataclass(frozen=True, eq=False)
 class OutMesh:
@@ -43,6 +80,12 @@ class OutMesh:
     #: Chains of edges of the mesh that are break lines: rows of ``vertices``, in order; with their names.
     lines: tuple[IntArray, ...] = ()
     line_names: tuple[str, ...] = ()
+    #: What a GLB says of the mesh in its ``extras``, as plain data.
+    extras: Mapping[str, Any] = field(default_factory=dict)
+    #: Whether a GLB says normals of its vertices and a material in any case: some viewers show no relief without.
+    shaded: bool = False
+    #: The same mesh compressed, where the format is to hold that instead; see ``Format.pack``.
+    packed: Packed | None = None
 
     @property
     def uv(self) -> AnyArray | None:

@@ -17,12 +17,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from meshsimp_pymoo import formats
 from meshsimp_pymoo.discovery import modules_in
-from meshsimp_pymoo.errors import ModelError, ModelWarning, raise_if_memory, reason_of, way_to_install
+from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError, raise_if_memory, reason_of, way_to_install
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.options import DEFAULT, Options
 from meshsimp_pymoo.formats.outmesh import OutMesh
@@ -66,7 +67,7 @@ WAYS_OUT = (
     ),
     (
         ".xml .landxml",
-        "a surface of LandXML is written, not read: export it as .ply or .obj, or its points as x y z (.xyz)",
+        "export it as .ply or .obj, or its points as x y z (.xyz)",
     ),
     (".xls .xlsx .ods", "save the table as .csv, x y z in every line"),
 )
@@ -123,8 +124,15 @@ class Format(NamedTuple):
         Whether it says from which origin its coordinates count; then single precision loses nothing that matters.
     keeps : tuple of str, optional
         The attributes of vertices that it holds when written, among them "uv", with which the material goes; None: all.
+    pack : callable, optional
+        ``pack(mesh, most)`` returns the mesh compressed so that no vertex moves by more than so many metres, as far as
+        the library can; ``write`` then writes that. A ResultError if the library is missing.
     refuse : callable, optional
         ``refuse(model)`` raises a ResultError if it cannot hold meshes of this model.
+    one_height : bool
+        Whether what it holds has one height at each place, along z of the file: it then holds meshes of no other model.
+    needs : str
+        The module of its extra without which nothing is written; empty: none.
     open_heights : callable, optional
         ``open_heights(path, name, options)`` opens a height grid that is read by windows.
     count_samples : callable, optional
@@ -149,7 +157,10 @@ class Format(NamedTuple):
     single: Callable[[OutMesh], FloatArray] | None = None
     states_origin: bool = False
     keeps: tuple[str, ...] | None = ()
+    pack: Callable[[OutMesh, float], OutMesh] | None = None
     refuse: Callable[[Held], None] | None = None
+    one_height: bool = False
+    needs: str = ""
     open_heights: Callable[[Path, str, Options], PlacedHeights] | None = None
     count_samples: Callable[[Path, str], int | None] | None = None
     read_lines: Callable[[Path, str], SourceLines] | None = None
@@ -167,9 +178,30 @@ class Format(NamedTuple):
         return self.single is not None
 
     def check(self, model: Held) -> None:
-        """Raise a ResultError if meshes of this model cannot be written in it."""
+        """Raise a ResultError if meshes of this model cannot be written in it, or what writes them is not installed."""
+        if self.needs and find_spec(self.needs) is None:
+            way = way_to_install(self.extra)
+            raise ResultError(f"{model.name}: {self.title} is written by {self.needs}; install it by {way}")
         if self.refuse is not None:
             self.refuse(model)
+        if self.one_height:
+            _refuse_folds(self, model)
+
+
+def _refuse_folds(kind: Format, model: Held) -> None:
+    """Refuse a mesh with faces that do not look up along the z of its file."""
+    from meshsimp_pymoo.arrays import Rows
+
+    if isinstance(model.faces, Rows):  # of a grid that is read by windows, where all look up
+        return
+    a, b, c = (model.file_points[model.faces[:, k], :2] for k in range(3))
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    if (area < 0).any() or not (area > 0).any():
+        wrong = int((area < 0).sum()) or len(area)
+        raise ResultError(
+            f"{model.name}: a {kind.title} surface has its heights along z, and {wrong:,} of {len(area):,} faces of "
+            "this one do not look up along it; write another format, such as ply"
+        )
 
 
 # --------------------------------------------------------------------------------------------------------- the table
@@ -386,9 +418,10 @@ def _way_out(path: Path) -> str:
 
     suffix, file = path.suffix.lower(), as_argument(path)
     lines = f"; its lines can be break lines of a model: --break-lines {file}" if suffix in line_suffixes() else ""
+    written = [f"{kind.title} is written, not read: " for kind in written_formats().values() if suffix in kind.suffixes]
     for suffixes, advice in WAYS_OUT:
         if suffix in suffixes.split():
-            return advice.format(file=file) + lines
+            return "".join(written) + advice.format(file=file) + lines
     known = [f"{' '.join(read_suffixes(sort))} for {title}" for sort, title in SORTS.items()]
     return f"known are {listed(known)}{lines}"
 
@@ -641,9 +674,8 @@ class Rounding:
             does.append(f"turns over or flattens {self.turned:,} triangle{'s' * (self.turned > 1)}")
         if not does:
             return
-        known = written_formats().values()
-        exact = listed(other.name for other in known if not other.single_precision)
-        stating = listed(other.name for other in known if other.states_origin)
+        exact = listed(other.name for other in _kept_formats() if not other.single_precision)
+        stating = listed(other.name for other in _kept_formats() if other.states_origin)
         warnings.warn(
             f"{name}: {self.kind.name} holds single precision, which {listed(does)}; {exact} keep them exactly"
             + ("" if self.kind.states_origin else f", {stating} states a local origin"),
@@ -652,11 +684,16 @@ class Rounding:
         )
 
 
+def _kept_formats() -> list[Format]:
+    """Return the formats that a mesh can be read from again, which are named in place of one that loses something."""
+    return [kind for kind in written_formats().values() if kind.read is not None]
+
+
 def warn_of_left_behind(kind: Format, name: str, attributes: Iterable[str]) -> None:
     """Warn if the format holds not all of what is known of the vertices."""
     lost = [] if kind.keeps is None else sorted(set(attributes) - set(kind.keeps))
     if lost:
-        exact = listed(other.name for other in written_formats().values() if other.keeps is None)
+        exact = listed(other.name for other in _kept_formats() if other.keeps is None)
         warnings.warn(
             f"{name}: {kind.name} does not hold {listed(lost)[:200]} of the vertices; {exact} does",
             ModelWarning,

@@ -10,8 +10,10 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import html
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,17 +22,15 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.errors import printable
+from meshsimp_pymoo.reprs import brief
 
-__all__ = ["embedded_array", "embedded_faces", "html_document", "magma"]
+__all__ = ["Framed", "embedded_array", "embedded_faces", "html_document"]
 
 ASSETS = Path(__file__).with_name("assets")
 COMPRESSION = 9
 
 # What the browser calls the types of embedded arrays.
 KINDS = {"u1": "u1", "u2": "u2", "u4": "u4", "f8": "f8"}
-
-# Colours of the error in all pictures: pale where it is small. The darkest ones would be lost on a dark page.
-COLOUR_MAP, DARKEST, COLOURS = "magma_r", 0.9, 128
 
 
 def html_document(template: str, scripts: Sequence[str], data: Any, **values: Any) -> str:
@@ -74,6 +74,30 @@ def html_document(template: str, scripts: Sequence[str], data: Any, **values: An
     )
 
 
+@brief
+@dataclass(frozen=True)
+class Framed:
+    """A page as notebooks show it: in a frame of its own, so that neither meets the other's styles and scripts.
+
+    Attributes
+    ----------
+    page : str
+        The HTML of it.
+    height : int
+        Of the frame [pixels].
+    """
+
+    page: str
+    height: int
+
+    def _repr_html_(self) -> str:
+        # the document is an attribute: VS Code shows no frame of a file, and a copy of the notebook shows the same
+        return (
+            f'<iframe srcdoc="{html.escape(self.page)}" style="width: 100%; height: {self.height}px; border: 0" '
+            'title="page of meshsimp_pymoo" allow="clipboard-write; fullscreen" allowfullscreen></iframe>'
+        )
+
+
 def embedded_array(values: npt.NDArray[Any]) -> dict[str, str]:
     """Return an array as the browser unpacks it: base64 of gzip of all first bytes, then all second ones, ...
 
@@ -104,15 +128,6 @@ def embedded_faces(faces: npt.NDArray[Any]) -> dict[str, str]:
     a, b, c = a[order], b[order], c[order]
     columns = np.concatenate([np.diff(a, prepend=0), b - a, c - a])
     return embedded_array(columns.astype(np.uint16 if columns.max(initial=0) < 2**16 else np.uint32))
-
-
-@cache
-def magma() -> list[list[int]]:
-    """Return the colours of the error, from none to the end of the scale: (r, g, b) from 0 to 255."""
-    from matplotlib import colormaps
-
-    rgb = colormaps[COLOUR_MAP](np.linspace(0.0, DARKEST, COLOURS))[:, :3]
-    return np.rint(255 * rgb).astype(int).tolist()
 
 
 @cache

@@ -8,6 +8,7 @@ above DRAWN_VERTICES the picture of the original.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,17 +17,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import BoolArray, IntArray, Rows
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
-from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, magma, slug
+from meshsimp_pymoo.report.colours import embedded_image, hypsometric, magma
+from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, slug
+from meshsimp_pymoo.report.downloads import downloads
 from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, original_mesh, winding
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
 from meshsimp_pymoo.storage import STATEMENT, StoredFront
-from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, Measure
+from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Measure
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import mesh_lines
@@ -40,22 +43,29 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "simplification.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "painter.js", "viewer.js",
+    "body.js", "windows.js", "simplification.js",
 )  # fmt: skip
-# Before the last one, where closed meshes are shown.
+# Where closed meshes are shown.
 OF_BODIES = "body.js"
 PAGE_BYTES = 15_000_000
 # The libraries, the texts and the numbers of the solutions.
-FIXED_BYTES = 700_000
+FIXED_BYTES = 730_000
 # What one triangle, one deviation and one vertex take, embedded; measured on scans and terrain. Too low an estimate is
 # put right afterwards, too high a one leaves out meshes that would have fitted.
-TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES = 4.0, 1.2, 26.0
+TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES, UV_BYTES = 4.0, 1.2, 26.0, 9
 # A deviation d is embedded as the level 254 sqrt(d / largest), which keeps small ones apart.
 LEVELS, UNCOVERED_LEVEL = 254, 255
 # The colours of the error end where this share of the knee's vertices are below: a few spikes do not pale all the rest.
 SCALE_QUANTILE = 0.98
 # Of break lines with more vertices than these together, what thinning left of them is drawn on the original.
 DRAWN_LINE_VERTICES = 10_000
+# How the meshes can be coloured, as the page calls it; the first ones only where the model has them.
+COLOURS = {"texture": "texture", "own": "own colours", "plain": "plain", "height": "heights", "error": "error"}
+# A surface that is longer than so many times its breadth is seen in high windows.
+BROAD = 1.15
+# The slider of the heights reaches from a tenth of the lower of their usual factor and 1 to ten times the higher one.
+HEIGHT_DECADES = 1.0
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
 RECORDED = ("algorithm", "seed", "generations", "evaluations", "moves", "interrupted")
 # A setting of more values than these (one weight a vertex) is counted on the page, not listed.
@@ -71,11 +81,15 @@ class _Embedded:
     ----------
     vertices : (V,) int array
         Rows of the model that are in the page, ascending.
-    original : dict
+    faces : (M, 3) int array
         The triangles of the drawn original, as rows of ``vertices``.
+    line_names : tuple of str
+        What the break lines are called that chains name by their number.
+    original : dict
+        The same, embedded.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
-        of these, and its break lines as edges, rows of ``vertices``, if there are any; None where its mesh is left out.
+        of these, and its break lines, chains of rows of ``vertices``, if it has any; None where it is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -83,6 +97,8 @@ class _Embedded:
     """
 
     vertices: IntArray
+    faces: IntArray
+    line_names: tuple[str, ...]
     original: dict[str, str]
     solutions: list[dict[str, Any] | None]
     scale_end: float
@@ -95,7 +111,7 @@ def simplification_page(
     kept: BoolArray | Chromosomes,
     *,
     measure: str,
-    folder: str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None,
     knee: int,
     limit: int = PAGE_BYTES,
 ) -> str:
@@ -112,8 +128,9 @@ def simplification_page(
         The solutions, in vector order.
     measure : str
         What was minimised beside the triangles.
-    folder : path
-        The folder of the front, as a shell command shall name it.
+    folder : path or None
+        The folder of the front, as a shell command shall name it; None: the page is in a notebook, where Python
+        writes the meshes.
     knee : int
         The row of the best compromise.
     limit : int
@@ -136,7 +153,12 @@ def simplification_page(
     whole = bool(original[0].all())  # else the largest mesh would take the place of many
     order = _by_importance(count, [row for row in (chosen, knee, 0, count - 1 if whole else None) if row is not None])
     lines = _original_lines(surface)
-    held = _embedded(surface, kept, front, original, order, knee, limit - (len(lines["data"]) if lines else 0))
+    uv, texture, word = model.attributes.get("uv"), None, ""
+    if uv is not None and model.material is not None and model.material.image:
+        texture, word = embedded_image(model.material)
+    taken = len(lines["data"]) if lines else 0
+    taken += len(texture["image"]) + UV_BYTES * int(original[0].sum()) if texture else 0
+    held = _embedded(surface, kept, front, original, order, knee, limit - taken)
     missing = sum(solution is None for solution in held.solutions)
     numbers = dict(front.quality)
     if front.refitted_error is not None:
@@ -144,12 +166,17 @@ def simplification_page(
     # what is not known is null
     columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
+    ramps = {"error": magma()} if view.is_closed else {"height": hypsometric(), "error": magma()}
+    colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
+    own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
+    points = model.file_points[held.vertices].astype(np.float64)
+    files = downloads(surface, points, held.faces, held.line_names)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
+    first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
-        "folder": printable(as_argument(folder)),
-        "measure": measure,
+        "folder": None if folder is None else printable(as_argument(folder)),
         "closed": _closed_look(surface) if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [
@@ -162,7 +189,11 @@ def simplification_page(
         "refitted_meshes": front.refitted_meshes,
         "knee": knee,
         "chosen": chosen,
-        "series": [{"name": name, "x": F[:, 1].tolist(), "y": F[:, 0].tolist()} for name, F in front.series.items()],
+        "searched": _same_order(measure),
+        "series": [
+            {"name": name, "x": F[:, 1].tolist(), "y": _known_errors(F[:, 0], measure, surface.total_weight)}
+            for name, F in front.series.items()
+        ],
         "model": {
             "vertices": model.n_vertices,
             "triangles": len(model.faces),
@@ -172,42 +203,56 @@ def simplification_page(
             "rotation": view.rotation.tolist(),
             "scale": view.scale.tolist(),
         },
-        "points": embedded_array(model.file_points[held.vertices].astype(np.float64)),
+        "points": embedded_array(points),
+        "files": files.templates,
         "paint": None if paint is None else embedded_array(paint) | {"channels": paint.shape[1]},
         "faces": held.original,
         "lines": lines,
         "solutions": held.solutions,
-        "colours": magma(),
+        "texture": texture
+        and texture | {"uv": embedded_array(np.asarray(uv)[held.vertices].astype(np.float32).astype(float))},
+        "colours": ramps,
         "uncovered_colour": [int(UNCOVERED[k : k + 2], 16) for k in (1, 3, 5)],
         "scale_end": held.scale_end,
         "scale_quantile": SCALE_QUANTILE,
     }
     return html_document(
         "simplification.html",
-        (*SCRIPTS[:-1], OF_BODIES, SCRIPTS[-1]) if view.is_closed else SCRIPTS,
+        [name for name in SCRIPTS if name != OF_BODIES or view.is_closed],
         data,
         title=f"{PurePath(source).name}, simplified",
         model={"vertices": model.n_vertices, "triangles": len(model.faces)},
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run, unit), *_what_is_thinned(model, held, missing)],
+        thinned=[
+            *_what_was_searched(front.run, unit),
+            *_what_is_thinned(model, held, missing),
+            *([word] if word else []),
+        ],
         heights=None if view.is_closed else _heights(view.exaggeration),
+        colours={name: COLOURS[name] for name in colours},
+        own_colours=own,
+        known_unit=unit != LENGTH,
+        broad=not view.is_closed and _is_broad(view.extent),
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
-            "mean_error": f"{columns['mean_error'][count // 2]:.3g}",
+            "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
         },
         painted=paint is not None,
+        is_stored=folder is not None,
+        files=files.titles,
+        refused=printable(" ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused)),
         covering=has_border,
         holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",
         further=printable(listed(further)) if (further := sorted(set(model.attributes) - {"color"})) else "",
-        errors={
-            name: MEASURES[name].label for name in _errors() if any(one is not None for one in columns.get(name, ()))
-        },
+        errors={name: label for name, label in _errors().items() if any(v is not None for v in columns.get(name, ()))},
+        first_error=first_error,
+        unit_sign="" if unit == LENGTH else unit,
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
-        quality=STATEMENT[1] if (front.folder / STATEMENT[1]).is_file() else "",
+        quality=STATEMENT[1] if folder is not None and (front.folder / STATEMENT[1]).is_file() else "",
     )
 
 
@@ -225,15 +270,44 @@ def _closed_look(surface: Surface) -> dict[str, Any]:
 
 
 def _heights(exaggeration: float) -> dict[str, str]:
-    """Return what the slider of the heights is made of."""
-    value = float(f"{exaggeration:.2g}")
-    return {"value": f"{value:g}", "step": f"{value / 20:g}", "most": f"{5 * value:g}"}
+    """Return the ends of the slider of the heights and where it stands: logarithms of the factor."""
+    usual = math.log10(exaggeration)
+    least, most = min(0.0, usual) - HEIGHT_DECADES, max(0.0, usual) + HEIGHT_DECADES
+    return {name: f"{round(value, 2):g}" for name, value in {"least": least, "most": most, "usual": usual}.items()}
 
 
-def _errors() -> list[str]:
-    """Return the measures of the error: those that a mesh is usually chosen by first, the sum last."""
+def _is_broad(extent: FloatArray) -> bool:
+    """Return whether a surface is seen broader than high: then its windows are no higher than broad.
+
+    >>> _is_broad(np.array([30.0, 20.0, 1.0])), _is_broad(np.array([20.0, 30.0, 1.0]))
+    (True, False)
+    """
+    return bool(extent[1] <= BROAD * extent[0])
+
+
+def _errors() -> dict[str, str]:
+    """Return the columns of errors with what they are called: what a mesh is usually chosen by first, the sum last."""
     errors = [name for name, measure in MEASURES.items() if measure.is_error]
-    return sorted(errors, key=lambda name: (not MEASURES[name].wish, name == "error"))
+    errors.sort(key=lambda name: (not MEASURES[name].wish, name == "error"))
+    labels = {name: MEASURES[name].label for name in errors}
+    return labels | {"refitted_error": "refitted error (sum)", "error": f"{labels['error']} (sum)"}
+
+
+def _same_order(measure: str) -> list[str]:
+    """Return the measures by which meshes stand in the order of an objective: itself, and its mean if it is the sum."""
+    return [measure] + [
+        name for name, other in MEASURES.items() if other.is_error and other.searched == measure != name
+    ]
+
+
+def _known_errors(objective: FloatArray, measure: str, total_weight: float) -> dict[str, list[float]]:
+    """Return what is known of the errors of meshes by their objective alone, by measure."""
+    if measure != "error":
+        return {measure: objective.tolist()}
+    table = np.zeros((len(objective), REGIONS))
+    table[:, ERROR] = objective
+    of: dict[str, Any] = {name: MEASURES[name].of for name in _same_order(measure)}
+    return {name: of[name](table, total_weight).tolist() for name in of}
 
 
 def spoken(measure: Measure, unit: str = LENGTH, *, closed: bool = False) -> dict[str, str]:
@@ -275,6 +349,8 @@ def _embedded(
     vertices = np.flatnonzero(used)
     solutions: list[dict[str, Any] | None] = [None] * len(kept)
     sizes: dict[int, int] = {}
+    known: Any = getattr(surface.model, "lines", None)  # which a surface of another kind need not have
+    line_names = () if known is None else tuple(dict.fromkeys(known.names))
     for row, mesh in found.items():
         largest = float(mesh.deviation.max())
         levels = np.rint(LEVELS * np.sqrt(mesh.deviation / (largest or 1.0))).astype(np.uint8)
@@ -282,13 +358,13 @@ def _embedded(
         triangles, deviation = embedded_faces(np.searchsorted(vertices, mesh.faces)), embedded_array(levels)
         held: dict[str, Any] = {"faces": triangles, "deviation": deviation, "largest": largest}
         sizes[row] = len(triangles["data"]) + len(deviation["data"])
-        chains, _ = mesh_lines(surface, mesh.faces)
+        chains, names = mesh_lines(surface, mesh.faces)
         if chains:
-            edges = np.concatenate([np.column_stack([chain[:-1], chain[1:]]) for chain in chains])
-            held["lines"] = embedded_array(np.searchsorted(vertices, edges).astype(np.uint32))
-            sizes[row] += len(held["lines"]["data"])
+            held["lines"] = _embedded_lines([np.searchsorted(vertices, chain) for chain in chains], names, line_names)
+            sizes[row] += sum(len(part["data"]) for part in held["lines"].values())
         solutions[row] = held
-    faces = embedded_faces(np.searchsorted(vertices, original))
+    original = np.searchsorted(vertices, original)
+    faces = embedded_faces(original)
     room = limit - FIXED_BYTES - len(faces["data"]) - VERTEX_BYTES * len(vertices)
     while sizes and sum(sizes.values()) > room:
         dropped = next(row for row in reversed(rows) if row in sizes)
@@ -296,7 +372,18 @@ def _embedded(
         del sizes[dropped]
     at_knee = found[knee] if knee in found else _checked(surface, kept, front, knee, measured)
     end = float(np.quantile(at_knee.deviation, SCALE_QUANTILE)) or float(front.quality["max_error"].max()) or 1.0
-    return _Embedded(vertices, faces, solutions, end, n_drawn)
+    return _Embedded(vertices, original, line_names, faces, solutions, end, n_drawn)
+
+
+def _embedded_lines(chains: Sequence[IntArray], names: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
+    """Return break lines as the browser unpacks them: the vertices of all, how many each has, their names."""
+    place = {name: k for k, name in enumerate(known)}
+    columns = {
+        "rows": np.concatenate(chains),
+        "sizes": [len(chain) for chain in chains],
+        "names": [place[name] for name in names],
+    }
+    return {name: embedded_array(np.asarray(values, np.uint32)) for name, values in columns.items()}
 
 
 def _original_lines(surface: Surface) -> dict[str, str] | None:

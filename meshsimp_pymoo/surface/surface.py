@@ -26,9 +26,9 @@ from meshsimp_pymoo.surface.measures import OBJECTIVES, OF_LINES, OF_MESH, Quali
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.workers import on_threads
 
-# A relief flatter than this share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
-# metres.
-LEAST_RELIEF = 0.12
+# A relief flatter than the first share of its extent is drawn higher: terrain is, by kilometres of width to hundreds of
+# metres. One deeper than the second is drawn lower: units of plane and height that are not the same make needles.
+LEAST_RELIEF, MOST_RELIEF = 0.12, 1.0
 
 
 @dataclass(frozen=True)
@@ -162,9 +162,11 @@ class View:
 
     @property
     def exaggeration(self) -> float:
-        """Factor by which z is drawn higher, so that a flat relief shows."""
-        least, height = LEAST_RELIEF * float(self.extent[:2].max()), float(self.extent[2])
-        return max(1.0, least / height) if height > 0 and not self.is_closed else 1.0
+        """Factor by which z is drawn: more for a relief too flat to show, less for one that would be a needle."""
+        width, height = float(self.extent[:2].max()), float(self.extent[2])
+        if not height > 0 or self.is_closed:
+            return 1.0
+        return min(max(1.0, LEAST_RELIEF * width / height), MOST_RELIEF * width / height)
 
 
 class Original(Protocol):

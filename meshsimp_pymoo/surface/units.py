@@ -27,6 +27,15 @@ def length_unit(georeference: Mapping[str, Any]) -> str:
     return LENGTH if unit in ("None", *ANGLES) else unit
 
 
+def metres_per_model_unit(georeference: Mapping[str, Any]) -> float:
+    """Return what the unit of errors is in metres; 1 where nobody says.
+
+    >>> metres_per_model_unit({"unit": "degree", "height_unit": "foot"}), metres_per_model_unit({})
+    (0.3048, 1.0)
+    """
+    return metres_of(length_unit(georeference)) or 1.0
+
+
 def system_name(georeference: Mapping[str, Any]) -> str:
     """Return what the reference system is called, as far as its text says.
 

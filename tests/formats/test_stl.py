@@ -32,7 +32,7 @@ def test_merging_takes_equal_positions_alone_and_zero_has_no_sign(tmp_path):
 def test_a_single_precision_format_says_how_far_it_moves_vertices(tmp_path, solutions):
     source = load("face:200")
     far = build_model(dataclasses.replace(source, points=source.points + np.array([5e6, 4e6, 0])))
-    said = r"by up to 0\.[12]\d+ \[model units\]; landxml, obj, off and ply keep them exactly, glb states"
+    said = r"by up to 0\.[12]\d+ \[model units\]; obj, off and ply keep them exactly, glb states"
     with pytest.warns(ModelWarning, match=said):
         write_solutions(tmp_path / "out", far, solutions, mesh_format="stl")
 
@@ -59,9 +59,7 @@ def test_triangles_that_single_precision_turns_over_or_flattens_are_counted(tmp_
     if mesh_format == "ply":
         assert not said
         return
-    way_out = "landxml, obj, off and ply keep them exactly" + (
-        ", glb states a local origin" if mesh_format == "stl" else ""
-    )
+    way_out = "obj, off and ply keep them exactly" + (", glb states a local origin" if mesh_format == "stl" else "")
     told = f"square: {mesh_format} holds single precision, which turns over or flattens 2 triangles; {way_out}"
     assert written == [told]
     assert [str(warning.message) for warning in said] == [told, told]  # as chosen and as one of the meshes: once
@@ -70,7 +68,7 @@ def test_triangles_that_single_precision_turns_over_or_flattens_are_counted(tmp_
 def test_far_from_the_origin_both_are_said(tmp_path, solutions):
     source = load("face:200")
     far = build_model(dataclasses.replace(source, points=source.points + np.array([5e8, 0, 0])))
-    said = r"moves vertices by up to 16 \[model units\] and turns over or flattens [\d,]+ triangles; landxml"
+    said = r"moves vertices by up to 16 \[model units\] and turns over or flattens [\d,]+ triangles; obj"
     with pytest.warns(ModelWarning, match=said):
         write_solutions(tmp_path / "out", far, solutions, mesh_format="stl")
 

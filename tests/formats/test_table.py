@@ -5,7 +5,10 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +18,7 @@ from numpy.testing import assert_array_equal
 from pyramid import COLORS, FACES, POINTS, ascii_ply, binary_ply, refusal, write
 from samples import coloured, write_solutions
 
+from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning, way_to_install
 from meshsimp_pymoo.formats.options import Options
@@ -38,8 +42,6 @@ from meshsimp_pymoo.surface.model import build_model
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
 BOTH_WAYS = [kind.name for kind in all_formats() if kind.read and kind.write]
-# LandXML is for survey programs alone.
-MESH_PROGRAM_FORMATS = [name for name in written_formats() if name != "landxml"]
 
 
 # ------------------------------------------------------------------------------------- what every format keeps to
@@ -60,6 +62,35 @@ def test_what_a_format_writes_it_reads_back(tmp_path, name):
         if "color" in source.attributes:
             assert_array_equal(source.attributes["color"], COLORS)
     assert (tmp_path / f"a{kind.suffix}").read_bytes() == (tmp_path / f"a{kind.suffix.upper()}").read_bytes()
+
+
+def test_the_same_mesh_is_the_same_bytes_at_another_time_and_in_upper_case(tmp_path):
+    facts, lines = {"epsg": 32633, "unit": "metre"}, (np.array([0, 4, 2]), np.array([4, 1]))
+    written = [kind for kind in written_formats().values() if not kind.needs or find_spec(kind.needs)]
+
+    def content(name: str, kind: Format, spell: Callable[[str], str]) -> bytes:
+        path = tmp_path / f"{name}{spell(kind.suffix)}"
+        write_mesh(path, POINTS, FACES, {"color": COLORS}, georeference=facts, lines=lines, line_names=("a", "b"))
+        return path.read_bytes()
+
+    first = [content("a", kind, str.lower) for kind in written]
+    time.sleep(1.1)  # dates in files are in seconds
+    assert [content("b", kind, str.upper) for kind in written] == first
+
+
+def test_what_is_written_by_a_library_of_an_extra_says_by_which():
+    without = {kind.name for kind in written_formats().values() if bool(kind.extra) != bool(kind.needs)}
+    assert without == set()
+
+
+@pytest.mark.parametrize("name", [kind.name for kind in all_formats() if kind.needs])
+def test_a_library_that_is_missing_for_writing_is_named_before_any_search(tmp_path, monkeypatch, capsys, name):
+    kind = written_formats()[name]
+    monkeypatch.setitem(sys.modules, kind.needs, None)
+    assert main(["simplify", "roof:5", "-o", str(tmp_path / "out"), "--format", name, "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert re.search(rf"{kind.title} is written by {kind.needs}; install it by pip install '.*{kind.needs}", said), said
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", BOTH_WAYS)
@@ -119,6 +150,7 @@ import contextlib, io
 from pathlib import Path
 import meshsimp_pymoo.formats
 meshsimp_pymoo.formats.__path__.append("more")
+from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning
@@ -291,7 +323,11 @@ def test_archives_are_not_unpacked(tmp_path, suffix):
         ("contours.shp", "can be break lines of a model: --break-lines FOLDER/contours.shp"),
         ("plan.dxf", "--break-lines FOLDER/plan.dxf"),
         ("tin.xml", "--break-lines FOLDER/tin.xml"),
-        ("tin.xml", "written, not read: export it as .ply or .obj"),
+        ("tin.xml", "LandXML is written, not read: export it as .ply or .obj"),
+        ("tin.dxf", "DXF is written, not read: if it is a mesh, export it as .ply, .obj or .glb"),
+        ("tin.2dm", "2DM is written, not read: if it is a mesh, export it"),
+        ("tin.vtu", "VTU is written, not read: if it is a mesh, export it"),
+        ("tin.gpkg", "GeoPackage is written, not read: it holds features"),
     ],
 )
 def test_what_is_not_read_is_told_the_way_out(tmp_path, name, advice):
@@ -397,7 +433,7 @@ def test_settings_are_for_the_models_that_they_describe_alone(tmp_path):
         assert re.search(said, refusal(tmp_path / "a.ply", **options))
 
 
-@pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)
+@pytest.mark.parametrize("suffix", BOTH_WAYS)
 def test_every_format_opens_in_pymeshlab(tmp_path, model, solutions, suffix):
     pymeshlab = pytest.importorskip("pymeshlab", exc_type=ImportError)
     vertices, faces, attributes = mesh_arrays(model, solutions[1][0].faces)
@@ -409,7 +445,7 @@ def test_every_format_opens_in_pymeshlab(tmp_path, model, solutions, suffix):
         assert np.array_equal(meshes.current_mesh().vertex_matrix(), vertices)
 
 
-@pytest.mark.parametrize("suffix", MESH_PROGRAM_FORMATS)
+@pytest.mark.parametrize("suffix", BOTH_WAYS)
 def test_every_format_opens_in_trimesh_with_the_same_shape(tmp_path, model, solutions, suffix):
     folder = write_solutions(tmp_path / "out", model, solutions, mesh_format=suffix, chosen=0, meshes=1)
     vertices, faces, _ = mesh_arrays(model, solutions[1][0].faces)

@@ -5,27 +5,26 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
-import io
 import json
-import math
 import re
 import shlex
 import time
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import Visit, launched
+from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike, until
 from samples import freed
 from scans import bowl
-from scipy.spatial import Delaunay
 from sketching import sketch
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.errors import PictureWarning, ResultError
-from meshsimp_pymoo.formats.table import read_source, write_mesh
+from meshsimp_pymoo.formats.table import read_lines, read_source, write_mesh
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.report import figures as figures_module
 from meshsimp_pymoo.report import page as page_module
@@ -36,19 +35,9 @@ from meshsimp_pymoo.surface.measures import MEASURES, OF_LINES
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
 ERRORS = ["mean_error", "rms_error", "max_error", "surface_error", "error"]
+# Colours and shading.
+LOOKS = [("plain", "flat"), ("plain", "wireframe"), ("error", "flat"), ("height", "flat")]
 SIDE = 24  # samples along a side of the model
-
-
-def relief(side, rng):
-    """Return a rolling square: points (N, 3) with the height along z, their Delaunay triangles, colours."""
-    y, x = np.mgrid[:side, :side].astype(float)
-    inside = (x % (side - 1) > 0) & (y % (side - 1) > 0)
-    x, y = (part + 0.3 * inside * rng.uniform(-1, 1, x.shape) for part in (x, y))  # one Delaunay triangulation, no ties
-    z = 3 * np.sin(x / 4) * np.cos(y / 5) + rng.normal(scale=0.1, size=x.shape)
-    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    faces = Delaunay(points[:, :2]).simplices
-    colour = np.column_stack([120 + 30 * points[:, 2], 200 - 5 * points[:, 0], 80 + 5 * points[:, 1]])
-    return points, faces, colour.clip(0, 255).astype(np.uint8)
 
 
 def subsets(problem, count, rng):
@@ -102,7 +91,8 @@ def used(opened):
 def seen(opened):
     """The page, as it was when it was opened, for a test that only looks at it."""
     if getattr(opened, "used", False):
-        opened.page.reload()
+        opened.page.goto("about:blank")  # for its address says what it shows
+        opened.page.goto(opened.url)
         opened.page.wait_for_selector("html[data-ready]")
         opened.used = False
     yield opened
@@ -114,42 +104,6 @@ def visit(seen):
     """The page, as it was when it was opened."""
     seen.used = True
     return seen
-
-
-def shown(page):
-    """Return the number of the solution whose mesh is shown, when the numbers beside it are the same one's."""
-    row = number(page, "solution")
-    page.wait_for_selector(f"html[data-shown='{row:.0f}']")
-    return int(row)
-
-
-def number(page, name):
-    return float(page.locator(f"#number-{name}").get_attribute("value"))
-
-
-def pixels(page):
-    """Return what is drawn in the windows of the original and of the simplified mesh, (height, width, 3) each."""
-    from PIL import Image
-
-    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    with Image.open(io.BytesIO(page.locator(".views").screenshot())) as image:
-        drawn = np.asarray(image.convert("RGB")).astype(int)
-    whole, *windows = (
-        page.locator(place).bounding_box() for place in (".views", "#original-window", "#simplified-window")
-    )
-    scale = drawn.shape[1] / whole["width"]
-    parts = []
-    for box in windows:
-        left, top = scale * (box["x"] - whole["x"]), scale * (box["y"] - whole["y"])
-        rows = slice(math.ceil(top), math.floor(top + scale * box["height"]))
-        parts.append(drawn[rows, math.ceil(left) : math.floor(left + scale * box["width"])])
-    return parts
-
-
-def unlike(a, b):
-    """Return the share of pixels that differ visibly."""
-    height, width = (min(s, t) for s, t in zip(a.shape[:2], b.shape[:2], strict=True))
-    return float((np.abs(a[:height, :width] - b[:height, :width]).max(axis=2) > 24).mean())
 
 
 # ----------------------------------------------------------------------------------------------------------- choosing
@@ -283,6 +237,93 @@ def test_knee_and_chosen_solution_are_marked(seen, front):
         assert chart.locator(f"path.special.{mark}").get_attribute("transform") == place
 
 
+def drawn_heights(page):
+    """Return how high each solution stands in the chart, by its number."""
+    dots = page.locator("#chart circle.front-dot").evaluate_all(
+        "all => all.map((at) => [at.dataset.row, at.cy.baseVal.value])"
+    )
+    return {int(row): y for row, y in dots}
+
+
+@pytest.mark.parametrize("measure", ["max_error", "error"])
+def test_the_chart_shows_any_error_and_the_searches_go_by_it(visit, front, measure):
+    page = visit.page
+    assert page.input_value("#axis") == "mean_error"
+    assert page.inner_text("#axis-remarks") == ""
+    page.select_option("#axis", measure)
+    assert page.input_value("#measure") == measure
+    assert MEASURES[measure].label in page.locator("#chart .axes .name").last.text_content()
+    heights = drawn_heights(page)
+    values = {row: getattr(front[row], measure) for row in heights}
+    assert len(heights) == len(front)
+    assert sorted(heights, key=lambda row: (values[row], row)) == sorted(heights, key=lambda row: (-heights[row], row))
+    limit = front[-2].triangles
+    page.fill("#most-triangles", str(limit))
+    page.click("#by-triangles button")
+    assert shown(page) == min((s for s in front if s.triangles <= limit), key=lambda s: getattr(s, measure)).solution
+    assert ("by the max error a larger mesh may be the worse one" in page.inner_text("#axis-remarks")) == (
+        measure == "max_error"
+    )
+    page.select_option("#measure", "rms_error")
+    assert page.input_value("#axis") == "rms_error"
+
+
+def test_what_has_no_such_error_is_left_out_of_the_chart_and_named(browser, front, folder, tmp_path):
+    known = np.where(np.arange(len(front)) == 2, 5.0, np.nan)
+    stored = replace(
+        read_front(folder),
+        refitted_error=known,
+        refitted_meshes=("refitted/2.ply",) * len(front),
+        series={"start": front.F},
+    )
+    page = simplification_page(stored, front.surface, front.kept, measure="error", folder=folder, knee=3)
+    (series,) = data_of(page)["series"]
+    assert series["y"]["error"] == front.F[:, 0].tolist()
+    np.testing.assert_allclose(series["y"]["mean_error"], [s.mean_error for s in front], rtol=1e-12)
+    path = tmp_path / "report.html"
+    path.write_text(page, encoding="utf-8")
+    visit = Visit(browser, path)
+    assert visit.page.locator("#chart .legend").inner_text().endswith("start")
+    visit.page.select_option("#axis", "refitted_error")
+    assert set(drawn_heights(visit.page)) == {2}
+    remarks = visit.page.inner_text("#axis-remarks")
+    assert f"1 of {len(front)} solutions have a refitted error." in remarks
+    assert "Not drawn, as their refitted error is not known: start." in remarks
+    assert "start" not in visit.page.inner_text("#chart .legend")
+    visit.page.locator("#slider").fill("4")  # one that is not drawn
+    assert shown(visit.page) == 4
+    visit.check()
+    visit.close()
+
+
+def test_a_link_opens_the_page_where_it_was_copied(visit, front, browser, folder):
+    page = visit.page
+    entries = page.evaluate("history.length")
+    page.locator("#slider").fill("7")
+    page.locator("#slider").fill("5")
+    assert shown(page) == 5
+    until(page, "location.hash === '#solution=5'")
+    page.select_option("#axis", "max_error")
+    until(page, "location.hash === '#solution=5&axis=max_error'")
+    assert page.evaluate("history.length") == entries  # the way back is the way out
+    page.click("#copy-link")
+    until(page, "document.getElementById('link-copied').textContent !== ''")
+    other = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+    other.page.goto("about:blank")
+    other.page.goto(page.url)
+    other.page.wait_for_selector("html[data-ready]")
+    until(other.page, "state.opened")
+    assert shown(other.page) == 5
+    assert other.page.input_value("#axis") == "max_error"
+    other.page.evaluate("location.hash = '#solution=2'")
+    other.page.wait_for_selector("html[data-shown='2']")
+    other.page.evaluate("location.hash = '#solution=99&axis=nothing'")
+    until(other.page, "document.getElementById('answer').className === 'missed'")
+    assert other.page.inner_text("#answer") == f"The link names solution 99; there are 0 to {len(front) - 1}."
+    assert shown(other.page) == 2
+    other.close()
+
+
 # ------------------------------------------------------------------------------------------------------------ looking
 
 
@@ -325,28 +366,30 @@ def test_another_solution_changes_the_right_window_alone(visit):
 def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
     page = visit.page
     looks = {}
-    for look in ("shaded", "wireframe", "error"):
-        page.check(f"input[value={look}]", force=True)
+    for look in LOOKS:
+        dress(page, *look)
         looks[look] = pixels(page)
-        assert page.locator("#error-key").is_visible() == (look == "error")
+        assert page.locator("#colour-key").is_visible() == (look[0] != "plain")
     for window in (0, 1):
-        assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
-        assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
+        for a, b in combinations(LOOKS, 2):
+            assert unlike(looks[a][window], looks[b][window]) > 0.05, (a, b)
+    dress(page, "error", "flat")
+    page.check("#same-scale")
     # seen from above, both windows show the same map of the error, on the original and on the simplified surface
     page.click("#from-above")
     assert unlike(*pixels(page)) < 0.25
-    end = page.inner_text("#scale-end")
+    end = scale_of_errors(page)
     page.locator("#slider").fill("5")
     assert shown(page) == 5
-    assert page.inner_text("#scale-end") == end
+    assert scale_of_errors(page) == end
     largest = np.quantile(front.knee().simplified.deviation, page_module.SCALE_QUANTILE)
-    assert float(end.removeprefix("≥ ")) == pytest.approx(largest, rel=1e-3)
-    page.select_option("#scale", "one")
+    assert end == pytest.approx(largest, rel=5e-3)
+    page.uncheck("#same-scale")
     fitted = np.quantile(front[5].simplified.deviation, page_module.SCALE_QUANTILE)
-    assert float(page.inner_text("#scale-end").removeprefix("≥ ")) == pytest.approx(fitted, rel=0.02)
+    assert scale_of_errors(page) == pytest.approx(fitted, rel=0.02)
     # where nothing deviates, all is in the palest colour
     page.locator("#slider").fill(str(len(front) - 1))
-    page.select_option("#scale", "all")
+    page.check("#same-scale")
     assert shown(page) == len(front) - 1
     _, drawn = pixels(page)
     middle = drawn[drawn.shape[0] // 2 - 10 :, drawn.shape[1] // 2 - 10 :][:20, :20].reshape(-1, 3)
@@ -380,6 +423,55 @@ def parsed(path):
         return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=np.int64) - 1
     corners = np.array([words[1:] for words in lines if words[0] == "vertex"], dtype=float)
     return corners, np.arange(len(corners)).reshape(-1, 3)
+
+
+def taken(page, suffix, folder):
+    """Return the path of the file that a button downloads."""
+    with page.expect_download() as download:
+        page.click(f"#downloads button[value={suffix}]")
+    path = folder / f"page.{suffix}"
+    download.value.save_as(path)
+    return path
+
+
+def chunks(path):
+    """Return the tree of a GLB and the parts of its buffer, by accessor."""
+    content = path.read_bytes()
+    size = int.from_bytes(content[12:16], "little")
+    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
+    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
+    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]
+
+
+def words(path):
+    """Return the words of a text, numbers as such, however they are spelled, in an order of their own."""
+    found = []
+    for word in re.split(r"[\s<>\"=]+", path.read_text(encoding="utf-8")):
+        try:
+            found.append(float(word))
+        except ValueError:
+            found.append(word)
+    return sorted(found, key=str)
+
+
+def sorted_faces(faces):
+    """Return triangles, each from its smallest vertex on, sorted."""
+    rows = [tuple(np.roll(row, -int(np.argmin(row))).tolist()) for row in np.asarray(faces)]
+    return sorted(rows)
+
+
+def test_a_downloaded_glb_is_the_file_that_the_package_writes(visit, front, tmp_path):
+    front[2].save(tmp_path / "package.glb")
+    (ours, parts), (theirs, own) = chunks(taken(visit.page, "glb", tmp_path)), chunks(tmp_path / "package.glb")
+    assert ours == theirs
+    assert parts[:-1] == own[:-1]
+    faces = [sorted_faces(np.frombuffer(part[-1], "<u4").reshape(-1, 3)) for part in (parts, own)]
+    assert faces[0] == faces[1]
+    source = read_source(tmp_path / "page.glb")
+    used = np.unique(front[2].faces)
+    away = np.abs(source.points - front.model.file_points[used]).max()
+    assert 0 < away < 1e-5  # half a step of single precision from the local origin, at 23 units
+    assert source.attributes["color"].tolist() == front.model.attributes["color"][used].tolist()
 
 
 @pytest.mark.parametrize("suffix", ["ply", "obj", "stl"])
@@ -436,14 +528,15 @@ def test_everything_can_be_reached_with_the_keyboard_and_shows_its_focus(used):
         used.page.keyboard.press("Tab")
         name, outlined, nothing = used.page.evaluate(
             """() => { const at = document.activeElement;
-            const seen = at.name === "look" ? at.nextElementSibling : at;
+            const seen = at.closest(".switch") ? at.nextElementSibling : at;
             return [at.id || at.value || at.textContent, getComputedStyle(seen).outlineStyle !== "none",
             at === document.body]; }"""
         )
         if not nothing:
             reached[name] = outlined
     assert {
-        "log-x", "log-y", "chart", "slider", "shaded", "canvas", "from-above", "from-side", "reset", "heights",
+        "log-x", "log-y", "chart", "slider", "canvas", "from-above", "from-side", "reset", "heights",
+        "own", "flat", "hillshade", "picture", "full-screen", "beside", "pin",
         "most-triangles", "most-error", "measure", "ply", "obj", "stl", "command", "copy",
     } <= set(reached)  # fmt: skip
     assert all(reached.values()), reached
@@ -524,16 +617,54 @@ def test_the_policy_stops_a_script_that_got_in_and_any_call(browser, folder, tmp
         visit.close()
 
 
-def test_without_3d_the_rest_of_the_page_works(engine, folder, front, tmp_path):
-    with launched(engine, "--disable-3d-apis") as blind:
-        visit = Visit(blind, folder / "report.html")
-        assert "no WebGL" in visit.page.inner_text("#no-3d")
-        visit.page.locator("#slider").fill("6")
-        assert shown(visit.page) == 6
-        with visit.page.expect_download() as download:
-            visit.page.click("#downloads button[value=obj]")
-        download.value.save_as(tmp_path / "small.obj")
-        assert len(parsed(tmp_path / "small.obj")[1]) == front[6].triangles
+@pytest.fixture(scope="module")
+def blind(engine, folder):
+    """The page in a browser without WebGL."""
+    with launched(engine, "--disable-3d-apis") as browser:
+        yield Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+
+
+def test_without_webgl_the_page_says_so_and_all_of_it_works(blind, front, tmp_path):
+    page = blind.page
+    assert "no WebGL" in page.inner_text("#no-3d")
+    page.locator("#slider").fill("6")
+    assert shown(page) == 6
+    page.locator("#slider").fill("14")
+    assert shown(page) == 14
+    before = pixels(page)
+    assert unlike(*before) < 0.05  # nearly all vertices are kept
+    page.locator("#canvas").press("ArrowLeft")
+    assert unlike(pixels(page)[1], before[1]) > 0.02
+    with page.expect_download() as download:
+        page.click("#downloads button[value=obj]")
+    download.value.save_as(tmp_path / "small.obj")
+    assert len(parsed(tmp_path / "small.obj")[1]) == front[14].triangles
+    with page.expect_download() as download:
+        page.click("#picture")
+    assert download.value.suggested_filename.endswith(".png")
+    page.click("#reset")
+    blind.check()
+
+
+@pytest.mark.parametrize(
+    "look", ["", "colours=error&shading=smooth", "colours=height&shading=wireframe", "arrangement=wipe"]
+)
+def test_what_the_page_draws_itself_is_what_webgl_draws(opened, blind, look):
+    pictures = []
+    for visit in (opened, blind):
+        visit.used = True
+        visit.page.goto("about:blank")
+        visit.page.goto(f"{visit.url}#solution=5&{look}")
+        visit.page.wait_for_selector("html[data-shown='5']")
+        until(visit.page, "state.opened && state.viewer !== null")
+        pictures.append(pixels(visit.page))
+        visit.check()
+    for light, own in zip(*pictures, strict=True):
+        height, width = (min(s, t) for s, t in zip(light.shape[:2], own.shape[:2], strict=True))
+        assert len(np.unique(own.reshape(-1, 3), axis=0)) > 50
+        # lines one point wide are softer in the one, and may lie a point beside in the other
+        away = np.abs(light[:height, :width] - own[:height, :width]).mean()
+        assert away < (14 if "wireframe" in look else 3.5), away
 
 
 # --------------------------------------------------------------------------------------------------- size and content
@@ -794,6 +925,14 @@ def lined(tmp_path_factory):
     return front, front.save(place / "out", chosen=2)
 
 
+@pytest.fixture(scope="module")
+def lined_page(browser, lined):
+    visit = Visit(browser, lined[1] / "report.html", viewport={"width": 1280, "height": 1000})
+    yield visit.page
+    visit.check()
+    visit.close()
+
+
 def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     front, folder = lined
     visit = Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
@@ -805,8 +944,8 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     for name in MEASURES:
         assert number(page, name) == getattr(front[2], name)
     assert "line max error" in page.locator("#measure option").all_inner_texts()
-    for look in ("shaded", "wireframe", "error"):
-        page.check(f"input[value={look}]", force=True)
+    for look in LOOKS[:3]:
+        dress(page, *look)
         with_lines = pixels(page)
         page.uncheck("#lines")
         without = pixels(page)
@@ -820,6 +959,28 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     assert len(edges) == 2 * (len(front[0].lines[0]) - 1)
     visit.check()
     visit.close()
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj", "xml", "glb", "stl"])
+def test_break_lines_are_in_the_files_as_the_package_writes_them(lined_page, lined, tmp_path, suffix):
+    front, _ = lined
+    front[2].save(tmp_path / f"package.{suffix}")
+    path = taken(lined_page, suffix, tmp_path)
+    if suffix in ("glb", "stl"):
+        assert len(read_source(path).faces) == front[2].triangles
+        return
+    ours, theirs = (read_lines(tmp_path / f"{name}.{suffix}") for name in ("page", "package"))
+    assert [line.tolist() for line in ours.lines] == [line.tolist() for line in theirs.lines]
+    assert ours.names == theirs.names
+    if suffix == "ply":  # but for the order of the triangles, whose rows are 13 bytes each
+        head, body = zip(
+            *(file.read_bytes().split(b"end_header\n") for file in (path, tmp_path / "package.ply")), strict=True
+        )
+        n, m = front[2].vertices, front[2].triangles
+        assert head[0] == head[1]
+        assert body[0][: 24 * n] + body[0][24 * n + 13 * m :] == body[1][: 24 * n] + body[1][24 * n + 13 * m :]
+        return
+    assert words(path) == words(tmp_path / f"package.{suffix}")
 
 
 def test_a_page_without_break_lines_says_nothing_of_any(seen):
@@ -855,19 +1016,10 @@ def closed_opened(browser, closed_folder):
 @pytest.fixture
 def closed(closed_opened):
     """The page of a closed model, seen from where it opens."""
-    closed_opened.page.check("input[value=shaded]", force=True)
+    dress(closed_opened.page, "plain", "flat")
     closed_opened.page.click("#reset")
     yield closed_opened
     closed_opened.check()
-
-
-def camera(page):
-    """Return where the camera is and what is up, relative to what it looks at, and its magnification."""
-    found = page.evaluate(
-        """() => { const { camera, target } = state.viewer;
-        return [camera.position.clone().sub(target).toArray(), camera.up.toArray(), camera.zoom, target.toArray()]; }"""
-    )
-    return tuple(map(np.array, found))
 
 
 def test_the_page_of_a_closed_model_says_nothing_of_heights(closed):
@@ -975,25 +1127,27 @@ def test_the_error_on_a_simplified_body_is_that_of_the_nearest_original_vertex(c
     page.locator("#slider").fill("4")
     assert shown(page) == 4
     looks = {}
-    for look in ("shaded", "wireframe", "error"):
-        page.check(f"input[value={look}]", force=True)
-        looks[look] = pixels(page)
+    for look in LOOKS:
+        if "height" not in look:
+            dress(page, *look)
+            looks[look] = pixels(page)
     for window in (0, 1):
-        assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
-        assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
+        for a, b in combinations(looks, 2):
+            assert unlike(looks[a][window], looks[b][window]) > 0.05, (a, b)
+    dress(page, "error", "flat")
+    before = pixels(page)
     # another scale and another mesh show at once
     page.locator("#slider").fill("2")
     assert shown(page) == 2
     same = pixels(page)[1]
-    assert unlike(same, looks["error"][1]) > 0.05
-    page.select_option("#scale", "one")
+    assert unlike(same, before[1]) > 0.05
+    page.check("#same-scale")
     assert unlike(pixels(page)[1], same) > 0.02
-    page.select_option("#scale", "all")
     places, sources, faces, points = (
         np.array(page.evaluate(f"Array.from({what})"))
         for what in (
-            "state.viewer.fine.getAttribute('position').array", "state.viewer.sources",
-            "state.viewer.fine.index.array", "state.viewer.arrays.position",
+            "state.viewer.simplified.fine.geometry.attributes.position.array", "state.viewer.simplified.fine.sources",
+            "state.viewer.simplified.fine.geometry.index.array", "state.viewer.arrays.position",
         )
     )  # fmt: skip
     places, points, faces = places.reshape(-1, 3), points.reshape(-1, 3), faces.reshape(-1, 3)
@@ -1035,7 +1189,18 @@ def test_all_of_the_page_of_a_closed_model_is_reached_with_the_keyboard(closed):
     for _ in range(40):
         closed.page.keyboard.press("Tab")
         reached.add(closed.page.evaluate("document.activeElement.id || document.activeElement.value"))
-    assert {"chart", "slider", "shaded", "canvas", "quarter-turn", "other-side", "reset", "measure", "ply"} <= reached
+    assert {
+        "chart",
+        "slider",
+        "plain",
+        "flat",
+        "canvas",
+        "quarter-turn",
+        "other-side",
+        "reset",
+        "measure",
+        "ply",
+    } <= reached
 
 
 def test_two_fingers_magnify_and_roll_a_closed_model(browser, closed_folder):
@@ -1091,7 +1256,7 @@ def test_the_page_of_what_has_holes_shows_its_inside_its_rims_and_what_is_uncove
                 red, _, blue = window[window.shape[0] // 2, window.shape[1] // 2]
                 assert (blue > red + 5) == is_inside
                 assert (red > blue + 5) != is_inside
-        page.check("input[value=error]", force=True)
+        dress(page, "error")
         assert page.locator("#uncovered-key").is_visible() == any(solution.uncovered for solution in Front.load(front))
         visit.check()
     finally:

@@ -1,4 +1,4 @@
-"""Lines of the files that GDAL reads as features, by pyogrio (the extra ``lines``).
+"""Lines and triangles of the files that GDAL reads and writes as features, by pyogrio (the extra ``lines``).
 
 GDAL can open a great many things under one name, other files and addresses among them: whoever asks for one has seen
 that the file begins as its suffix says.
@@ -6,20 +6,23 @@ that the file begins as its suffix says.
 
 from __future__ import annotations
 
+import shutil
+import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.arrays import AnyArray, FloatArray
 from meshsimp_pymoo.errors import ModelError, printable, reason_of, warn_of
 from meshsimp_pymoo.formats.source.lines import SourceLines, build_lines, part_names, spelled_name
 from meshsimp_pymoo.formats.source.metric import stated_system
 from meshsimp_pymoo.formats.source.numbers import glimpse
+from meshsimp_pymoo.formats.source.triangles import TRIANGLE
 from meshsimp_pymoo.memory import check_free
 
 # What a byte of a file takes at most: as the library's objects, as bytes of geometry, as coordinates.
@@ -30,6 +33,9 @@ NAMES = ("name", "id")
 # Of well-known binary: the kinds of geometries, and what three dimensions add to their numbers, by two spellings.
 POINT, LINE, POLYGON, COLLECTIONS = 1, 2, 3, (4, 5, 6, 7)
 THOUSANDS, HIGHEST_BIT = 1000, 1 << 31
+
+# The date that GDAL is told, where a file must say one, so that equal meshes are equal files.
+DATE_OPTION, DATE = "OGR_CURRENT_DATE", "1980-01-01T00:00:00Z"
 
 
 def read_features(path: Path, name: str, magic: bytes, beside: str) -> SourceLines:
@@ -56,7 +62,7 @@ def read_features(path: Path, name: str, magic: bytes, beside: str) -> SourceLin
     ModelWarning
         If lines of several layers were taken, and as :func:`~meshsimp_pymoo.formats.source.lines.build_lines`.
     """
-    from pyogrio import list_layers
+    from pyogrio import list_layers, read_info
 
     with path.open("rb") as stream:
         begins = stream.read(max(len(magic), 24))
@@ -75,6 +81,10 @@ def read_features(path: Path, name: str, magic: bytes, beside: str) -> SourceLin
         try:
             layers = [str(layer) for layer, kind in list_layers(path) if kind is not None]
             for layer in layers:
+                facts = read_info(path, layer=layer)
+                if TRIANGLE in facts["fields"]:  # a surface as this package writes it
+                    others["triangles"] += facts["features"]
+                    continue
                 before = len(lines)
                 system, features = _features(path, layer)
                 for called, geometry in features:
@@ -158,3 +168,81 @@ def _parts(geometry: bytes, others: Counter[str]) -> Iterator[FloatArray]:
         else:  # surfaces, whose parts are polygons or triangles of surfaces
             others["surfaces"] += 1
             return
+
+
+# ------------------------------------------------------------------------------------------------------------ writing
+
+
+class Layer(NamedTuple):
+    """Features to be written: their sort, as GDAL calls it, their geometries in well-known binary, their properties."""
+
+    name: str
+    sort: str
+    geometries: list[bytes]
+    columns: dict[str, AnyArray]
+
+
+def polygons(corners: FloatArray) -> list[bytes]:
+    """Return triangles (M, 3, 3) as polygons with heights in well-known binary."""
+    form = [("order", "u1"), ("sort", "<u4"), ("rings", "<u4"), ("count", "<u4"), ("ring", "<f8", (4, 3))]
+    rows = np.empty(len(corners), np.dtype(form))
+    rows["order"], rows["sort"], rows["rings"], rows["count"] = 1, THOUSANDS + POLYGON, 1, 4
+    rows["ring"] = corners[:, [0, 1, 2, 0]]
+    return [row.tobytes() for row in rows]
+
+
+def line_strings(lines: Sequence[FloatArray]) -> list[bytes]:
+    """Return polylines (n, 3) in well-known binary."""
+    head = Struct("<BII")
+    return [head.pack(1, THOUSANDS + LINE, len(line)) + line.astype("<f8").tobytes() for line in lines]
+
+
+def write_layers(
+    path: Path, driver: str, layers: Sequence[Layer], georeference: Mapping[str, Any], **options: str
+) -> None:
+    """Write layers of features by a driver of GDAL with its options, the same bytes for the same features.
+
+    Warns
+    -----
+    ModelWarning
+        If GDAL does not know their reference system: none is written then.
+    """
+    import pyogrio
+    from pyogrio.errors import CRSError
+
+    number = georeference.get("epsg")
+    system = f"EPSG:{number}" if number else str(georeference.get("crs") or "")
+    before = pyogrio.get_gdal_config_option(DATE_OPTION)
+    pyogrio.set_gdal_config_options({DATE_OPTION: DATE})
+    try:
+        with tempfile.TemporaryDirectory() as folder:  # a file that is there and empty is no good one to GDAL
+            made = Path(folder, f"made{path.suffix}")
+            try:
+                _put_layers(made, driver, layers, system, options)
+            except CRSError as problem:
+                warn_of(f"{path.name}: holds no reference system, as GDAL does not know it ({reason_of(problem)})")
+                made.unlink(missing_ok=True)
+                _put_layers(made, driver, layers, "", options)
+            shutil.copyfile(made, path)
+    finally:
+        pyogrio.set_gdal_config_options({DATE_OPTION: before})
+
+
+def _put_layers(path: Path, driver: str, layers: Sequence[Layer], system: str, options: Mapping[str, str]) -> None:
+    from pyogrio.raw import write
+
+    with warnings.catch_warnings():
+        if not system:
+            warnings.simplefilter("ignore")  # that there is no reference system
+        for place, layer in enumerate(layers):
+            write(
+                path,
+                np.array(layer.geometries, object),
+                list(layer.columns.values()),
+                list(layer.columns),
+                layer=layer.name,
+                driver=driver,
+                geometry_type=layer.sort,
+                crs=system or None,
+                dataset_options=None if place else dict(options),
+            )

@@ -28,8 +28,6 @@ logging.getLogger("trimesh").addHandler(logging.NullHandler())
 
 # How the pixels of a PNG may be stored, as Pillow calls it.
 PNG_MODES = ("1", "L", "LA", "P", "RGB", "RGBA")
-# Significant digits that carry any double.
-EXACT_DIGITS = 17
 
 
 def from_trimesh(mesh: trimesh.Trimesh, name: str = "mesh") -> SourceMesh:
@@ -214,10 +212,10 @@ def _concatenated(
     return np.concatenate([piece[0] for piece in pieces]), faces, attributes
 
 
-def export(path: Path, mesh: OutMesh, **options: Any) -> None:
+def export(path: Path, mesh: OutMesh) -> None:
     """Write a mesh and its colours as trimesh does, in the format of the path's suffix."""
     import trimesh
 
     exported = trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.attributes.get("color"), process=False)
-    written = exported.export(file_type=path.suffix.lower().lstrip("."), **options)
+    written = exported.export(file_type=path.suffix.lower().lstrip("."))
     path.write_bytes(written.encode("utf-8") if isinstance(written, str) else bytes(written))

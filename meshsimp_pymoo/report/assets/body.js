@@ -1,11 +1,9 @@
 // Closed meshes side by side: like MeshPair, but turned freely, since a body has neither an above nor heights.
 
-const FILLED = 0.92; // of the window, by the body as it is first seen
 const LEAST_ZOOM = 0.25;
 const MOST_ZOOM = 60;
 const MOST_SAMPLES = 300_000; // of the error on a simplified mesh
 const MOST_PARTS = 48; // of one edge of it
-const [FRONT_SIDE, BACK_SIDE] = [0, 1]; // as three.js numbers them; the build of it here has no names of them
 
 // Which of some points in space is nearest to another one: a tree of halves.
 class NearestPoint {
@@ -96,6 +94,10 @@ class BodyPair extends MeshPair {
     );
   }
 
+  get middle() {
+    return this.target;
+  }
+
   // Two fingers: one stays, the other one has moved; what is between them grows and turns with them.
   pinch(still, before, now) {
     const [a, b] = [before, now].map((at) => ({ x: at.x - still.x, y: at.y - still.y }));
@@ -108,6 +110,7 @@ class BodyPair extends MeshPair {
   // Pixels to the right and down.
   move(dx, dy) {
     const { camera, target } = this;
+    this.moved = true;
     const arm = camera.position.clone().sub(target);
     const pixel = (2 * arm.length() * Math.tan((camera.fov * Math.PI) / 360)) / (this.window(0)[3] * camera.zoom);
     const right = camera.up.clone().cross(arm).normalize();
@@ -115,19 +118,19 @@ class BodyPair extends MeshPair {
     this.stand(arm);
   }
 
-  // The camera at the end of an arm from what it looks at, with all of the body between the limits of its sight.
+  // The camera at the end of an arm from what it looks at.
   stand(arm) {
     const { camera, target } = this;
     camera.position.copy(target).add(arm);
     camera.lookAt(target);
-    camera.near = Math.max(0.01, camera.position.length() - 1.01 * this.radius);
-    camera.far = camera.position.length() + 1.01 * this.radius;
     this.request();
   }
 
   // Look from the direction (azimuth about the upright from the front, elevation), upright, at all of it.
   look(azimuth, elevation) {
     const { camera, target } = this;
+    this.view = [azimuth, elevation];
+    this.moved = false;
     const [sine, cosine] = [Math.sin(elevation), Math.cos(elevation)];
     const [east, south] = [Math.sin(azimuth), Math.cos(azimuth)];
     const arm = new THREE.Vector3(cosine * east, sine, cosine * south);
@@ -138,7 +141,7 @@ class BodyPair extends MeshPair {
     const wide = (tall * Math.max(1, width)) / Math.max(1, height);
     const point = new THREE.Vector3();
     let distance = 0;
-    for (const row of this.original.wire.geometry.index.array) {
+    for (const row of this.original.faces) {
       point.fromArray(this.arrays.position, 3 * row);
       const out = Math.max(Math.abs(point.dot(camera.up)) / tall, Math.abs(point.dot(right)) / wide);
       distance = Math.max(distance, point.dot(arm) + out);
@@ -151,6 +154,7 @@ class BodyPair extends MeshPair {
   // The camera goes round the body to the right and downwards, however far.
   turn(right, down, zoom) {
     const { camera } = this;
+    this.moved = true;
     const arm = camera.position.clone().sub(this.target);
     arm.applyAxisAngle(camera.up, right);
     const across = camera.up.clone().cross(arm).normalize();
@@ -165,22 +169,27 @@ class BodyPair extends MeshPair {
   }
 
   // Of a body with holes each side is drawn for itself, the inside in another tone, and the rims.
-  scene(faces, ends) {
-    const part = super.scene(faces, ends);
+  part(faces, ends) {
+    const part = super.part(faces, ends);
     if (!this.open) return part;
-    if (!this.materials.inside) {
-      const sides = [FRONT_SIDE, BACK_SIDE];
-      if (this.open.winding < 0) sides.reverse();
-      this.materials.shaded.side = sides[0];
-      const { polygonOffset, polygonOffsetFactor, polygonOffsetUnits } = this.materials.shaded;
-      const lifted = { polygonOffset, polygonOffsetFactor, polygonOffsetUnits };
-      this.materials.inside = new THREE.MeshLambertMaterial({ color: this.open.inside, flatShading: true, side: sides[1], ...lifted });
-    }
-    part.inside = new THREE.Mesh(part.mesh.geometry, this.materials.inside);
+    part.inside = new THREE.Mesh(part.indexed, this.materials.paper);
     part.inside.frustumCulled = false;
     part.scene.add(part.inside);
     part.rims = this.linesOf(this.rimsOf(faces), this.materials.rim);
     return part;
+  }
+
+  lit(look) {
+    if (!this.open) return super.lit(look);
+    return super.lit({ side: this.open.winding < 0 ? THREE.BackSide : THREE.FrontSide, ...look });
+  }
+
+  material(colours) {
+    if (colours !== "inside") return super.material(colours);
+    const name = `inside ${this.isSmooth ? "smooth" : "flat"}`;
+    const side = this.open.winding < 0 ? THREE.FrontSide : THREE.BackSide;
+    this.materials[name] ??= this.lit({ color: this.open.inside, flatShading: !this.isSmooth, side });
+    return this.materials[name];
   }
 
   // The ends of the edges that one triangle only has.
@@ -197,34 +206,39 @@ class BodyPair extends MeshPair {
     return Float32Array.from([...alone.values()].flat().flatMap((row) => [...this.arrays.position.subarray(3 * row, 3 * row + 3)]));
   }
 
-  show(faces, edges) {
-    this.fine?.dispose();
-    this.fine = null;
-    super.show(faces, edges);
+  dispose(part) {
+    super.dispose(part);
+    part.fine?.geometry.dispose();
   }
 
-  setErrors(colours) {
-    this.errorColour.array.set(colours);
-    this.errorColour.needsUpdate = true;
-    if (this.fine) this.paintFine();
-    this.request();
+  dress(part) {
+    super.dress(part);
+    if (!part.inside) return;
+    part.inside.visible = this.shading !== "wireframe" || this.isRead;
+    part.inside.geometry = part.mesh.geometry;
+    part.inside.material = this.material("inside");
   }
 
   // On the simplified mesh the error is that of the original vertex that is nearest.
-  dress(part, which) {
-    super.dress(part, which);
-    if (part.inside) part.inside.visible = this.mode !== "wireframe";
-    if (which === 0) return;
-    const isError = this.mode === "error";
-    if (isError && !this.fine) this.makeFine(part.wire.geometry.index.array);
-    part.mesh.geometry = isError ? this.fine : part.wire.geometry;
-    if (isError) part.mesh.material = this.materials.shaded;
+  dressInErrors(part) {
+    part.fine ??= this.fineOf(part.faces);
+    if (part.isMapOld) {
+      part.isMapOld = false;
+      const colour = part.fine.geometry.getAttribute("color");
+      part.fine.sources.forEach((row, at) => {
+        for (let k = 0; k < 3; k++) colour.array[3 * at + k] = part.errors.array[3 * row + k];
+      });
+      colour.needsUpdate = true;
+    }
+    part.mesh.geometry = part.fine.geometry;
+    part.mesh.material = this.material("error");
   }
 
   // Its triangles in parts as small as the original ones, and the original vertex that is nearest to each corner.
-  makeFine(faces) {
+  fineOf(faces) {
     const local = this.arrays.position;
-    const original = this.original.wire.geometry.index.array;
+    const original = this.original.faces;
+    const normals = cornerNormals(local, faces, this.creased);
     const edge = (i, j) => Math.hypot(...[0, 1, 2].map((k) => local[3 * i + k] - local[3 * j + k]));
     if (!this.nearest) {
       let sum = 0;
@@ -246,7 +260,8 @@ class BodyPair extends MeshPair {
     }
     const places = new Float32Array(3 * count);
     const index = new Uint32Array(3 * parts.reduce((sum, n) => sum + n * n, 0));
-    this.sources = new Uint32Array(count);
+    const directions = new Float32Array(3 * count);
+    const sources = new Uint32Array(count);
     let at = 0;
     let next = 0;
     for (let t = 0; t < parts.length; t++) {
@@ -258,9 +273,11 @@ class BodyPair extends MeshPair {
           for (let k = 0; k < 3; k++) {
             const [a, b, c] = [0, 1, 2].map((m) => local[3 * corners[m] + k]);
             places[3 * at + k] = a + ((b - a) * i + (c - a) * j) / n;
+            const [u, v, w] = [0, 1, 2].map((m) => normals[9 * t + 3 * m + k]);
+            directions[3 * at + k] = u + ((v - u) * i + (w - u) * j) / n;
           }
           near = this.nearest.find(places.subarray(3 * at, 3 * at + 3), near);
-          this.sources[at] = near;
+          sources[at] = near;
           if (i + j === n) continue;
           const above = at + n - i + 1; // the same j in the next row
           index.set([at, above, at + 1], next);
@@ -271,18 +288,11 @@ class BodyPair extends MeshPair {
         }
       }
     }
-    this.fine = new THREE.BufferGeometry();
-    this.fine.setAttribute("position", new THREE.BufferAttribute(places, 3));
-    this.fine.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * count), 3));
-    this.fine.setIndex(new THREE.BufferAttribute(index, 1));
-    this.paintFine();
-  }
-
-  paintFine() {
-    const colour = this.fine.getAttribute("color");
-    this.sources.forEach((row, at) => {
-      for (let k = 0; k < 3; k++) colour.array[3 * at + k] = this.errorColour.array[3 * row + k];
-    });
-    colour.needsUpdate = true;
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
+    geometry.setAttribute("normal", new THREE.BufferAttribute(directions, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(3 * count), 3));
+    geometry.setIndex(new THREE.BufferAttribute(index, 1));
+    return { geometry, sources };
   }
 }

@@ -47,18 +47,21 @@ function svgPart(parent, name, attributes = {}, text = null) {
 }
 
 class FrontChart {
-  // host: where it goes. front: {x, y, hollow} arrays to pick from, or null. series: [{name, x, y, colour, mark, line, half}],
-  // line being "thick" or "thin", half another {x, y} drawn as a thin line.
+  // host: where it goes. front: {x, y, hollow} arrays to pick from, or null; y is null where it is not known.
+  // series: [{name, x, y, colour, mark, line, half}], line being "thick" or "thin", half another {x, y} drawn as a thin line.
   // special: [{row, mark, name}] of the front. log: {x, y}.
   constructor(host, { front = null, series = [], special = [], labels, log, describe = null, onPick = null, name }) {
     Object.assign(this, { host, front, series, special, labels, log, describe, onPick, name });
     this.hidden = new Set();
     this.picked = null;
     this.svg = svgPart(host, "svg", { role: "img", "aria-label": name });
+    this.list = document.createElement("ul");
+    this.list.className = "legend";
     this.tip = document.createElement("div");
     this.tip.className = "tip";
     this.tip.hidden = true;
     host.append(this.tip);
+    host.append(this.list);
     this.legend();
     if (front) {
       this.svg.addEventListener("click", (event) => {
@@ -82,18 +85,29 @@ class FrontChart {
     this.draw();
   }
 
+  // Another quantity upwards: the front's y and whether it falls in steps, the series that have it, the name of the axis.
+  show({ y, steps, series, label, log }) {
+    Object.assign(this.front, { y, steps });
+    this.series = series;
+    this.labels.y = label;
+    this.log.y = log;
+    this.tip.hidden = true;
+    this.legend();
+    this.draw();
+  }
+
   legend() {
-    const list = document.createElement("ul");
-    list.className = "legend";
+    const list = this.list;
+    list.replaceChildren();
     const entry = (look, name, toggled) => {
       const item = document.createElement("li");
       const label = document.createElement(toggled ? "label" : "span");
       if (toggled) {
         const box = document.createElement("input");
         box.type = "checkbox";
-        box.checked = true;
+        box.checked = !this.hidden.has(toggled.name);
         box.addEventListener("change", () => {
-          this.hidden[box.checked ? "delete" : "add"](toggled);
+          this.hidden[box.checked ? "delete" : "add"](toggled.name);
           this.draw();
         });
         label.append(box);
@@ -114,7 +128,7 @@ class FrontChart {
       const line = { ...this.look(one, "M-8,0H8"), class: `series ${one.line}` };
       entry(one.line === "thick" || !one.mark ? line : this.look(one, mark(one.mark, 4)), one.name, one);
     }
-    if (list.childElementCount > 1) this.host.append(list);
+    list.hidden = list.childElementCount < 2;
   }
 
   look(series, d) {
@@ -151,7 +165,7 @@ class FrontChart {
   }
 
   draw() {
-    const visible = this.series.filter((one) => !this.hidden.has(one));
+    const visible = this.series.filter((one) => !this.hidden.has(one.name));
     this.width = Math.max(260, this.host.clientWidth);
     this.height = Math.round(Math.max(260, Math.min(450, 0.8 * this.width)));
     const box = { right: this.width - 12, top: 28, bottom: this.height - 42 };
@@ -159,7 +173,9 @@ class FrontChart {
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
     svg.setAttribute("height", this.height);
-    const parts = [...(this.front ? [this.front] : []), ...visible, ...visible.flatMap((one) => one.half || [])];
+    const known = this.front && [...this.front.y.keys()].filter((row) => this.front.y[row] !== null);
+    const front = this.front && { x: known.map((row) => this.front.x[row]), y: known.map((row) => this.front.y[row]) };
+    const parts = [...(front ? [front] : []), ...visible, ...visible.flatMap((one) => one.half || [])];
     if (!parts.length) return;
     const y = this.scale("y", parts.flatMap((part) => Array.from(part.y)), box.bottom, box.top);
     box.left = Math.max(58, 14 + LETTER * Math.max(...y.ticks.map(([, text]) => text.length)));
@@ -193,21 +209,30 @@ class FrontChart {
       const marks = Array.from(one.x, (value, k) => `M${x.at(value).toFixed(1)},${y.at(one.y[k]).toFixed(1)}${shape}`);
       svgPart(svg, "path", this.look(one, marks.join("")));
     }
-    if (!this.front) return;
-    svgPart(svg, "path", { d: steps(this.front), class: "front-line" });
-    this.places = Array.from(this.front.x, (value, k) => [x.at(value), y.at(this.front.y[k])]);
+    if (!front) return;
+    this.places = Array.from(this.front.x, (value, row) => (this.front.y[row] === null ? null : [x.at(value), y.at(this.front.y[row])]));
+    const seen = known.map((row) => this.places[row]);
+    const direct = seen.map(([px, py], k) => `${k ? "L" : "M"}${px.toFixed(1)},${py.toFixed(1)}`).join("");
+    svgPart(svg, "path", { d: this.front.steps ? steps(front) : direct, class: "front-line" });
     const r = this.places.length > MANY ? 2.4 : 3.5;
-    this.places.forEach(([px, py], k) => {
-      svgPart(svg, "circle", { cx: px, cy: py, r, class: this.front.hollow[k] ? "front-dot hollow" : "front-dot" });
-    });
+    for (const row of known) {
+      const [cx, cy] = this.places[row];
+      svgPart(svg, "circle", { cx, cy, r, class: this.front.hollow[row] ? "front-dot hollow" : "front-dot", "data-row": row });
+    }
+    // a ring, so that a mark below it is seen; where the quantity is not known, a line says which one it is
+    if (this.picked !== null) {
+      const place = this.places[this.picked];
+      const [px, py] = place || [x.at(this.front.x[this.picked]), box.top];
+      svgPart(svg, "path", { d: `M${px},${box.bottom}V${py}${place ? `H${box.left}` : ""}`, class: "picked-lines" });
+      if (place) {
+        svgPart(svg, "circle", { cx: px, cy: py, r: 4.5, class: "picked-dot" });
+        svgPart(svg, "circle", { cx: px, cy: py, r: 11, class: "picked-ring" });
+      }
+    }
     for (const { row, mark } of this.special) {
+      if (!this.places[row]) continue;
       const [px, py] = this.places[row];
       svgPart(svg, "path", { d: `M0,0${MARKS[mark](8)}`, transform: `translate(${px},${py})`, class: `special ${mark}` });
-    }
-    if (this.picked !== null) {
-      const [px, py] = this.places[this.picked];
-      svgPart(svg, "path", { d: `M${px},${box.bottom}V${py}H${box.left}`, class: "picked-lines" });
-      svgPart(svg, "circle", { cx: px, cy: py, r: 6, class: "picked-dot" });
     }
   }
 
@@ -217,8 +242,9 @@ class FrontChart {
     const [px, py] = [(event.clientX - frame.left) * shrunk, (event.clientY - frame.top) * shrunk];
     let best = null;
     let least = Infinity;
-    this.places.forEach(([x, y], row) => {
-      const distance = (x - px) ** 2 + (y - py) ** 2;
+    this.places.forEach((place, row) => {
+      if (!place) return;
+      const distance = (place[0] - px) ** 2 + (place[1] - py) ** 2;
       if (distance < least) [least, best] = [distance, row];
     });
     return best;
@@ -226,6 +252,7 @@ class FrontChart {
 
   hover(event) {
     const row = this.nearest(event);
+    if (row === null) return;
     const [px, py] = this.places[row];
     const shrunk = this.svg.getBoundingClientRect().width / this.width;
     this.tip.textContent = this.describe(row);

@@ -19,6 +19,13 @@ async function unpackArray({ kind, data }) {
   return new Kind(bytes.buffer);
 }
 
+// Break lines: the vertices of all of them one after the other, how many each has, and the number of its name.
+async function unpackLines(packed) {
+  const [rows, sizes, names] = await Promise.all([packed.rows, packed.sizes, packed.names].map(unpackArray));
+  let at = 0;
+  return Array.from(sizes, (size, k) => ({ rows: rows.subarray(at, (at += size)), name: names[k] }));
+}
+
 // Triangles (a, b, c) with a the smallest, sorted by it, come as three columns: steps of a, then b - a, then c - a.
 async function unpackFaces(packed) {
   const columns = await unpackArray(packed);

@@ -6,6 +6,7 @@ const count = columns.triangles.length;
 const embedded = data.solutions.map((solution, row) => (solution ? row : -1)).filter((row) => row >= 0);
 const part = (id) => document.getElementById(id);
 const sixDigits = d3.format(",.6~g");
+const LINEAR_REACH = 5; // errors that differ by no more than this factor stand on a linear axis
 
 function spell(value) {
   const size = Math.abs(value);
@@ -13,10 +14,8 @@ function spell(value) {
   return size >= 1e9 || size < 1e-4 ? d3.format(".6~e")(value) : sixDigits(value);
 }
 
-function describe(row) {
-  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles${columns.free[row] ? ", free" : ""}, mean error ${readable(columns.mean_error[row])}${data.unit}`;
-}
-
+const sizeOf = (row) =>
+  `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
 const measures = Object.fromEntries(data.measures.map((measure) => [measure.name, measure]));
 const named = (column) => measures[column]?.label ?? column.replace("_", " ");
 const withUnit = (text, unit) => [text, unit && `[${unit}]`].filter(Boolean).join(" ");
@@ -25,22 +24,62 @@ const percent = (share) => `${d3.format(share < 1e-3 ? ".2~r" : share < 0.0995 ?
 
 // -------------------------------------------------------------------------------------------------------- picking
 
-const state = { row: null, mesh: null, viewer: null, geometry: null };
+const state = { row: null, mesh: null, pinned: null, viewer: null, geometry: null };
+
+function describe(row) {
+  const name = part("axis").value;
+  const error = columns[name][row] === null ? `${named(name)} not known` : `${named(name)} ${readable(columns[name][row])}${data.unit}`;
+  return `solution ${row}: ${plainNumber(columns.triangles[row])} triangles${columns.free[row] ? ", free" : ""}, ${error}`;
+}
 
 const chart = new FrontChart(part("chart"), {
   name: "The front: error against triangles. Each point is a simplified mesh.",
-  front: { x: columns.triangles, y: columns[data.measure], hollow: data.solutions.map((solution) => !solution) },
-  series: data.series.map((one) => ({ ...one, faint: true, line: "thin", mark: one.x.length > MANY_BESIDE ? null : "circle" })),
+  front: { x: columns.triangles, y: columns[part("axis").value], steps: false, hollow: data.solutions.map((solution) => !solution) },
   special: [
     { row: data.knee, mark: "diamond", name: "knee: the best compromise" },
     ...(data.chosen === null ? [] : [{ row: data.chosen, mark: "star", name: "chosen when the front was made" }]),
   ],
-  labels: { x: "triangles", y: withUnit(data.measure === "error" ? "error: sum over all vertices" : named(data.measure), measures[data.measure].unit) },
-  log: { x: part("log-x").checked, y: part("log-y").checked },
+  labels: { x: "triangles", y: "" },
+  log: { x: part("log-x").checked, y: true },
   describe,
   onPick: pick,
 });
-for (const axis of ["x", "y"]) part(`log-${axis}`).addEventListener("change", (event) => chart.setLog(axis, event.target.checked));
+for (const axis of ["x", "y"]) {
+  part(`log-${axis}`).addEventListener("change", (event) => {
+    chart.setLog(axis, event.target.checked);
+    if (axis === "y") state.logChosen = true;
+  });
+}
+
+// The error that the chart shows and the searches go by: one for all of them.
+function measureBy(name) {
+  const y = columns[name];
+  const known = y.filter((value) => value !== null);
+  const above = known.filter((value) => value > ROUNDING * Math.max(...known));
+  if (!state.logChosen) part("log-y").checked = Math.max(...above) > LINEAR_REACH * Math.min(...above);
+  const beside = data.series.filter((one) => name in one.y);
+  const log = part("log-y").checked;
+  chart.show({
+    y,
+    steps: data.searched.includes(name),
+    series: beside.map((one) => ({ ...one, y: one.y[name], faint: true, line: "thin", mark: one.x.length > MANY_BESIDE ? null : "circle" })),
+    label: withUnit(name === "error" ? "error: sum over all vertices" : named(name), measures.error.unit),
+    log,
+  });
+  const remarks = [];
+  if (known.length < count) remarks.push(`${plainNumber(known.length)} of ${plainNumber(count)} solutions have a ${named(name)}.`);
+  if (!data.searched.includes(name)) remarks.push(`The search was for the ${named(data.searched[0])}; by the ${named(name)} a larger mesh may be the worse one.`);
+  const absent = data.series.filter((one) => !beside.includes(one)).map((one) => one.name);
+  if (absent.length) remarks.push(`Not drawn, as their ${named(name)} is not known: ${absent.join(", ")}.`);
+  part("axis-remarks").textContent = remarks.join(" ");
+  part("axis").value = part("measure").value = name;
+  part("best-by").textContent = named(name);
+  if (state.row === null) return;
+  slider.setAttribute("aria-valuetext", describe(state.row));
+  if (!state.limitTyped && y[state.row] !== null) part("most-error").value = d3.format(".3~g")(y[state.row]);
+}
+for (const id of ["axis", "measure"]) part(id).addEventListener("change", (event) => measureBy(event.target.value));
+part("most-error").addEventListener("input", () => (state.limitTyped = true));
 
 const slider = part("slider");
 slider.max = embedded.length - 1;
@@ -54,7 +93,7 @@ function step(by) {
 
 document.addEventListener("keydown", (event) => {
   const onChart = part("chart").contains(event.target);
-  if (event.target !== document.body && !onChart) return;
+  if (event.target !== document.body && event.target.tagName !== "BUTTON" && !onChart) return;
   if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
   const moves = { ArrowRight: 1, ArrowLeft: -1 };
   if (onChart) Object.assign(moves, { ArrowUp: -1, ArrowDown: 1, Home: -count, End: count });
@@ -66,28 +105,27 @@ document.addEventListener("keydown", (event) => {
 async function pick(row) {
   state.row = row;
   chart.pick(row);
+  noteLink();
   const place = embedded.findLastIndex((other) => other <= row);
   slider.value = Math.max(0, place);
   slider.setAttribute("aria-valuetext", describe(row));
   part("picked").textContent = `solution ${row} of 0 to ${count - 1}`;
   numbers(row);
   const file = `${data.stem}_${columns.triangles[row]}.ply`;
-  part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
+  part("command").textContent =
+    data.folder === null ? `front[${row}].save("${file}")` : `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
   const solution = data.solutions[row];
-  part("simplified-title").textContent =
-    `${plainNumber(columns.triangles[row])} triangles, ${percent(columns.triangles[row] / model.triangles)}${columns.free[row] ? ", free" : ""}`;
+  part("simplified-title").textContent = sizeOf(row);
   part("not-embedded").hidden = Boolean(solution);
   for (const button of document.querySelectorAll("#downloads button")) button.disabled = !solution;
-  const [faces, levels, edges] = solution
-    ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation), solution.lines ? unpackArray(solution.lines) : null])
-    : [null, null, null];
+  const [faces, levels, lines] = solution
+    ? await Promise.all([unpackFaces(solution.faces), unpackArray(solution.deviation), solution.lines ? unpackLines(solution.lines) : []])
+    : [null, null, []];
   if (state.row !== row) return; // another one was picked meanwhile
-  state.mesh = faces && { row, faces, levels, edges };
+  const edges = lines.length ? lines.flatMap(({ rows }) => [...rows.subarray(1)].flatMap((row, k) => [rows[k], row])) : null;
+  state.mesh = faces && { row, faces, levels, lines, edges };
   document.documentElement.dataset.shown = row;
-  if (state.viewer) {
-    state.viewer.show(faces, edges);
-    paintErrors();
-  }
+  showMesh();
 }
 
 function refitted(row) {
@@ -149,9 +187,10 @@ function answer(row, wish) {
 part("by-triangles").addEventListener("submit", (event) => {
   event.preventDefault();
   const most = part("most-triangles").valueAsNumber;
+  const errors = columns[part("axis").value];
   let best = null;
   columns.triangles.forEach((triangles, row) => {
-    if (triangles <= most && (best === null || columns[data.measure][row] < columns[data.measure][best])) best = row;
+    if (triangles <= most && errors[row] !== null && (best === null || errors[row] < errors[best])) best = row;
   });
   answer(best, `at most ${plainNumber(most)} triangles; the smallest has ${plainNumber(Math.min(...columns.triangles))}`);
 });
@@ -172,9 +211,9 @@ part("by-error").addEventListener("submit", (event) => {
 for (const button of document.querySelectorAll("#downloads button")) {
   button.addEventListener("click", () => {
     const kind = button.value;
-    const mesh = compactMesh(state.geometry.points, state.geometry.paint, state.mesh.faces);
+    const mesh = compactMesh(state.geometry.points, state.geometry.paint, state.mesh.faces, state.mesh.lines);
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(MESH_FILES[kind](mesh));
+    link.href = URL.createObjectURL(MESH_FILES[kind](mesh, data.files[kind]));
     link.download = `${data.stem}_${columns.triangles[state.mesh.row]}.${kind}`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
@@ -191,119 +230,83 @@ part("copy").addEventListener("click", async () => {
   }
 });
 
-// ---------------------------------------------------------------------------------------------------- the two meshes
+// ---------------------------------------------------------------------------------------------------------- the link
 
-const UNCOVERED_LEVEL = 255; // other levels q mean an error of (q / 254)^2 times the largest of the solution
-const errorAt = (row, level) => data.solutions[row].largest * (level / 254) ** 2;
+// The address says which solution is shown, and of the controls marked data-linked those that are not as the page opens.
+// Inside another document the page has no address of its own.
+const hasAddress = ["file:", "http:", "https:"].includes(location.protocol);
+const LINK_DELAY = 250; // browsers refuse an address that changes all the time [ms]
+const valueOf = (control) => (control.type === "checkbox" ? String(control.checked) : control.value);
+const nameOf = (control) => control.name || control.id;
 
-// The end of the scale: the same for all solutions, or fitted to the shown one; a few spikes do not pale all the rest.
-function scaleEnd() {
-  if (part("scale").value === "all") return data.scale_end;
-  const { row, levels } = state.mesh;
-  const covered = levels.filter((level) => level !== UNCOVERED_LEVEL).sort();
-  const level = covered.length ? covered[Math.floor(data.scale_quantile * (covered.length - 1))] : 0;
-  return errorAt(row, level) || data.solutions[row].largest || 1;
+function usualOf(control) {
+  if (control.type === "checkbox") return String(control.defaultChecked);
+  if (control.tagName === "SELECT") return ([...control.options].find((option) => option.defaultSelected) ?? control.options[0]).value;
+  return control.defaultValue;
 }
 
-function paintErrors() {
-  if (!state.mesh) return;
-  const { row, levels } = state.mesh;
-  const end = scaleEnd();
-  const table = Array.from({ length: 256 }, (_, level) => {
-    if (level === UNCOVERED_LEVEL) return data.uncovered_colour;
-    const share = Math.min(1, errorAt(row, level) / end);
-    return data.colours[Math.round(share * (data.colours.length - 1))];
-  });
-  const { points, measured } = state.geometry;
-  const colours = new Float32Array(points.length);
-  levels.forEach((level, i) => {
-    for (let k = 0; k < 3; k++) colours[3 * measured[i] + k] = table[level][k] / 255;
-  });
-  state.viewer.setErrors(colours);
-  part("scale-middle").textContent = readable(end / 2);
-  part("scale-end").textContent = data.solutions.some((solution) => solution && solution.largest > end) ? `≥ ${readable(end)}` : readable(end);
-  if (part("uncovered-key")) part("uncovered-key").hidden = !columns.uncovered.some(Boolean);
+function linked() {
+  return [...document.querySelectorAll("[data-linked]")].filter((control) => control.type !== "radio" || control.checked);
 }
 
-function colourBar() {
-  const bar = part("bar");
-  const pen = bar.getContext("2d");
-  data.colours.forEach((rgb, k) => {
-    pen.fillStyle = `rgb(${rgb.join(",")})`;
-    pen.fillRect((k * bar.width) / data.colours.length, 0, bar.width / data.colours.length + 1, bar.height);
-  });
-}
-
-async function openViewer() {
-  const [points, faces, lines, paint] = await Promise.all([
-    unpackArray(data.points),
-    unpackFaces(data.faces),
-    data.lines && unpackArray(data.lines),
-    data.paint && unpackArray(data.paint),
-  ]);
-  state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
-  const { pivot, rotation, scale } = model; // scaled, coordinates are lengths
-  const upright = new Float64Array(points.length);
-  for (let i = 0; i < points.length; i += 3) {
-    for (let k = 0; k < 3; k++) {
-      let sum = 0;
-      for (let j = 0; j < 3; j++) sum += rotation[k][j] * (scale[j] * points[i + j] - pivot[j]);
-      upright[i + k] = sum;
-    }
+function link() {
+  const words = new URLSearchParams({ solution: state.row });
+  for (const control of linked()) {
+    const isUsual = control.type === "radio" ? control.defaultChecked : valueOf(control) === usualOf(control);
+    if (!isUsual) words.set(nameOf(control), valueOf(control));
   }
-  const canvas = part("canvas");
-  const windows = [part("original-window"), part("simplified-window")];
-  const heights = part("heights"); // which a closed mesh has not
-  let first = true;
+  return `#${words}`;
+}
+
+function noteLink() {
+  clearTimeout(state.linking);
+  if (hasAddress && state.opened) state.linking = setTimeout(() => history.replaceState(null, "", link()), LINK_DELAY);
+}
+
+// Do what the address says; return the solution that it names, if there is one of that number.
+function followLink() {
+  const words = new URLSearchParams(location.hash.slice(1));
+  for (const control of document.querySelectorAll("[data-linked]")) {
+    const value = words.get(nameOf(control));
+    if (value === null || (control.type === "radio" && control.value !== value)) continue;
+    const known = control.tagName !== "SELECT" || [...control.options].some((option) => option.value === value);
+    if (!known) continue;
+    if (control.type === "checkbox" || control.type === "radio") control.checked = control.type === "radio" || value === "true";
+    else control.value = value;
+    control.dispatchEvent(new Event(control.type === "range" ? "input" : "change", { bubbles: true }));
+  }
+  const named = words.get("solution");
+  if (named === null) return null;
+  const row = /^\d+$/.test(named) ? Number(named) : count;
+  if (row < count) return row;
+  part("answer").textContent = `The link names solution ${named}; there are 0 to ${count - 1}.`;
+  part("answer").className = "missed";
+  return null;
+}
+
+document.addEventListener("change", (event) => "linked" in event.target.dataset && noteLink());
+document.addEventListener("input", (event) => "linked" in event.target.dataset && noteLink());
+addEventListener("hashchange", () => {
+  const row = followLink();
+  if (row !== null) pick(row);
+});
+part("copy-link").hidden = !hasAddress;
+part("copy-link").addEventListener("click", async () => {
+  const address = location.href.replace(/#.*|$/, link());
+  history.replaceState(null, "", address);
   try {
-    state.viewer = new (data.closed ? BodyPair : MeshPair)(canvas, windows, {
-      positions: upright,
-      faces,
-      lines,
-      paint,
-      channels: data.paint ? data.paint.channels : 0,
-      exaggeration: heights ? heights.valueAsNumber : 1,
-      relief: model.relief,
-      first: data.closed && data.closed.front.map((degrees) => (degrees * Math.PI) / 180),
-      open: data.closed && data.closed.open,
-      onDraw() {
-        if (!first || !state.mesh) return;
-        first = false;
-        performance.mark("first picture");
-        document.documentElement.dataset.ready = "yes";
-      },
-    });
-  } catch (problem) {
-    part("no-3d").hidden = false;
-    part("no-3d").textContent = `The meshes cannot be shown: this browser gives no WebGL (${problem.message}). All else works.`;
-    document.documentElement.dataset.ready = "without WebGL";
-    return;
+    await navigator.clipboard.writeText(address);
+    part("link-copied").textContent = "copied";
+  } catch {
+    part("link-copied").textContent = "it is in the address bar";
   }
-  const viewer = state.viewer;
-  for (const radio of document.querySelectorAll("input[name=look]")) {
-    radio.addEventListener("change", () => {
-      viewer.setMode(radio.value);
-      part("error-key").hidden = radio.value !== "error";
-    });
-  }
-  part("scale").addEventListener("change", paintErrors);
-  heights?.addEventListener("input", () => {
-    part("heights-value").textContent = `× ${readable(heights.valueAsNumber)}`;
-    viewer.setExaggeration(heights.valueAsNumber);
-  });
-  part("lines")?.addEventListener("change", (event) => viewer.showLines(event.target.checked));
-  part("from-above")?.addEventListener("click", () => viewer.look(0, 0));
-  part("from-side")?.addEventListener("click", () => viewer.look(0.6, 1.2));
-  part("quarter-turn")?.addEventListener("click", () => viewer.turn(Math.PI / 2, 0, 1));
-  part("other-side")?.addEventListener("click", () => viewer.turn(Math.PI, 0, 1));
-  part("reset").addEventListener("click", () => viewer.reset());
-  if (state.mesh) {
-    viewer.show(state.mesh.faces, state.mesh.edges);
-    paintErrors();
-  }
-}
+});
 
 if (data.closed?.open) part("inside-key").style.background = data.closed.open.inside;
-colourBar();
+measureBy(part("axis").value);
 pick(data.chosen === null ? data.knee : data.chosen);
-openViewer();
+openViewer().then(() => {
+  const row = followLink();
+  if (row !== null) pick(row);
+  state.opened = true;
+});

@@ -1,18 +1,76 @@
-// Original and simplified mesh side by side: two windows of one WebGL canvas, seen by one camera, so that they turn together.
+// Two meshes in two windows of one WebGL canvas, or in one window with a divider, seen by one camera, so that they turn together.
 
 THREE.ColorManagement.enabled = false; // colours go to the screen as they are given
 
-const CLAY = [0.9, 0.84, 0.77];
+const CLAY = "#e6d6c4";
 const NO_VERTEX = "#9aa0a6"; // simplified surface where the original has none
 const TURN_STEP = Math.PI / 36;
-const TEXTURE_SIZE = 1024;
+const TEXTURE_SIZE = 1024; // of the map of the error
+const INK = "#2a3442"; // edges over colours that are read, whatever the page's own colours
+const [DARK_WIRES, FAINTEST_WIRE] = [6_000, 0.12]; // triangles whose edges are as dark as any; opacity of those of very many
+const FILLED = 0.94; // of the window, by the original as it is first seen
+const CREASE = Math.cos((55 * Math.PI) / 180); // edges at which faces turn by more stay sharp on smooth surfaces
+const VIEWER_LIGHT = [-0.5, 0.6, 0.75]; // from the upper left, in front of the picture
+const MAP_LIGHT = [-0.5, 0.5, Math.SQRT1_2]; // from the north-west, at 45 degrees
+// Brightness of shadows, and what the light adds: colours that are read off a bar must be told from the light.
+const LIGHTS = { plain: [0.3, 0.78], read: [0.72, 0.36], hillshade: [0.2, 0.92], readHillshade: [0.52, 0.62] };
+// Where textures look for their coordinates: the map of the error, the image of the model, the colours of heights.
+const [MAP_CHANNEL, IMAGE_CHANNEL, HEIGHT_CHANNEL] = [0, 1, 2];
+const UV_NAMES = ["uv", "uv1", "uv2"]; // as three.js calls those of the channels
+
+// The mean of the faces around each corner of each face, weighted by their angles there, but none beyond a crease:
+// (9 T) of triangles (3 T) of points (3 V). They are smooth where heights are multiplied by a factor.
+function cornerNormals(points, faces, factor) {
+  const count = faces.length / 3;
+  const ofFace = new Float32Array(3 * count);
+  const angle = new Float32Array(3 * count);
+  const first = new Uint32Array(points.length / 3 + 1);
+  const edge = (from, to) => [
+    points[3 * to] - points[3 * from], points[3 * to + 1] - points[3 * from + 1], factor * (points[3 * to + 2] - points[3 * from + 2]),
+  ];
+  for (let t = 0; t < count; t++) {
+    const corners = faces.subarray(3 * t, 3 * t + 3);
+    const sides = [0, 1, 2].map((k) => edge(corners[k], corners[(k + 1) % 3]));
+    const [u, v] = [sides[0], sides[2]];
+    const normal = [v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]];
+    const size = Math.hypot(...normal) || 1;
+    for (let k = 0; k < 3; k++) {
+      ofFace[3 * t + k] = normal[k] / size;
+      const [on, back] = [sides[k], sides[(k + 2) % 3]];
+      angle[3 * t + k] = Math.atan2(size, -(on[0] * back[0] + on[1] * back[1] + on[2] * back[2]));
+      first[corners[k] + 1]++;
+    }
+  }
+  for (let row = 0; row + 1 < first.length; row++) first[row + 1] += first[row];
+  const around = new Uint32Array(faces.length); // the corners at each vertex
+  const next = first.slice();
+  for (let corner = 0; corner < faces.length; corner++) around[next[faces[corner]]++] = corner;
+  const normals = new Float32Array(9 * count);
+  for (let corner = 0; corner < faces.length; corner++) {
+    const own = 3 * Math.floor(corner / 3);
+    const [x, y, z] = [ofFace[own], ofFace[own + 1], ofFace[own + 2]];
+    let [sx, sy, sz] = [0, 0, 0];
+    for (let at = first[faces[corner]]; at < first[faces[corner] + 1]; at++) {
+      const other = 3 * Math.floor(around[at] / 3);
+      if (x * ofFace[other] + y * ofFace[other + 1] + z * ofFace[other + 2] < CREASE) continue;
+      const weight = angle[around[at]];
+      sx += weight * ofFace[other];
+      sy += weight * ofFace[other + 1];
+      sz += weight * ofFace[other + 2];
+    }
+    const size = Math.hypot(sx, sy, factor * sz) || 1; // normals stretch by the inverse
+    normals.set([sx / size, sy / size, (factor * sz) / size], 3 * corner);
+  }
+  return normals;
+}
 
 class MeshPair {
   // positions: (V, 3) upright from a local origin; extent: [low, high] of the original; paint: (V, k) uint8 or null;
-  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null; first: where a body is looked at from;
-  // open: how the inside of a body with holes looks, or null
-  constructor(canvas, windows, { positions, faces, lines, paint, channels, exaggeration, relief, first, open, onDraw }) {
-    Object.assign(this, { canvas, windows, paint, first, open, onDraw });
+  // lines: ends of the original's break lines, (2 S, 3) in the same frame, or null; image: {canvas or img, uv, colour} or null;
+  // ramp: canvas with the colours of heights, or null; first: where a body is looked at from; open: how the inside of a body
+  // with holes looks, or null
+  constructor(canvas, windows, { positions, faces, lines, paint, channels, image, ramp, exaggeration, relief, first, open, onDraw }) {
+    Object.assign(this, { canvas, windows, image, ramp, first, open, onDraw, exaggeration, relief });
     const count = positions.length / 3;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -22,62 +80,52 @@ class MeshPair {
         high[k] = Math.max(high[k], positions[3 * row + k]);
       }
     }
-    const size = Math.max(high[0] - low[0], high[1] - low[1]);
+    this.heights = [low[2], high[2]];
+    const size = Math.max(high[0] - low[0], high[1] - low[1]) || 1;
+    this.size = size; // model units to one of the scene
     this.extent = [0, 1, 2].map((k) => (high[k] - low[k]) / size);
     const local = new Float32Array(3 * count);
     const uv = new Float32Array(2 * count);
+    const level = new Float32Array(2 * count);
     for (let i = 0; i < count; i++) {
       for (let k = 0; k < 3; k++) local[3 * i + k] = (positions[3 * i + k] - (low[k] + high[k]) / 2) / size;
       for (let k = 0; k < 2; k++) uv[2 * i + k] = (positions[3 * i + k] - low[k]) / (high[k] - low[k]);
+      level[2 * i] = (positions[3 * i + 2] - low[2]) / (high[2] - low[2] || 1);
+      level[2 * i + 1] = 0.5;
     }
     const own = new Float32Array(3 * count);
-    for (let i = 0; i < count; i++) {
-      for (let k = 0; k < 3; k++) own[3 * i + k] = paint ? paint[channels * i + k] / 255 : CLAY[k];
-    }
-    this.arrays = { position: local, uv, color: own };
-    this.own = new THREE.BufferAttribute(own, 3);
-    this.errorColour = new THREE.BufferAttribute(new Float32Array(3 * count), 3);
+    for (let i = 0; paint && i < own.length; i++) own[i] = paint[channels * Math.floor(i / 3) + (i % 3)] / 255;
+    this.own = own;
+    this.arrays = { position: local, uv };
+    if (image) this.arrays.uv1 = image.uv;
+    if (ramp) this.arrays.uv2 = level;
+    this.creased = exaggeration; // creases are those of heights as they are first drawn
 
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer = openRenderer(canvas);
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setClearColor(0x000000, 0);
     this.camera = new THREE.PerspectiveCamera(28, 1, 0.01, 100);
     this.camera.up.set(0, 0, 1);
     this.sun = new THREE.DirectionalLight(0xffffff, 1);
-    this.sun.position.set(-0.5, 0.6, 0.75); // from the upper left, in front of the picture
-    this.sun.target.position.set(0, 0, 0); // the camera
-    this.camera.add(this.sun, this.sun.target);
+    this.sun.target.position.set(0, 0, 0);
     this.sky = new THREE.AmbientLight(0xffffff, 1);
 
-    const side = THREE.DoubleSide;
-    const lifted = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
-    const below = lines || open ? lifted : {}; // lines lie in front of the faces that they are edges of
+    this.lifted = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
     this.materials = {
-      shaded: new THREE.MeshLambertMaterial({ vertexColors: true, flatShading: true, side, ...below }),
-      texture: new THREE.MeshLambertMaterial({ flatShading: true, side, ...below }),
       line: new THREE.LineBasicMaterial(),
       rim: new THREE.LineBasicMaterial(),
-      paper: new THREE.MeshBasicMaterial({ side, ...lifted }),
-      wire: new THREE.MeshBasicMaterial({ wireframe: true, side }),
+      paper: new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, ...this.lifted }),
     };
-    const longest = Math.max(this.extent[0], this.extent[1]);
-    const pixels = [0, 1].map((k) => Math.max(16, Math.round((TEXTURE_SIZE * this.extent[k]) / longest)));
-    this.target = new THREE.WebGLRenderTarget(pixels[0], pixels[1], { minFilter: THREE.LinearFilter });
-    this.materials.texture.map = this.target.texture;
+    this.textures = {
+      texture: image && this.textureOf(image.picture, IMAGE_CHANNEL),
+      height: ramp && this.textureOf(ramp, HEIGHT_CHANNEL),
+    };
     const ends = lines && new Float32Array(lines.length);
     for (let i = 0; ends && i < ends.length; i++) ends[i] = (lines[i] - (low[i % 3] + high[i % 3]) / 2) / size;
     this.linesShown = true;
-    this.original = this.scene(faces, ends);
-    this.simplified = null;
-    this.flat = new THREE.Scene();
-    const coloured = this.geometry(faces);
-    coloured.setAttribute("color", this.errorColour);
-    const map = new THREE.Mesh(coloured, new THREE.MeshBasicMaterial({ vertexColors: true, side }));
-    this.flat.add(map);
-    this.above = new THREE.OrthographicCamera(-this.extent[0] / 2, this.extent[0] / 2, this.extent[1] / 2, -this.extent[1] / 2, -10, 10);
-    this.mode = "shaded";
-    this.exaggeration = exaggeration;
-    this.relief = relief;
+    Object.assign(this, { colours: "plain", shading: "flat", hillshaded: false, wiped: false, divider: 0.5 });
+    this.original = this.part(faces, ends);
+    this.pinned = this.simplified = null;
 
     // the wheel scrolls the page until the view has the focus
     canvas.addEventListener(
@@ -100,28 +148,73 @@ class MeshPair {
   // What turns the camera: heights stay upright.
   steer() {
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+    this.controls.addEventListener("start", () => (this.moved = true));
     this.controls.addEventListener("change", () => this.request());
-    this.controls.maxDistance = 20;
     this.controls.minDistance = 0.05;
   }
+
+  textureOf(picture, channel) {
+    const texture = new THREE.CanvasTexture(picture);
+    texture.channel = channel;
+    if (channel === IMAGE_CHANNEL) texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+    return texture;
+  }
+
+  // -------------------------------------------------------------------------------------------------------- the meshes
 
   // Every geometry has attributes of its own: disposing of one deletes its buffers on the graphics card.
   geometry(faces) {
     const geometry = new THREE.BufferGeometry();
     for (const [name, array] of Object.entries(this.arrays)) {
-      geometry.setAttribute(name, new THREE.BufferAttribute(array, name === "uv" ? 2 : 3));
+      geometry.setAttribute(name, new THREE.BufferAttribute(array, name === "position" ? 3 : 2));
     }
     geometry.setIndex(new THREE.BufferAttribute(faces, 1));
     return geometry;
   }
 
-  scene(faces, ends) {
+  // What one window shows; ends: of its break lines, (2 S, 3), or null.
+  part(faces, ends) {
     const scene = new THREE.Scene();
-    const mesh = new THREE.Mesh(this.geometry(faces), this.materials.shaded);
-    const wire = new THREE.Mesh(mesh.geometry, this.materials.wire);
+    const mesh = new THREE.Mesh(this.geometry(faces), this.materials.paper);
+    const wire = new THREE.Mesh(mesh.geometry, new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide, transparent: true }));
     mesh.frustumCulled = wire.frustumCulled = false;
     scene.add(mesh, wire);
-    return { scene, mesh, wire, lines: ends && this.linesOf(ends) };
+    const own = new THREE.BufferAttribute(this.own, 3);
+    const errors = new THREE.BufferAttribute(new Float32Array(this.own.length), 3);
+    return { faces, scene, mesh, wire, lines: ends && this.linesOf(ends), own, errors, indexed: mesh.geometry, smooth: null, map: null };
+  }
+
+  // Its triangles one by one, with normals of their own at each corner.
+  smoothed(part) {
+    if (part.smooth) return part.smooth;
+    const { faces } = part;
+    part.smooth = new THREE.BufferGeometry();
+    for (const [name, array] of Object.entries(this.arrays)) {
+      part.smooth.setAttribute(name, this.spread(array, faces, name === "position" ? 3 : 2));
+    }
+    part.smooth.setAttribute("normal", new THREE.BufferAttribute(cornerNormals(this.arrays.position, faces, this.creased), 3));
+    return part.smooth;
+  }
+
+  // An attribute of vertices as one of corners.
+  spread(array, faces, width) {
+    const corners = new Float32Array(width * faces.length);
+    for (let corner = 0; corner < faces.length; corner++) {
+      for (let k = 0; k < width; k++) corners[width * corner + k] = array[width * faces[corner] + k];
+    }
+    return new THREE.BufferAttribute(corners, width);
+  }
+
+  // Colours of vertices on either geometry of a part.
+  paint(part, colours) {
+    if (part.mesh.geometry !== part.smooth) {
+      part.mesh.geometry.setAttribute("color", colours);
+      return;
+    }
+    const is = part.painted;
+    if (is && is.colours === colours && is.version === colours.version && is.on === part.smooth) return;
+    part.smooth.setAttribute("color", this.spread(colours.array, part.faces, 3));
+    part.painted = { colours, version: colours.version, on: part.smooth };
   }
 
   // ends: (2 S, 3) Float32Array; the lines have a scene of their own, which is drawn several times to make them wider
@@ -135,14 +228,24 @@ class MeshPair {
     return { scene, segments };
   }
 
+  // The mesh on the right; or, if it is pinned, on the left, where no mesh means the original.
   // faces: Uint32Array or null for no mesh; edges: the ends of its break lines as rows of the vertices, or null
-  show(faces, edges) {
-    if (this.simplified) this.simplified.wire.geometry.dispose();
-    for (const lines of [this.simplified?.lines, this.simplified?.rims]) lines?.segments.geometry.dispose();
+  show(faces, edges, isPinned = false) {
+    const name = isPinned ? "pinned" : "simplified";
+    if (this[name]) this.dispose(this[name]);
     const ends = edges && new Float32Array(3 * edges.length);
     for (let i = 0; ends && i < ends.length; i++) ends[i] = this.arrays.position[3 * edges[Math.floor(i / 3)] + (i % 3)];
-    this.simplified = faces ? this.scene(faces, ends) : null;
+    this[name] = faces ? this.part(faces, ends) : null;
     this.request();
+  }
+
+  dispose(part) {
+    part.indexed.dispose();
+    part.wire.material.dispose();
+    part.smooth?.dispose();
+    part.map?.target.dispose();
+    part.map?.material.forEach((material) => material.dispose());
+    for (const lines of [part.lines, part.rims]) lines?.segments.geometry.dispose();
   }
 
   showLines(shown) {
@@ -164,53 +267,148 @@ class MeshPair {
     this.renderer.autoClear = true;
   }
 
-  // colours: (V, 3) float, of the error at every vertex
-  setErrors(colours) {
-    this.errorColour.array.set(colours);
-    this.errorColour.needsUpdate = true;
-    this.renderer.setRenderTarget(this.target);
-    this.renderer.setClearColor(NO_VERTEX, 1);
-    this.renderer.clear();
-    this.renderer.render(this.flat, this.above);
-    this.renderer.setRenderTarget(null);
-    this.renderer.setClearColor(0x000000, 0);
+  // ---------------------------------------------------------------------------------------------------- how they look
+
+  // colours: (V, 3) float, of the error of a mesh at every vertex of the original
+  setErrors(colours, isPinned = false) {
+    for (const part of isPinned ? [this.pinned] : [this.original, this.simplified]) {
+      if (!part) continue;
+      part.errors.array.set(colours);
+      part.errors.needsUpdate = true;
+      part.isMapOld = true;
+    }
     this.request();
   }
 
-  setMode(mode) {
-    this.mode = mode;
+  // The map of the error, as seen from above, which covers a simplified mesh: its triangles have no vertices between.
+  mapOf(part) {
+    if (!this.above) {
+      this.above = new THREE.OrthographicCamera(-this.extent[0] / 2, this.extent[0] / 2, this.extent[1] / 2, -this.extent[1] / 2, -10, 10);
+      this.flat = new THREE.Scene();
+      this.flat.add(new THREE.Mesh(this.geometry(this.original.faces), new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide })));
+    }
+    if (!part.map) {
+      const longest = Math.max(this.extent[0], this.extent[1]);
+      const pixels = [0, 1].map((k) => Math.max(16, Math.round((TEXTURE_SIZE * this.extent[k]) / longest)));
+      const target = new THREE.WebGLRenderTarget(pixels[0], pixels[1], { minFilter: THREE.LinearFilter });
+      part.map = { target, material: [true, false].map((flatShading) => this.lit({ flatShading, map: target.texture })) };
+    }
+    if (part.isMapOld) {
+      part.isMapOld = false;
+      // an attribute of its own, since that of the part is of another geometry
+      const seen = this.flat.children[0];
+      seen.geometry.setAttribute("color", part.errors);
+      this.renderer.setScissorTest(false);
+      this.renderer.setRenderTarget(part.map.target);
+      this.renderer.setClearColor(NO_VERTEX, 1);
+      this.renderer.clear();
+      this.renderer.render(this.flat, this.above);
+      this.renderer.setRenderTarget(null);
+      this.renderer.setClearColor(0x000000, 0);
+    }
+    return part.map.material[this.isSmooth ? 1 : 0];
+  }
+
+  get isSmooth() {
+    return this.shading === "smooth";
+  }
+
+  lit(look) {
+    return new THREE.MeshLambertMaterial({ side: THREE.DoubleSide, ...this.lifted, ...look });
+  }
+
+  // The material of a kind of colours, made when it is first asked for.
+  material(colours) {
+    const name = `${colours} ${this.isSmooth ? "smooth" : "flat"}`;
+    if (!this.materials[name]) {
+      const look = { flatShading: !this.isSmooth };
+      if (colours === "plain") look.color = CLAY;
+      else if (this.textures[colours]) look.map = this.textures[colours];
+      else look.vertexColors = true;
+      if (colours === "texture") look.color = this.image.colour;
+      this.materials[name] = this.lit(look);
+    }
+    return this.materials[name];
+  }
+
+  // colours: plain, own, texture, height or error; shading: flat, smooth or wireframe; hillshaded: lit from the north-west
+  setLook({ colours = this.colours, shading = this.shading, hillshaded = this.hillshaded }) {
+    Object.assign(this, { colours, shading, hillshaded });
     this.request();
+  }
+
+  // Whether what is drawn is coloured by numbers.
+  get isRead() {
+    return this.colours === "error" || this.colours === "height";
   }
 
   setExaggeration(factor) {
     this.exaggeration = factor;
-    this.request();
+    this.refit();
+  }
+
+  // wiped: both meshes in one window, left and right of a divider, which stands at a share of its width
+  arrange({ wiped = this.wiped, divider = this.divider }) {
+    const isOther = wiped !== this.wiped;
+    Object.assign(this, { wiped, divider });
+    if (isOther) this.refit();
+    else this.request();
   }
 
   theme() {
     const style = getComputedStyle(document.documentElement);
     this.materials.paper.color.set(style.getPropertyValue("--card").trim());
-    this.materials.wire.color.set(style.getPropertyValue("--wire").trim());
+    this.wireColour = style.getPropertyValue("--wire").trim();
     this.lineColours = { shaded: "#00574b", wireframe: style.getPropertyValue("--breakline").trim() };
     this.rimColours = { shaded: this.open?.rim, wireframe: style.getPropertyValue("--rim").trim() };
     this.request();
   }
 
+  // --------------------------------------------------------------------------------------------------- where from
+
   resize() {
     const ratio = Math.min(2, window.devicePixelRatio || 1);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(this.canvas.clientWidth, this.canvas.clientHeight, false);
-    this.request();
+    this.refit();
   }
 
-  // Look from the direction (azimuth from the south, polar angle from above).
+  // What was fitted into the windows is so again, unless somebody has moved it since.
+  refit() {
+    if (this.view && !this.moved) this.look(...this.view);
+    else this.request();
+  }
+
+  // Look from the direction (azimuth from the south, polar angle from above), at all of it, as near as it can be.
   look(azimuth, polar) {
+    this.view = [azimuth, polar];
+    this.moved = false;
+    const tilt = Math.max(1e-3, polar);
+    const [sine, cosine, east, south] = [Math.sin(tilt), Math.cos(tilt), Math.sin(azimuth), Math.cos(azimuth)];
+    const arm = new THREE.Vector3(sine * east, -sine * south, cosine);
+    const up = new THREE.Vector3(-cosine * east, cosine * south, sine);
+    const right = new THREE.Vector3(south, east, 0);
     const [width, height] = this.window(0).slice(2);
-    const fitted = Math.tan((this.camera.fov * Math.PI) / 360);
-    const deep = this.extent[1] * Math.cos(polar) + this.extent[2] * this.exaggeration * Math.sin(polar);
-    const distance = (0.55 * Math.max(deep, (this.extent[0] * height) / width)) / fitted + 0.5 * this.extent[1] * Math.sin(polar);
-    this.controls.target.set(0, 0, 0);
-    this.place(azimuth, polar, distance);
+    const tall = FILLED * Math.tan((this.camera.fov * Math.PI) / 360);
+    const wide = (tall * Math.max(1, width)) / Math.max(1, height);
+    // each side of the window is a plane through the camera; the furthest point beyond it decides
+    const reach = { right: -Infinity, left: -Infinity, up: -Infinity, down: -Infinity };
+    const point = new THREE.Vector3();
+    for (const row of this.original.faces) {
+      point.fromArray(this.arrays.position, 3 * row);
+      point.z *= this.exaggeration;
+      const [x, y, near] = [point.dot(right), point.dot(up), point.dot(arm)];
+      reach.right = Math.max(reach.right, x + wide * near);
+      reach.left = Math.max(reach.left, wide * near - x);
+      reach.up = Math.max(reach.up, y + tall * near);
+      reach.down = Math.max(reach.down, tall * near - y);
+    }
+    const distance = Math.max((reach.right + reach.left) / (2 * wide), (reach.up + reach.down) / (2 * tall));
+    this.controls.target
+      .copy(right.multiplyScalar((reach.right - reach.left) / 2))
+      .addScaledVector(up, (reach.up - reach.down) / 2);
+    this.controls.maxDistance = 6 * distance;
+    this.place(azimuth, tilt, distance);
   }
 
   place(azimuth, polar, distance) {
@@ -224,6 +422,7 @@ class MeshPair {
   }
 
   turn(azimuth, polar, zoom) {
+    this.moved = true;
     const arm = this.camera.position.clone().sub(this.controls.target);
     const distance = arm.length();
     const tilt = Math.acos(arm.z / distance);
@@ -232,7 +431,7 @@ class MeshPair {
 
   // A relief as high as a face is seen nearly from the front, terrain from a hill beside it.
   reset() {
-    this.look(0, this.relief > 0.2 ? 0.25 : 0.85);
+    this.look(0, this.relief > 0.2 ? 0.25 : 0.6);
   }
 
   key(event) {
@@ -253,10 +452,20 @@ class MeshPair {
     event.stopPropagation();
   }
 
+  // All of the model lies between the limits of sight.
+  clip() {
+    const { camera } = this;
+    const radius = 0.51 * Math.hypot(this.extent[0], this.extent[1], this.extent[2] * this.exaggeration);
+    const distance = camera.position.length();
+    camera.far = distance + radius;
+    camera.near = Math.max(2e-3 * camera.far, distance - radius);
+  }
+
+  // The rectangle (left, bottom, width, height) of a window on the canvas; of both where there is one.
   window(which) {
     const canvas = this.canvas.getBoundingClientRect();
-    const frame = this.windows[which].getBoundingClientRect();
-    return [frame.left - canvas.left, canvas.bottom - frame.bottom, frame.width, frame.height].map(Math.round);
+    const [from, to] = (this.wiped ? [0, 1] : [which, which]).map((k) => this.windows[k].getBoundingClientRect());
+    return [from.left - canvas.left, canvas.bottom - from.bottom, to.right - from.left, from.height].map(Math.round);
   }
 
   request() {
@@ -268,41 +477,94 @@ class MeshPair {
     });
   }
 
-  // What the original (0) and the simplified mesh (1) look like in this mode.
-  dress(part, which) {
-    part.wire.visible = this.mode === "wireframe";
-    if (which === 0) part.mesh.geometry.setAttribute("color", this.mode === "error" ? this.errorColour : this.own);
-    if (this.mode === "wireframe") part.mesh.material = this.materials.paper;
-    else if (this.mode === "error" && which === 1) part.mesh.material = this.materials.texture;
-    else part.mesh.material = this.materials.shaded;
+  // What a mesh looks like now.
+  dress(part) {
+    const isOriginal = part === this.original;
+    const { colours, isRead } = this;
+    const isWire = this.shading === "wireframe";
+    part.wire.visible = isWire;
+    // the more edges, the paler each, or they would cover everything
+    part.wire.material.opacity = Math.max(FAINTEST_WIRE, Math.min(1, (3 * DARK_WIRES) / part.faces.length)) * (isRead ? 0.5 : 1);
+    part.wire.material.color.set(isRead ? INK : this.wireColour);
+    part.mesh.geometry = this.isSmooth ? this.smoothed(part) : part.indexed;
+    if (isWire && !isRead) part.mesh.material = this.materials.paper;
+    else if (colours === "error" && !isOriginal) this.dressInErrors(part);
+    else {
+      part.mesh.material = this.material(colours);
+      if (colours === "error") this.paint(part, part.errors);
+      if (colours === "own") this.paint(part, part.own);
+    }
+  }
+
+  dressInErrors(part) {
+    part.mesh.material = this.mapOf(part);
   }
 
   draw() {
-    const renderer = this.renderer;
-    const bright = this.mode === "error" ? 0.72 : 0.3; // colours of the error must be told from the light
-    this.sky.intensity = Math.PI * bright;
-    this.sun.intensity = Math.PI * (this.mode === "error" ? 0.36 : 0.78);
-    const ground = this.mode === "wireframe" ? "wireframe" : "shaded";
+    const { renderer, camera, sun } = this;
+    const lights = LIGHTS[this.isRead ? (this.hillshaded ? "readHillshade" : "read") : this.hillshaded ? "hillshade" : "plain"];
+    this.sky.intensity = Math.PI * lights[0];
+    sun.intensity = Math.PI * lights[1];
+    sun.position.set(...(this.hillshaded ? MAP_LIGHT : VIEWER_LIGHT));
+    const ground = this.shading === "wireframe" && !this.isRead ? "wireframe" : "shaded";
     this.materials.line.color.set(this.lineColours[ground]);
     if (this.open) this.materials.rim.color.set(this.rimColours[ground]);
+    this.clip();
+    const parts = [this.pinned ?? this.original, this.simplified];
+    parts.forEach((part) => part && this.dress(part));
     renderer.setScissorTest(false);
     renderer.clear();
     renderer.setScissorTest(true);
-    [this.original, this.simplified].forEach((part, which) => {
+    parts.forEach((part, which) => {
       if (!part) return;
       const rectangle = this.window(which);
       if (rectangle[2] < 1 || rectangle[3] < 1) return;
       renderer.setViewport(...rectangle);
-      renderer.setScissor(...rectangle);
-      this.camera.aspect = rectangle[2] / rectangle[3];
-      this.camera.updateProjectionMatrix();
-      this.dress(part, which);
+      const [left, bottom, width, height] = rectangle;
+      const split = this.wiped ? Math.round(this.divider * width) : null;
+      if (split === null) renderer.setScissor(...rectangle);
+      else if (which === 0) renderer.setScissor(left, bottom, split, height);
+      else renderer.setScissor(left + split, bottom, width - split, height);
+      camera.aspect = width / height;
+      camera.updateProjectionMatrix();
       part.mesh.scale.z = part.wire.scale.z = this.exaggeration;
-      part.scene.add(this.camera, this.sky);
-      renderer.render(part.scene, this.camera);
-      if (part.rims) this.drawLines(part.rims, rectangle[2], rectangle[3]);
-      if (part.lines && this.linesShown) this.drawLines(part.lines, rectangle[2], rectangle[3]);
+      (this.hillshaded ? part.scene : camera).add(sun, sun.target);
+      part.scene.add(camera, this.sky);
+      renderer.render(part.scene, camera);
+      if (part.rims) this.drawLines(part.rims, width, height);
+      if (part.lines && this.linesShown) this.drawLines(part.lines, width, height);
     });
+    if (renderer instanceof SoftwareRenderer) renderer.flush();
     this.onDraw();
+  }
+
+  get middle() {
+    return this.controls.target;
+  }
+
+  // Pixels of the page to a model unit across the picture, where the camera looks at.
+  get pixelsPerUnit() {
+    const { camera } = this;
+    const distance = camera.position.distanceTo(this.middle);
+    return (this.window(0)[3] * camera.zoom) / (2 * Math.tan((camera.fov * Math.PI) / 360) * distance * this.size);
+  }
+
+  // How far north is turned from upwards in the picture, clockwise.
+  get north() {
+    const arm = this.camera.position.clone().sub(this.middle);
+    return Math.atan2(arm.x, (-arm.y * arm.z) / arm.length());
+  }
+
+  // What the canvas shows now, drawn with so many pixels to one of the page.
+  picture(ratio) {
+    const before = this.renderer.getPixelRatio();
+    const copy = document.createElement("canvas");
+    this.renderer.setPixelRatio(ratio);
+    this.draw();
+    [copy.width, copy.height] = [this.canvas.width, this.canvas.height];
+    copy.getContext("2d").drawImage(this.canvas, 0, 0);
+    this.renderer.setPixelRatio(before);
+    this.draw();
+    return copy;
   }
 }
