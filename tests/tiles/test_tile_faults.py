@@ -73,6 +73,7 @@ def contents(out, *, drawn=True):
     assert set(SAME if drawn else SAME[:-1]) < set(files)
     files.pop("run.json")
     files.pop("report.html", None)  # which names the folder
+    files.pop("quality.html", None)  # which comes with it
     return files
 
 
