@@ -558,8 +558,8 @@ def write_mesh(
         put beside, with a checksum of their content in their names.
     lines : sequence of (m,) int arrays, optional
         Break lines: chains of edges of the mesh, as rows of `vertices`. OBJ has them as its lines ``l``, PLY as its
-        element ``edge`` (``vertex1``, ``vertex2``), LandXML as the ``Breaklines`` of the surface, and others as their files say;
-        those that leave them have no ``holds_lines``.
+        element ``edge`` (``vertex1``, ``vertex2``), LandXML as the ``Breaklines`` of the surface, and others as
+        their files say; those that leave them have no ``holds_lines``.
     line_names : sequence of str, optional
         Of LandXML, GeoPackage and GeoJSON: what each line is called.
 
