@@ -535,8 +535,8 @@ def write_mesh(
     faces : (M, 3) int array
         Triangles.
     attributes : mapping of str to (V,) or (V, k) array, optional
-        ``color`` (uint8, 3 or 4 columns) goes to every format but STL, OFF and LandXML, ``uv`` (V, 2: where on the
-        image of the material each vertex lies) to PLY, OBJ and GLB, anything else to PLY only.
+        What goes to which format its ``keeps`` says. ``color`` has 3 or 4 columns of uint8, ``uv`` (V, 2) is where on
+        the image of the material each vertex lies.
     origin : (3,) floats, optional
         Of GLB: what is subtracted from the coordinates before they lose their double precision. By default the mesh's
         lower corner in round numbers. GLB is Y up and in metres; its one node puts the mesh, by its translation, where
@@ -545,10 +545,11 @@ def write_mesh(
         by this package, it has the coordinates of the file again.
     georeference : mapping, optional
         What is known of the coordinates (see :class:`~meshsimp_pymoo.formats.source.SourceMesh`): PLY says the CRS in a
-        comment, GLB in ``extras``, LandXML as its coordinate system and unit. What its ``unit``, ``height_unit`` and
-        ``scale`` make metres is scaled in GLB; where nothing is known, units are taken for metres, and it says so.
+        comment, GLB in ``extras``, LandXML as its coordinate system and unit, GeoPackage and GeoJSON as the system of
+        their layers, DXF the unit alone. What its ``unit``, ``height_unit`` and ``scale`` make metres is scaled in GLB;
+        where nothing is known, units are taken for metres, and it says so.
     name : str
-        What LandXML calls the surface.
+        What LandXML, 2DM and VTK call the surface.
     up : (3,) floats, optional
         Of GLB: the direction of the height; the axis next to it becomes glTF's Y. By default z. What was read from a
         glTF is written as it lay.
@@ -557,14 +558,17 @@ def write_mesh(
         put beside, with a checksum of their content in their names.
     lines : sequence of (m,) int arrays, optional
         Break lines: chains of edges of the mesh, as rows of `vertices`. OBJ has them as its lines ``l``, PLY as its
-        element ``edge`` (``vertex1``, ``vertex2``), LandXML as the ``Breaklines`` of the surface; others leave them.
+        element ``edge`` (``vertex1``, ``vertex2``), LandXML as the ``Breaklines`` of the surface, and others as
+        their files say; those that leave them have no ``holds_lines``.
     line_names : sequence of str, optional
-        Of LandXML: what each line is called.
+        Of LandXML, GeoPackage and GeoJSON: what each line is called.
 
     Raises
     ------
     ValueError
         If the suffix is not known.
+    ImportError
+        If the library that writes it is missing: :meth:`Format.check` says so before.
     """
     import numpy as np
 
