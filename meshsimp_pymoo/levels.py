@@ -114,7 +114,7 @@ class _Ladder:
         model, largest = self.surface.model, LARGEST[self.surface.view.is_closed]
         crs = model.georeference.get("crs")
         return {
-            "model": model.name,
+            "model": Path(model.name).name,
             "hash": model.hash,
             **{"unit": length_unit(model.georeference)},
             **known_units(model.georeference),

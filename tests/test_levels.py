@@ -156,6 +156,15 @@ def test_a_geometric_error_is_the_largest_of_a_level_and_all_finer_ones(front, t
     assert record["geometric_error"].startswith(LARGEST[False])
 
 
+def test_no_level_is_said_to_be_better_than_a_finer_one(front, tmp_path):
+    odd = front[:]
+    odd.quality = (*front.quality[:-2], dataclasses.replace(front[-2].quality, max_error=1e3), front[-1].quality)
+    for form in ("ply", "3d-tiles"):
+        levels = save_levels(odd, tmp_path / form, list(odd), form=form)["levels"]
+        assert [level["geometric_error"] for level in levels] == [0.0, *([1e3] * (len(odd) - 1))]
+        assert levels[2]["max_error"] == front[-3].max_error < 1e3
+
+
 def test_at_its_screen_height_the_error_of_a_level_is_a_pixel(front, tmp_path):
     record = save_levels(front, tmp_path / "levels.glb")
     diameter = np.linalg.norm(np.ptp(front.model.file_points, axis=0))
