@@ -25,6 +25,7 @@ from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
 from meshsimp_pymoo.formats.earth import LEAST_RADIUS, earth_centred, sagitta
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import format_to_write, read_source, written_formats
 from meshsimp_pymoo.levels import HEIGHT, LARGEST, PIXELS, WIDTH
 from meshsimp_pymoo.storage import COMPRESSION_SHARE
@@ -308,6 +309,24 @@ def test_tiles_are_shown_from_coarse_to_fine_as_the_camera_comes_near(front, tmp
     assert shown == sorted(shown, reverse=True)
     for level, solution in zip(record["levels"], front.levels(), strict=True):
         assert difference(said["corners"][level["file"]], corners_of(solution)) < 1e-4  # of some hundred
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_the_box_of_a_tileset_holds_all_of_a_flat_model(tmp_path, compress):
+    if compress:
+        pytest.importorskip("DracoPy", reason="no DracoPy: pip install DracoPy")
+    front = front_of(grid_source(np.zeros((12, 9)) + 7.0, 0.1, 0.1, name="flat"))
+    record = save_levels(front, tmp_path / "tiles", list(front), form="3d-tiles", compress=compress)
+    root = json.loads((tmp_path / "tiles" / "tileset.json").read_text())["root"]
+    box = np.array(root["boundingVolume"]["box"])
+    half = np.diag(box[3:].reshape(3, 3))
+    assert (half > 0).all()
+    for level in record["levels"]:
+        if compress:
+            assert level["bits"] == 24, "it is exact"
+        else:
+            points = trimesh.load(tmp_path / "tiles" / level["file"], force="mesh", process=False).vertices
+            assert (np.abs(points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] - box[:3]) <= half).all()
 
 
 def test_a_tileset_is_a_chain_that_ends_in_the_finest_level(front, tmp_path):
