@@ -59,6 +59,7 @@ from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
+    LENGTH,
     MAXIMUM,
     MEASURES,
     OF_LINES,
@@ -92,12 +93,15 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+    from meshsimp_pymoo.report.document import Framed
     from meshsimp_pymoo.report.statement import QualityStatement
 
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
+# What a page in a notebook may take, which is saved with it.
+NOTEBOOK_BYTES = 4_000_000
 # What the front that a search started from is called, and how many of its thousands of points are drawn.
 START = "adaptive thinning (start)"
 START_POINTS = 200
@@ -322,7 +326,9 @@ class FrontSolution(_Numbers):
 
         figure = Figure(figsize=(5.0, 4.2), dpi=90, layout="constrained")
         self.plot(figure.subplots()).set_title(
-            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}", fontsize=10
+            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}"
+            + f" {self.front.unit}" * (self.front.unit != LENGTH),
+            fontsize=10,
         )
         return _png(figure)
 
@@ -1158,6 +1164,47 @@ class Front(Sequence[FrontSolution]):
         wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
 
+    def show(self, *, height: int = 1000, limit: int = NOTEBOOK_BYTES) -> Framed:
+        """Return the page of the front for a notebook: every mesh beside the original, to turn, compare and take home.
+
+        It is the page that :meth:`draw` writes, inside the output of the cell: it needs no widget, no kernel once it is
+        there, no file and no network.
+
+        Parameters
+        ----------
+        height : int
+            Of its frame [pixels].
+        limit : int
+            Size that is not exceeded if it can be helped, by leaving out meshes [bytes]; notebooks keep what they show.
+
+        Returns
+        -------
+        Framed
+            What a notebook shows as the last value of a cell.
+
+        Raises
+        ------
+        ResultError
+            If the model of a stored front is not where its record says.
+        """
+        from tempfile import TemporaryDirectory
+
+        from meshsimp_pymoo.report.document import Framed
+        from meshsimp_pymoo.report.page import simplification_page
+
+        with TemporaryDirectory() as unstored:
+            folder = self.folder or self.save(Path(unstored) / "front", meshes=0, pictures=False)
+            content = simplification_page(
+                read_front(folder),
+                self.surface,
+                self.kept,
+                measure=self.objectives[0],
+                folder=None,
+                knee=knee(self.F),
+                limit=limit,
+            )
+        return Framed(content, height)
+
     def stored_mesh(self, solution: int) -> Path | None:
         """Return the file of a solution's mesh in the front's folder; None if it was not written."""
         path = self._meshes[solution]
@@ -1211,7 +1258,9 @@ class Front(Sequence[FrontSolution]):
         shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name in also]
         shown = [name for name in shown if not all(np.isnan(getattr(q, name)) for q in self.quality)]
         names = sorted(shown, key=lambda name: MEASURES[name].is_error)
-        header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
+        unit = "" if self.unit == LENGTH else f" [{html.escape(self.unit)}]"
+        labels = [MEASURES[name].label + unit * MEASURES[name].is_error for name in names]
+        header = "".join(f"<th>{label}</th>" for label in ("solution", *labels))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]

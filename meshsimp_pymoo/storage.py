@@ -81,13 +81,13 @@ from meshsimp_pymoo.formats.table import (
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
 from meshsimp_pymoo.surface.kinds import stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
+from meshsimp_pymoo.surface.measures import COUNTED, LENGTH, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
 from meshsimp_pymoo.surface.smallest import facts_of_lines
 from meshsimp_pymoo.surface.solid import as_solid, check_solid
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
-from meshsimp_pymoo.surface.units import metres_per_model_unit
+from meshsimp_pymoo.surface.units import length_unit, metres_per_model_unit
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
@@ -429,11 +429,13 @@ def write_front(
             arrays_of |= stored_arrays(surface)
         write_npz(partial / "front.npz", F=F[order], **arrays_of)
         shape = getattr(model, "shape", None)  # of a height grid
+        unit = length_unit(model.georeference)
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
                 "file": path_from(target, model.name),
                 "hash": model.hash,
+                **({} if unit == LENGTH else {"unit": unit}),
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
                 "up": surface.view.rotation[2],
@@ -627,9 +629,8 @@ class MeshWriter:
         written = mesh if solid is None else solid
         if not self.compress or self.kind.pack is None:
             return written
-        return self.kind.pack(
-            written, COMPRESSION_SHARE * error * metres_per_model_unit(self.surface.model.georeference)
-        )
+        metres = metres_per_model_unit(self.surface.model.georeference)
+        return self.kind.pack(written, COMPRESSION_SHARE * error * metres)
 
     def warn(self) -> None:
         """Say what is lost by single precision, and what the format does not hold."""
@@ -676,9 +677,8 @@ def write_solution(
     mesh, closed = writer.mesh(faces), None
     if solid is not None:
         check_solid(surface, solid, writer.kind)
-        (vertices, triangles, attributes), _ = _closed(
-            surface, faces, (mesh.vertices, mesh.faces, mesh.attributes), solid
-        )
+        own = mesh.vertices, mesh.faces, mesh.attributes
+        (vertices, triangles, attributes), _ = _closed(surface, faces, own, solid)
         closed = replace(mesh, vertices=vertices, faces=triangles, attributes=attributes)
     written = writer.write(path, mesh, compressed_by or 0.0, closed)
     writer.warn()

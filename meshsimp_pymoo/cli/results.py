@@ -197,7 +197,7 @@ def _tell(front: Front, output: Output, wish: Wish) -> None:
     if front.has_lines:
         tell(f"break lines: {lines_in_words(run['model']['lines'], unit)}")
     if run.get("wish"):
-        tell(f"searched: around {in_words(run['wish'])}; the rest of the front is what came along")
+        tell(f"searched: around {in_words(run['wish'], unit)}; the rest of the front is what came along")
     if chosen is not None:
         path = _chosen_path(output)
         which = f"solution {chosen}{', free' * front[chosen].free}"

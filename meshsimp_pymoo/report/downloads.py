@@ -94,9 +94,9 @@ def downloads(surface: Surface, points: FloatArray, faces: IntArray, line_names:
             frame = shared_frame(
                 kind, model.file_box, name=model.name, georeference=model.georeference, up=surface.view.rotation[2]
             )
-            lines = {"lines": tuple(TRIANGLE[0, :2] for _ in line_names), "line_names": tuple(line_names)}
-            content = _written(kind, OutMesh(corners, TRIANGLE, attributes, **frame, **lines))
-            found.templates[suffix] = TEMPLATES[name](content)
+            lines = tuple(TRIANGLE[0, :2] for _ in line_names)
+            mesh = OutMesh(corners, TRIANGLE, attributes, **frame, lines=lines, line_names=tuple(line_names))
+            found.templates[suffix] = TEMPLATES[name](_written(kind, mesh))
     return found
 
 

@@ -43,8 +43,8 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "painter.js", "viewer.js", "body.js",
-    "windows.js", "simplification.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "painter.js", "viewer.js",
+    "body.js", "windows.js", "simplification.js",
 )  # fmt: skip
 # Where closed meshes are shown.
 OF_BODIES = "body.js"
@@ -111,7 +111,7 @@ def simplification_page(
     kept: BoolArray | Chromosomes,
     *,
     measure: str,
-    folder: str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None,
     knee: int,
     limit: int = PAGE_BYTES,
 ) -> str:
@@ -128,8 +128,9 @@ def simplification_page(
         The solutions, in vector order.
     measure : str
         What was minimised beside the triangles.
-    folder : path
-        The folder of the front, as a shell command shall name it.
+    folder : path or None
+        The folder of the front, as a shell command shall name it; None: the page is in a notebook, where Python
+        writes the meshes.
     knee : int
         The row of the best compromise.
     limit : int
@@ -165,17 +166,17 @@ def simplification_page(
     # what is not known is null
     columns = {name: [None if np.isnan(one) else one for one in found.tolist()] for name, found in numbers.items()}
     paint = model.attributes["color"][held.vertices] if "color" in model.attributes else None
-    points = model.file_points[held.vertices].astype(np.float64)
-    files = downloads(surface, points, held.faces, held.line_names)
     ramps = {"error": magma()} if view.is_closed else {"height": hypsometric(), "error": magma()}
     colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
     own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
+    points = model.file_points[held.vertices].astype(np.float64)
+    files = downloads(surface, points, held.faces, held.line_names)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
-        "folder": printable(as_argument(folder)),
+        "folder": None if folder is None else printable(as_argument(folder)),
         "closed": _closed_look(surface) if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [
@@ -224,7 +225,11 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing), *([word] if word else [])],
+        thinned=[
+            *_what_was_searched(front.run, unit),
+            *_what_is_thinned(model, held, missing),
+            *([word] if word else []),
+        ],
         heights=None if view.is_closed else _heights(view.exaggeration),
         colours={name: COLOURS[name] for name in colours},
         own_colours=own,
@@ -235,6 +240,7 @@ def simplification_page(
             "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
         },
         painted=paint is not None,
+        is_stored=folder is not None,
         files=files.titles,
         refused=printable(" ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused)),
         covering=has_border,
@@ -246,7 +252,7 @@ def simplification_page(
         unit_sign="" if unit == LENGTH else unit,
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
-        quality=STATEMENT[1] if (front.folder / STATEMENT[1]).is_file() else "",
+        quality=STATEMENT[1] if folder is not None and (front.folder / STATEMENT[1]).is_file() else "",
     )
 
 
@@ -436,11 +442,11 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     return files
 
 
-def _what_was_searched(run: Mapping[str, Any]) -> Iterator[str]:
+def _what_was_searched(run: Mapping[str, Any], unit: str) -> Iterator[str]:
     if run.get("wish"):
         yield (
-            f"What was searched is the mesh with {in_words(run['wish'])}. The others came along: a search for the "
-            "whole front would find better ones far from it."
+            f"What was searched is the mesh with {in_words(run['wish'], unit)}. The others came along: a search for "
+            "the whole front would find better ones far from it."
         )
 
 

@@ -2,8 +2,9 @@
 
 The surface stays as it is. Under each side of its outline stands a wall of two triangles; the base is the constrained
 Delaunay triangulation of the outline's vertices, within the outline, which takes far fewer triangles than the surface
-again. Where parts of the outline touch in a vertex, that vertex is there once for each part: every edge is in two
-triangles, one each way.
+again. Where parts of the outline touch in a vertex, that vertex is there once for each part, and these are drawn apart
+by a millionth of the mesh: every edge is in two triangles, one each way, also of a file such as STL, whose readers join
+what is at one place.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.workers import Reserve
 
+# By how much parts are drawn apart, as a share of the diagonal: some eight steps of single precision.
+APART = 2.0**-20
+
 
 class Solid(NamedTuple):
     """A closed mesh, its triangles counter-clockwise as seen from outside.
@@ -40,17 +44,22 @@ class Solid(NamedTuple):
         Which vertex of the surface each one is, or stands below.
     volume : float
         What it encloses [file units cubed].
+    parted : int
+        How many of its vertices above are further ones where the outline touches itself; they, and those below, are by
+        APART times the diagonal off their place.
     """
 
     vertices: FloatArray
     faces: IntArray
     source: IntArray
     volume: float
+    parted: int
 
     @property
     def numbers(self) -> dict[str, Any]:
         """How large it is."""
-        return {"triangles": len(self.faces), "vertices": len(self.vertices), "volume": self.volume}
+        parted = {"parted": self.parted} if self.parted else {}
+        return {"triangles": len(self.faces), "vertices": len(self.vertices), "volume": self.volume} | parted
 
 
 def check_solid(surface: Surface, thickness: float, kind: Format | None = None) -> None:
@@ -134,13 +143,19 @@ def as_solid(surface: Surface, faces: IntArray, thickness: float, vertices: Floa
     walls = np.concatenate([np.column_stack([b, a, before[first_step]]), np.column_stack([b[owner], before, after])])
     below = n_upper + lower.reshape(-1, 3)[base.inside]
 
-    up = surface.view.rotation[2]
+    up, shift = surface.view.rotation[2], np.zeros((n_upper + len(lower_source), 3))
+    for k in range(len(rows), n_upper):
+        middle = top[compact[np.flatnonzero(corner == k) // 3]].mean(axis=(0, 1)) - top[upper_source[k]]
+        inwards = middle - (middle @ up) * up
+        shift[k] = APART * np.linalg.norm(np.ptp(top, axis=0)) / np.linalg.norm(inwards) * inwards
+    shift[before[first_step]] = shift[a]
     bottom = _flattened(top[lower_source], up, float((top @ up).min()) - thickness)
-    solid_vertices = np.concatenate([top[upper_source], bottom])
+    solid_vertices = np.concatenate([top[upper_source], bottom]) + shift
     solid_faces = np.concatenate([corner.reshape(-1, 3), walls, below[:, ::-1]])
     corners = (solid_vertices - solid_vertices[-1])[solid_faces]
     volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0)
-    return Solid(solid_vertices, solid_faces, np.concatenate([upper_source, lower_source]), volume)
+    source = np.concatenate([upper_source, lower_source])
+    return Solid(solid_vertices, solid_faces, source, volume, n_upper - len(rows))
 
 
 class _Sides(NamedTuple):

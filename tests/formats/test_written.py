@@ -167,12 +167,21 @@ def test_a_geopackage_has_a_layer_of_lines_with_their_names_in_the_same_system(t
 
 def test_a_system_that_gdal_does_not_know_is_left_out_and_said(tmp_path):
     pyogrio = pytest.importorskip("pyogrio")
-    before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
     with pytest.warns(ModelWarning, match=r"a\.gpkg: holds no reference system, as GDAL does not know it \(.*a & b"):
         path = written(tmp_path, ".gpkg", georeference={"crs": 'PROJCS["a & b"]'})
     assert pyogrio.read_info(path, layer="tin")["crs"] is None
     assert pyogrio.read_info(path, layer="break_lines")["features"] == 2
-    assert pyogrio.get_gdal_config_option("OGR_CURRENT_DATE") == before
+
+
+@pytest.mark.parametrize("date", [None, "2001-02-03T04:05:06Z"])
+def test_the_date_that_a_user_told_gdal_stays(tmp_path, date):
+    pyogrio = pytest.importorskip("pyogrio")
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": date})
+    try:
+        written(tmp_path, ".gpkg")
+        assert pyogrio.get_gdal_config_option("OGR_CURRENT_DATE") == date
+    finally:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": None})
 
 
 def test_a_system_of_text_alone_is_written_to_a_geopackage(tmp_path):

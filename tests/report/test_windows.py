@@ -41,9 +41,9 @@ RED, GREEN, BLUE, GREY = [220, 30, 30], [30, 190, 30], [30, 60, 220], [120, 120,
 
 @pytest.fixture(scope="module")
 def front(tmp_path_factory):
-    """A front with its page, of terrain with an image on it, north-west red, north-east green, south-west blue."""
+    """A front with its page, of terrain with an image on it whose first axis goes to the north, its second one east."""
     points, faces, _ = relief(SIDE, np.random.default_rng(3))
-    uv = (points[:, :2] - points[:, :2].min(axis=0)) / np.ptp(points[:, :2], axis=0)
+    uv = ((points[:, :2] - points[:, :2].min(axis=0)) / np.ptp(points[:, :2], axis=0))[:, ::-1]
     facts = {"epsg": 32633, "unit": "metre"}
     points = points + np.array([4e5, 5e6, 700])
     source = build_source(points, faces, name="hill.obj", attributes={"uv": uv}, georeference=facts)
@@ -190,7 +190,7 @@ def test_terrain_whose_system_is_known_opens_with_its_hillshade_and_its_image(pa
     for window in pixels(page):
         height, width, _ = window.shape
         quarters = [window[height // 2 + y, width // 2 + x] for y in (-30, 30) for x in (-30, 30)]
-        for seen, painted in zip(quarters, (RED, GREEN, BLUE, GREY), strict=True):
+        for seen, painted in zip(quarters, (GREY, GREEN, BLUE, RED), strict=True):
             shade = seen.max() / max(painted)
             np.testing.assert_allclose(seen, np.array(painted) * shade, atol=16)
 
@@ -418,6 +418,9 @@ def test_a_graphics_card_that_fails_is_said_and_comes_back(browser, front):
         page.evaluate("lost.restoreContext()")
         until(page, "document.getElementById('no-3d').hidden")
         assert max(unlike(*pair) for pair in zip(pixels(page), before, strict=True)) < 0.01
+        page.locator("#slider").fill("0")
+        assert shown(page) == 0
+        assert unlike(pixels(page)[1], before[1]) > 0.02
     finally:
         visit.close()
 

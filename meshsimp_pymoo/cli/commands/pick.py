@@ -159,7 +159,7 @@ def _how_far(front: Front, folder: str, model: str | None, solution: FrontSoluti
     is_whole = solution.quality.vertices == front.run["model"].get("vertices")
     if own in searched or (not is_whole and any(near <= FAR * own <= FAR**2 * near for near in searched)):
         return ""
-    around = f"{folder} was searched around {in_words(limits)}"
+    around = f"{folder} was searched around {in_words(limits, front.unit)}"
     said = f"this is the original itself; {around}" if is_whole else f"{around}; far from it the meshes are poor"
     if is_whole and not wish.spelled:
         return said

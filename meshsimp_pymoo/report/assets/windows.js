@@ -320,7 +320,6 @@ async function openViewer() {
   canvas.addEventListener("webglcontextrestored", () => {
     state.viewer = viewer;
     withoutWebgl(null);
-    viewer.restore();
     showMesh();
   });
   steerLook(viewer);
