@@ -574,3 +574,33 @@ def test_pick_compresses_a_glb_and_says_by_how_much(folder, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["moved_by_at_most_m"] > 0.0
     assert run("pick", folder, "--triangles", 100, "--compress") == 2
     assert "name its file" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("draco")
+def test_levels_of_a_mountain_are_where_it_stands_in_every_program(shared_data, tmp_path):
+    warp = pytest.importorskip("rasterio.warp", reason="no rasterio: pip install rasterio")
+    source = grid_source(np.load(shared_data / "dem_sthelens.npz")["elevation"], 30.0, 30.0, name="sthelens")
+    points = source.points + np.array([558_000.0, 5_107_000.0, 0.0])
+    source = dataclasses.replace(source, points=points, georeference={"epsg": 32610, "unit": "metre"})
+    front = front_of(source)[:-2]
+    levels = front.levels()
+    assert levels[0].triangles > 50_000
+    save_levels(front, tmp_path / "levels.glb", levels)
+    found = json.loads(run_script("babylon.mjs", tmp_path / "levels.glb", str(len(levels)), needs=BABYLON))
+    for level, solution in zip(found[::-1], levels, strict=True):
+        assert difference(level["corners"], y_up(corners_of(solution))) < 1e-3
+    record = save_levels(front, tmp_path / "tiles", levels, form="3d-tiles")
+    views = [f"{times * record['diameter']:.0f}" for times in (400, 4, 1, 0.25, 0.05)]
+    said = json.loads(run_script("tiled.mjs", tmp_path / "tiles" / "tileset.json", *views, needs=TILES))
+    for level, solution in zip(record["levels"], levels, strict=True):
+        corners = corners_of(solution).reshape(-1, 3)
+        x, y = warp.transform("EPSG:32610", "EPSG:4326", *corners[:, :2].T.tolist())
+        expected = warp.transform("EPSG:4979", "EPSG:4978", x, y, corners[:, 2].tolist())
+        assert difference(said["corners"][level["file"]], np.column_stack(expected)) < 1e-3
+    packed = save_levels(front, tmp_path / "packed", levels, form="glb", compress=True)["levels"]
+    unpacked = json.loads(run_script("unpacked.mjs", *(tmp_path / "packed" / p["file"] for p in packed), needs=DRACO))
+    for level, (mesh,), solution in zip(packed, unpacked, levels, strict=True):
+        off = difference_in_any_order(mesh["position"], y_up(corners_of(solution)))
+        assert off <= level["moved_by_at_most_m"] * (1 + 1e-6)
+        assert off <= COMPRESSION_SHARE * solution.mean_error
