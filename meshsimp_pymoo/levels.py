@@ -45,6 +45,8 @@ GLB = "glb"
 RECORD = "levels.json"
 # The viewing rule: a level is shown while its geometric error is at most so many pixels of such a screen.
 WIDTH, HEIGHT, PIXELS = 1920, 1080, 1.0
+# By what share of its width the box around tiles is larger than they are: for single precision, and for what is flat.
+ROUNDING = 1e-6
 # What of a level's numbers is said.
 SAID = ("triangles", "vertices", "mean_error", "rms_error", "max_error", "uncovered")
 LARGEST = {
@@ -114,7 +116,7 @@ class _Ladder:
         model, largest = self.surface.model, LARGEST[self.surface.view.is_closed]
         crs = model.georeference.get("crs")
         return {
-            "model": model.name,
+            "model": Path(model.name).name,
             "hash": model.hash,
             **{"unit": length_unit(model.georeference)},
             **known_units(model.georeference),
@@ -284,7 +286,6 @@ def _write_tiles(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict
         points, at = _in_tile(mesh, place)
         below = 0.0 if place is None else sagitta(points, mesh.faces)
         errors.append(max([level.error * metres + below, *errors[-1:]]))
-        corners += [points.min(axis=0), points.max(axis=0)]
         file = f"level-{k}{writer.kind.suffix}"
         numbers = ladder.said(k) | {"below_the_bent_earth_m": below, "tile_error_m": errors[-1]}
         tile = replace(
@@ -297,6 +298,8 @@ def _write_tiles(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict
             shaded=True,
         )
         written = writer.write(folder / file, tile, level.quality.mean_error)
+        off = ROUNDING * float(np.ptp(points, axis=0).max()) + (0.0 if written.packed is None else written.packed.shift)
+        corners += [points.min(axis=0) - off, points.max(axis=0) + off]
         said.append({"file": file} | numbers | _packing(written))
     where: dict[str, Any] = {"system": None}
     if place is not None:

@@ -25,6 +25,7 @@ from meshsimp_pymoo.errors import ModelError, ModelWarning, ResultError
 from meshsimp_pymoo.formats.earth import LEAST_RADIUS, earth_centred, sagitta
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.outmesh import OutMesh
+from meshsimp_pymoo.formats.source.heights import grid_source
 from meshsimp_pymoo.formats.table import format_to_write, read_source, written_formats
 from meshsimp_pymoo.levels import HEIGHT, LARGEST, PIXELS, WIDTH
 from meshsimp_pymoo.storage import COMPRESSION_SHARE
@@ -154,6 +155,15 @@ def test_a_geometric_error_is_the_largest_of_a_level_and_all_finer_ones(front, t
         assert level["geometric_error"] == max(front[-1 - j].max_error for j in range(k + 1))
         assert level["max_error"] == front[-1 - k].max_error
     assert record["geometric_error"].startswith(LARGEST[False])
+
+
+def test_no_level_is_said_to_be_better_than_a_finer_one(front, tmp_path):
+    odd = front[:]
+    odd.quality = (*front.quality[:-2], dataclasses.replace(front[-2].quality, max_error=1e3), front[-1].quality)
+    for form in ("ply", "3d-tiles"):
+        levels = save_levels(odd, tmp_path / form, list(odd), form=form)["levels"]
+        assert [level["geometric_error"] for level in levels] == [0.0, *([1e3] * (len(odd) - 1))]
+        assert levels[2]["max_error"] == front[-3].max_error < 1e3
 
 
 def test_at_its_screen_height_the_error_of_a_level_is_a_pixel(front, tmp_path):
@@ -299,6 +309,24 @@ def test_tiles_are_shown_from_coarse_to_fine_as_the_camera_comes_near(front, tmp
     assert shown == sorted(shown, reverse=True)
     for level, solution in zip(record["levels"], front.levels(), strict=True):
         assert difference(said["corners"][level["file"]], corners_of(solution)) < 1e-4  # of some hundred
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_the_box_of_a_tileset_holds_all_of_a_flat_model(tmp_path, compress):
+    if compress:
+        pytest.importorskip("DracoPy", reason="no DracoPy: pip install DracoPy")
+    front = front_of(grid_source(np.zeros((12, 9)) + 7.0, 0.1, 0.1, name="flat"))
+    record = save_levels(front, tmp_path / "tiles", list(front), form="3d-tiles", compress=compress)
+    root = json.loads((tmp_path / "tiles" / "tileset.json").read_text())["root"]
+    box = np.array(root["boundingVolume"]["box"])
+    half = np.diag(box[3:].reshape(3, 3))
+    assert (half > 0).all()
+    for level in record["levels"]:
+        if compress:
+            assert level["bits"] == 24, "it is exact"
+        else:
+            points = trimesh.load(tmp_path / "tiles" / level["file"], force="mesh", process=False).vertices
+            assert (np.abs(points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] - box[:3]) <= half).all()
 
 
 def test_a_tileset_is_a_chain_that_ends_in_the_finest_level(front, tmp_path):
@@ -546,3 +574,33 @@ def test_pick_compresses_a_glb_and_says_by_how_much(folder, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["moved_by_at_most_m"] > 0.0
     assert run("pick", folder, "--triangles", 100, "--compress") == 2
     assert "name its file" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("draco")
+def test_levels_of_a_mountain_are_where_it_stands_in_every_program(shared_data, tmp_path):
+    warp = pytest.importorskip("rasterio.warp", reason="no rasterio: pip install rasterio")
+    source = grid_source(np.load(shared_data / "dem_sthelens.npz")["elevation"], 30.0, 30.0, name="sthelens")
+    points = source.points + np.array([558_000.0, 5_107_000.0, 0.0])
+    source = dataclasses.replace(source, points=points, georeference={"epsg": 32610, "unit": "metre"})
+    front = front_of(source)[:-2]
+    levels = front.levels()
+    assert levels[0].triangles > 50_000
+    save_levels(front, tmp_path / "levels.glb", levels)
+    found = json.loads(run_script("babylon.mjs", tmp_path / "levels.glb", str(len(levels)), needs=BABYLON))
+    for level, solution in zip(found[::-1], levels, strict=True):
+        assert difference(level["corners"], y_up(corners_of(solution))) < 1e-3
+    record = save_levels(front, tmp_path / "tiles", levels, form="3d-tiles")
+    views = [f"{times * record['diameter']:.0f}" for times in (400, 4, 1, 0.25, 0.05)]
+    said = json.loads(run_script("tiled.mjs", tmp_path / "tiles" / "tileset.json", *views, needs=TILES))
+    for level, solution in zip(record["levels"], levels, strict=True):
+        corners = corners_of(solution).reshape(-1, 3)
+        x, y = warp.transform("EPSG:32610", "EPSG:4326", *corners[:, :2].T.tolist())
+        expected = warp.transform("EPSG:4979", "EPSG:4978", x, y, corners[:, 2].tolist())
+        assert difference(said["corners"][level["file"]], np.column_stack(expected)) < 1e-3
+    packed = save_levels(front, tmp_path / "packed", levels, form="glb", compress=True)["levels"]
+    unpacked = json.loads(run_script("unpacked.mjs", *(tmp_path / "packed" / p["file"] for p in packed), needs=DRACO))
+    for level, (mesh,), solution in zip(packed, unpacked, levels, strict=True):
+        off = difference_in_any_order(mesh["position"], y_up(corners_of(solution)))
+        assert off <= level["moved_by_at_most_m"] * (1 + 1e-6)
+        assert off <= COMPRESSION_SHARE * solution.mean_error
