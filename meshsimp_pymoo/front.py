@@ -19,8 +19,8 @@ import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from functools import cached_property
-from pathlib import Path
+from functools import cache, cached_property
+from pathlib import Path, PurePath
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
@@ -48,6 +48,7 @@ from meshsimp_pymoo.settings import plain, read_back
 from meshsimp_pymoo.storage import (
     MESHES_BY_DEFAULT,
     PICTURES,
+    STATEMENT,
     even_selection,
     read_front,
     write_front,
@@ -58,6 +59,7 @@ from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
+    LENGTH,
     MAXIMUM,
     MEASURES,
     OF_LINES,
@@ -72,6 +74,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
+from meshsimp_pymoo.surface.solid import Solid, as_solid
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
     Refitted,
@@ -90,12 +93,15 @@ if TYPE_CHECKING:
     import trimesh
     from matplotlib.axes import Axes
 
+    from meshsimp_pymoo.report.document import Framed
     from meshsimp_pymoo.report.statement import QualityStatement
 
 __all__ = ["Front", "FrontSolution", "simplify_to", "starting_front"]
 
 # Rows of the table that a notebook shows.
 SHOWN_ROWS = 12
+# What a page in a notebook may take, which is saved with it.
+NOTEBOOK_BYTES = 4_000_000
 # What the front that a search started from is called, and how many of its thousands of points are drawn.
 START = "adaptive thinning (start)"
 START_POINTS = 200
@@ -104,6 +110,9 @@ HALVED = 0.01
 # A level of detail has at most so much fewer triangles than the finer one before it; fewer than so many make none: to
 # draw them takes no less time.
 LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
+# Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
+# largest nothing is said: these take seconds for each million vertices.
+SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -177,6 +186,15 @@ class FrontSolution(_Numbers):
 
         return stated(self._compared(refitted=refitted), mesh=self._called(refitted=refitted))
 
+    def _quick_statement(self) -> QualityStatement:
+        """Return the statement of the mesh without what would take more than some seconds, of which it says so."""
+        from meshsimp_pymoo.report.statement import stated
+
+        if self.front.surface.n_vertices <= SPACE_VERTICES:
+            return self.accuracy()
+        left_out = "Distances in space are left out here, so that nobody had to wait; meshsimp quality takes them."
+        return stated(self._compared(), mesh=self._called(), space_samples=0, left_out=(left_out,))
+
     def _compared(self, *, refitted: bool = False) -> Compared:
         """Return the mesh beside its original; that of tiles is not held at once."""
         surface = self.front.surface
@@ -186,8 +204,7 @@ class FrontSolution(_Numbers):
 
     def _called(self, *, refitted: bool = False) -> dict[str, Any]:
         """Return what a statement of quality calls the mesh."""
-        stored = self.front.folder is not None and self.solution < len(self.front)
-        name = f"solution {self.solution}" + f" of {self.front.folder}" * stored
+        name = f"{PurePath(self.front.name).name}, solution {self.solution}"
         return {"name": name, "solution": self.solution, "free": self.free, "refitted": refitted}
 
     @property
@@ -216,27 +233,40 @@ class FrontSolution(_Numbers):
         """The simplified mesh in the frame of the model's file, with its colours and attributes."""
         return mesh_of(self.front.surface, self.faces)
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
         A mesh that the front's folder holds in this format is copied, unless it names files beside it.
 
+        Parameters
+        ----------
+        path : path
+            The file.
+        overwrite : bool
+            Replace a file that exists.
+        solid : float, optional
+            Close the mesh of a height surface for printing: by walls along its outline and holes, and a flat base so
+            far below its lowest point [file units].
+
         Raises
         ------
         ResultError
-            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
+            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, it cannot be written, or
+            the surface cannot be made solid: it is closed already, or its coordinates are no lengths.
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         suffix = path.suffix.lower()
-        stored = self.front.stored_mesh(self.solution)
+        stored = self.front.stored_mesh(self.solution) if solid is None else None
         with new_file(path) as unfinished:
             if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.surface, self.faces)
+                write_solution(unfinished, self.front.surface, self.faces, solid=solid)
         return path
 
-    def save_compressed(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> float:
+    def save_compressed(
+        self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None
+    ) -> float:
         """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
 
         That is no more than a twentieth of its mean error, as far as single precision lets it.
@@ -248,9 +278,23 @@ class FrontSolution(_Numbers):
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         with new_file(path) as unfinished:
-            written = write_solution(unfinished, self.front.surface, self.faces, compressed_by=self.mean_error)
+            written = write_solution(
+                unfinished, self.front.surface, self.faces, solid=solid, compressed_by=self.mean_error
+            )
         assert written.packed is not None
         return written.packed.shift
+
+    def solid(self, thickness: float) -> Solid:
+        """Return the mesh closed by walls and a flat base, so far below its lowest point [file units].
+
+        See :mod:`meshsimp_pymoo.surface.solid`.
+
+        Raises
+        ------
+        ResultError
+            If the surface is closed already, or its coordinates are no lengths.
+        """
+        return as_solid(self.front.surface, self.faces, thickness)
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
@@ -282,7 +326,9 @@ class FrontSolution(_Numbers):
 
         figure = Figure(figsize=(5.0, 4.2), dpi=90, layout="constrained")
         self.plot(figure.subplots()).set_title(
-            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}", fontsize=10
+            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}"
+            + f" {self.front.unit}" * (self.front.unit != LENGTH),
+            fontsize=10,
         )
         return _png(figure)
 
@@ -985,6 +1031,7 @@ class Front(Sequence[FrontSolution]):
         chosen: int | FrontSolution | None = None,
         piece: int | None = None,
         refit: bool | Mapping[int, Refitted] = False,
+        solid: float | None = None,
         pictures: bool = True,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
@@ -1010,6 +1057,9 @@ class Front(Sequence[FrontSolution]):
             Write each of the meshes once more refitted, and their error to ``front.csv``: with its best heights, see
             :func:`~meshsimp_pymoo.surface.height.refit_heights`, or of a closed surface its best vertices. Or only
             those of these solutions, found already.
+        solid : float, optional
+            Close the chosen mesh for printing, by walls and a flat base so far below its lowest point [file units]; all
+            other meshes stay surfaces.
         pictures : bool
             Go on to :meth:`draw`, once all else is in place.
         page : bool
@@ -1046,6 +1096,7 @@ class Front(Sequence[FrontSolution]):
             chosen=row,
             cut=None if piece is None else lambda faces: pieces(self.model, faces, piece),
             refit=fitted if refit is not False else None,
+            solid=solid,
             series=self.series,
             run=record,
             overwrite=overwrite,
@@ -1057,6 +1108,8 @@ class Front(Sequence[FrontSolution]):
 
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
         """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
+
+        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one.
 
         Parameters
         ----------
@@ -1102,9 +1155,55 @@ class Front(Sequence[FrontSolution]):
             )
             path.write_bytes(content.encode("utf-8"))
 
-        drawings = dict(zip(PICTURES, (draw_front, draw_page), strict=True))
-        wanted = PICTURES if page else PICTURES[:1]
+        drawings: dict[str, Callable[[Path], object]] = {PICTURES[0]: draw_front}
+        if chosen is not None and surface.n_vertices <= STATED_VERTICES:
+            statement = cache(self[chosen]._quick_statement)
+            write = (lambda path: statement().write_data(path), lambda path: statement().write_page(path))
+            drawings |= zip(STATEMENT, write, strict=True)
+        drawings[PICTURES[1]] = draw_page  # which links to the others
+        wanted = [name for name in drawings if page or name not in (PICTURES[1], STATEMENT[1])]
         draw_into(stored, {name: drawings[name] for name in wanted if not (missing and (stored / name).is_file())})
+
+    def show(self, *, height: int = 1000, limit: int = NOTEBOOK_BYTES) -> Framed:
+        """Return the page of the front for a notebook: every mesh beside the original, to turn, compare and take home.
+
+        It is the page that :meth:`draw` writes, inside the output of the cell: it needs no widget, no kernel once it is
+        there, no file and no network.
+
+        Parameters
+        ----------
+        height : int
+            Of its frame [pixels].
+        limit : int
+            Size that is not exceeded if it can be helped, by leaving out meshes [bytes]; notebooks keep what they show.
+
+        Returns
+        -------
+        Framed
+            What a notebook shows as the last value of a cell.
+
+        Raises
+        ------
+        ResultError
+            If the model of a stored front is not where its record says.
+        """
+        from tempfile import TemporaryDirectory
+
+        from meshsimp_pymoo.report.document import Framed
+        from meshsimp_pymoo.report.page import simplification_page
+
+        with TemporaryDirectory() as unstored:
+            folder = self.folder or self.save(Path(unstored) / "front", meshes=0, pictures=False)
+            content = simplification_page(
+                read_front(folder),
+                self.surface,
+                self.kept,
+                measure=self.objectives[0],
+                folder=None,
+                knee=knee(self.F),
+                limit=limit,
+            )
+        return Framed(content, height)
 
     def stored_mesh(self, solution: int) -> Path | None:
         """Return the file of a solution's mesh in the front's folder; None if it was not written."""
@@ -1159,7 +1258,9 @@ class Front(Sequence[FrontSolution]):
         shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name in also]
         shown = [name for name in shown if not all(np.isnan(getattr(q, name)) for q in self.quality)]
         names = sorted(shown, key=lambda name: MEASURES[name].is_error)
-        header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
+        unit = "" if self.unit == LENGTH else f" [{html.escape(self.unit)}]"
+        labels = [MEASURES[name].label + unit * MEASURES[name].is_error for name in names]
+        header = "".join(f"<th>{label}</th>" for label in ("solution", *labels))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]

@@ -10,9 +10,9 @@ import pytest
 from browser import launched, playwright_engine
 from counts import SLOW
 from hypothesis import settings
-from sketching import sketch, sketch_into
+from sketching import sketch, sketch_into, sketch_pictures
 
-from meshsimp_pymoo.report import figures
+from meshsimp_pymoo.report import figures, statement_figures
 from meshsimp_pymoo.warming import PARTS, SEARCH, Warming
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -67,9 +67,14 @@ def sketched():
     """Let the commands of a module draw sketches, a tenth of the work, but for tests that ask for `drawn`."""
     from meshsimp_pymoo.comparison import report
 
-    pictures = [(figures, "front_figure", figures.front_figure), (report, "_save", report._save)]
+    pictures = [
+        (figures, "front_figure", figures.front_figure),
+        (statement_figures, "pictures", statement_figures.pictures),
+        (report, "_save", report._save),
+    ]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "front_figure", sketch)
+        patch.setattr(statement_figures, "pictures", sketch_pictures)
         patch.setattr(report, "_save", sketch_into)
         yield pictures
 

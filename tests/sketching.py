@@ -25,3 +25,8 @@ def sketch_into(draw: Any, path: Path) -> None:
     figure = Figure(figsize=(1, 1), dpi=32)
     figure.text(0.0, 0.5, path.name.lstrip(".").partition(".")[0])  # while it is made, the file has a mark of its own
     figure.savefig(path)
+
+
+def sketch_pictures(compared: Any, numbers: Any) -> dict[str, str]:
+    """Return addresses of nothing for the pictures of a statement of quality."""
+    return dict.fromkeys(("map", "spread", "angles"), "data:,")

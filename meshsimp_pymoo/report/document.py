@@ -10,8 +10,10 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
+import html
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,8 +22,9 @@ import numpy as np
 import numpy.typing as npt
 
 from meshsimp_pymoo.errors import printable
+from meshsimp_pymoo.reprs import brief
 
-__all__ = ["embedded_array", "embedded_faces", "html_document"]
+__all__ = ["Framed", "embedded_array", "embedded_faces", "html_document"]
 
 ASSETS = Path(__file__).with_name("assets")
 COMPRESSION = 9
@@ -69,6 +72,30 @@ def html_document(template: str, scripts: Sequence[str], data: Any, **values: An
         data=Markup(_json(data)),
         **values,
     )
+
+
+@brief
+@dataclass(frozen=True)
+class Framed:
+    """A page as notebooks show it: in a frame of its own, so that neither meets the other's styles and scripts.
+
+    Attributes
+    ----------
+    page : str
+        The HTML of it.
+    height : int
+        Of the frame [pixels].
+    """
+
+    page: str
+    height: int
+
+    def _repr_html_(self) -> str:
+        # the document is an attribute: VS Code shows no frame of a file, and a copy of the notebook shows the same
+        return (
+            f'<iframe srcdoc="{html.escape(self.page)}" style="width: 100%; height: {self.height}px; border: 0" '
+            'title="page of meshsimp_pymoo" allow="clipboard-write; fullscreen" allowfullscreen></iframe>'
+        )
 
 
 def embedded_array(values: npt.NDArray[Any]) -> dict[str, str]:

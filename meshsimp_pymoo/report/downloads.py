@@ -1,4 +1,4 @@
-"""The files that a page makes of its meshes: what the package writes of one triangle, for the page to put the others in.
+"""The files that a page makes of its meshes: what the package writes of one triangle, in which the page puts others.
 
 So the page knows of a format only where the numbers stand; reference system, unit, local origin, axes and names are
 said in the package's own words.
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, shared_frame, written_formats
@@ -94,9 +94,9 @@ def downloads(surface: Surface, points: FloatArray, faces: IntArray, line_names:
             frame = shared_frame(
                 kind, model.file_box, name=model.name, georeference=model.georeference, up=surface.view.rotation[2]
             )
-            lines = {"lines": tuple(TRIANGLE[0, :2] for _ in line_names), "line_names": tuple(line_names)}
-            content = _written(kind, OutMesh(corners, TRIANGLE, attributes, **frame, **lines))
-            found.templates[suffix] = TEMPLATES[name](content)
+            lines = tuple(TRIANGLE[0, :2] for _ in line_names)
+            mesh = OutMesh(corners, TRIANGLE, attributes, **frame, lines=lines, line_names=tuple(line_names))
+            found.templates[suffix] = TEMPLATES[name](_written(kind, mesh))
     return found
 
 

@@ -28,7 +28,7 @@ from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, origina
 from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.settings import settings_of
-from meshsimp_pymoo.storage import StoredFront
+from meshsimp_pymoo.storage import STATEMENT, StoredFront
 from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Measure
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
@@ -43,8 +43,8 @@ __all__ = ["PAGE_BYTES", "simplification_page"]
 
 
 SCRIPTS = (
-    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "viewer.js", "body.js",
-    "windows.js", "simplification.js",
+    "vendor/three.min.js", "vendor/d3.min.js", "codec.js", "meshfile.js", "chart.js", "painter.js", "viewer.js",
+    "body.js", "windows.js", "simplification.js",
 )  # fmt: skip
 # Where closed meshes are shown.
 OF_BODIES = "body.js"
@@ -89,7 +89,7 @@ class _Embedded:
         The same, embedded.
     solutions : list
         Of each solution its triangles, the deviations at the vertices of the drawn original, ascending, the largest
-        of these, and its break lines, chains of rows of ``vertices``, if there are any; None where its mesh is left out.
+        of these, and its break lines, chains of rows of ``vertices``, if it has any; None where it is left out.
     scale_end : float
         End of the error's colours [model units].
     drawn : int
@@ -111,7 +111,7 @@ def simplification_page(
     kept: BoolArray | Chromosomes,
     *,
     measure: str,
-    folder: str | os.PathLike[str],
+    folder: str | os.PathLike[str] | None,
     knee: int,
     limit: int = PAGE_BYTES,
 ) -> str:
@@ -128,8 +128,9 @@ def simplification_page(
         The solutions, in vector order.
     measure : str
         What was minimised beside the triangles.
-    folder : path
-        The folder of the front, as a shell command shall name it.
+    folder : path or None
+        The folder of the front, as a shell command shall name it; None: the page is in a notebook, where Python
+        writes the meshes.
     knee : int
         The row of the best compromise.
     limit : int
@@ -175,7 +176,7 @@ def simplification_page(
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
     data = {
         "stem": slug(PurePath(source).stem),
-        "folder": printable(as_argument(folder)),
+        "folder": None if folder is None else printable(as_argument(folder)),
         "closed": _closed_look(surface) if view.is_closed else None,
         "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
         "measures": [
@@ -224,7 +225,11 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing), *([word] if word else [])],
+        thinned=[
+            *_what_was_searched(front.run, unit),
+            *_what_is_thinned(model, held, missing),
+            *([word] if word else []),
+        ],
         heights=None if view.is_closed else _heights(view.exaggeration),
         colours={name: COLOURS[name] for name in colours},
         own_colours=own,
@@ -235,6 +240,7 @@ def simplification_page(
             "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
         },
         painted=paint is not None,
+        is_stored=folder is not None,
         files=files.titles,
         refused=printable(" ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused)),
         covering=has_border,
@@ -246,6 +252,7 @@ def simplification_page(
         unit_sign="" if unit == LENGTH else unit,
         libraries="three.js (MIT licence) and parts of D3 (ISC licence)",
         settings=_settings(front.run),
+        quality=STATEMENT[1] if folder is not None and (front.folder / STATEMENT[1]).is_file() else "",
     )
 
 
@@ -369,7 +376,7 @@ def _embedded(
 
 
 def _embedded_lines(chains: Sequence[IntArray], names: Sequence[str], known: Sequence[str]) -> dict[str, Any]:
-    """Return break lines as the browser unpacks them: their vertices one after the other, their lengths, their names."""
+    """Return break lines as the browser unpacks them: the vertices of all, how many each has, their names."""
     place = {name: k for k, name in enumerate(known)}
     columns = {
         "rows": np.concatenate(chains),
@@ -435,11 +442,11 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     return files
 
 
-def _what_was_searched(run: Mapping[str, Any]) -> Iterator[str]:
+def _what_was_searched(run: Mapping[str, Any], unit: str) -> Iterator[str]:
     if run.get("wish"):
         yield (
-            f"What was searched is the mesh with {in_words(run['wish'])}. The others came along: a search for the "
-            "whole front would find better ones far from it."
+            f"What was searched is the mesh with {in_words(run['wish'], unit)}. The others came along: a search for "
+            "the whole front would find better ones far from it."
         )
 
 

@@ -50,7 +50,9 @@ def raster_of(model: Any) -> Raster:
     Raises
     ------
     NoHeightGrid
-        If it is none, or its rows and columns are not evenly spaced, so that no transform says where they are.
+        If it is none.
+    ModelError
+        If its rows or columns are not evenly spaced, so that no transform says where they are.
     """
     if isinstance(model, HeightGrid) and model.model is None:
         part: Any = RasterPart(*model.shape, *model.corner, model.file_columns or model.shape[1])
@@ -83,7 +85,7 @@ def raster_of(model: Any) -> Raster:
     x, y = (places[0] - [dx * (column[0] + 0.5), dy * (row[0] + 0.5)]).tolist()
     found = (dx, 0.0, x, 0.0, dy, y)
     if not _fits(found, row, column, places):
-        raise NoHeightGrid(
+        raise ModelError(
             f"{model.name}: its rows or columns are not evenly spaced, so no raster holds its residuals where they are"
         )
     return Raster((part.rows, part.columns), found, number)
@@ -131,7 +133,7 @@ def write_residuals(path: Path, compared: Compared) -> None:
     NoHeightGrid
         If the original is no raster.
     ModelError
-        If rasterio is not installed or cannot write it.
+        If its rows or columns are not even, or rasterio is not installed or cannot write it.
     """
     model = compared.surface.model
     raster, facts = raster_of(model), model.georeference

@@ -21,20 +21,23 @@ from typing import Any
 from meshsimp_pymoo.errors import ModelError, NoHeightGrid, ResultError, printable, warn_of
 from meshsimp_pymoo.files import new_folder
 from meshsimp_pymoo.formats.outmesh import metres_of
+from meshsimp_pymoo.report.document import html_document
 from meshsimp_pymoo.report.residuals import write_residuals
+from meshsimp_pymoo.report.statement_figures import SCALE_QUANTILE
+from meshsimp_pymoo.storage import STATEMENT
 from meshsimp_pymoo.surface.accuracy import (
     NORMAL_90,
     NORMAL_95,
-    SPACE_SAMPLES,
     Accuracy,
     Compared,
     accuracy_of,
 )
 from meshsimp_pymoo.surface.measures import LENGTH
+from meshsimp_pymoo.surface.units import system_name
 
 __all__ = ["DATA", "PAGE", "RESIDUALS", "QualityStatement", "stated"]
 
-DATA, PAGE, RESIDUALS = "quality.json", "quality.html", "residuals.tif"
+(DATA, PAGE), RESIDUALS = STATEMENT, "residuals.tif"
 # Of the keys of quality.json: it rises where one changes its meaning or goes, not where one comes.
 SCHEMA = 1
 NOT_INDEPENDENT = "check points are the samples the mesh was made from, not independent ground truth"
@@ -68,7 +71,7 @@ class QualityStatement(Accuracy):
     """
 
     compared: Compared = field(repr=False, compare=False)
-    mesh: Mapping[str, Any] = field(default_factory=dict)
+    mesh: dict[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
     @property
@@ -131,7 +134,7 @@ class QualityStatement(Accuracy):
             "statement": self.sentence,
             "remark": NOT_INDEPENDENT,
             "original": self.original,
-            "mesh": dict(self.mesh),
+            "mesh": self.mesh,
             "accuracy": self.numbers.plain,
             "sources": SOURCES,
             "left_out": list(self.left_out),
@@ -141,6 +144,10 @@ class QualityStatement(Accuracy):
         """Write quality.json."""
         text = json.dumps(self.as_data(), indent=2, allow_nan=False, ensure_ascii=False)
         path.write_text(text + "\n", encoding="utf-8")
+
+    def write_page(self, path: Path) -> None:
+        """Write quality.html; the same for the same mesh."""
+        path.write_bytes(_page(self).encode("utf-8"))
 
     def save(self, folder: str | os.PathLike[str], *, overwrite: bool = False, residuals: bool = True) -> Path:
         """Write quality.json, quality.html and, of a raster, residuals.tif to a new folder, all or nothing.
@@ -169,6 +176,7 @@ class QualityStatement(Accuracy):
         claim_folder(folder, overwrite=overwrite)
         with new_folder(folder, replace=overwrite) as partial:
             self.write_data(partial / DATA)
+            self.write_page(partial / PAGE)
             if residuals and self.compared.signed:
                 self._write_residuals(partial / RESIDUALS)
         return folder
@@ -183,11 +191,173 @@ class QualityStatement(Accuracy):
             warn_of(f"{RESIDUALS} is left out: {reason}")
 
 
+# ------------------------------------------------------------------------------------------------------------- the page
+
+Rows = list[tuple[str, str, str]]
+
+
+def _page(stated: QualityStatement) -> str:
+    """Return the page of a statement."""
+    from meshsimp_pymoo.report.statement_figures import pictures
+
+    unit, mesh = stated.unit, printable(str(stated.mesh.get("name", "mesh")))
+    numbers = stated.numbers
+    scale_end = f"The colours end where {in_per_cent(SCALE_QUANTILE)} of the residuals are below."
+    if stated.closed:
+        map_said = f"Distances of the original's vertices from the mesh [{unit}]. {scale_end}"
+    else:
+        sides = "red where the original is above the mesh, blue where it is below, grey where there is no sample"
+        map_said = f"Residuals at the samples [{unit}]: {sides}. {scale_end}"
+    return html_document(
+        "quality.html",
+        (),
+        stated.as_data(),
+        title=f"Statement of quality: {PurePath(mesh).name}",
+        libraries="",
+        sentence=stated.sentence,
+        remark=NOT_INDEPENDENT,
+        left_out=stated.left_out,
+        closed=stated.closed,
+        unit=unit,
+        subjects=_subjects(stated, mesh),
+        accuracy=_accuracy_rows(stated),
+        shape=_shape_rows(stated),
+        method=_method(stated),
+        pictures=pictures(stated.compared, numbers),
+        map_said=map_said,
+        spread_said=f"Histogram of the residuals [{unit}], {sum(numbers.histogram.counts):,} check points.",
+        angles_said=f"Histogram of the least angles of {stated.triangles:,} triangles, in degrees.",
+    )
+
+
+def _subjects(stated: QualityStatement, mesh: str) -> list[tuple[str, str]]:
+    original = stated.original
+    kinds = [name for name in ("free", "refitted") if stated.mesh.get(name)]
+    low, high = original["box"]
+    box = "; ".join(f"{axis} {a:.10g} to {b:.10g}" for axis, a, b in zip("xyz", low, high, strict=True))
+    return [
+        (
+            "Mesh",
+            f"{mesh}{''.join(f', {kind}' for kind in kinds)}: {stated.triangles:,} triangles, {stated.vertices:,} "
+            f"vertices, {in_per_cent(stated.reduction)} fewer triangles than the original",
+        ),
+        (
+            "Original",
+            f"{printable(original['name'])}: {stated.original_vertices:,} vertices, "
+            f"{stated.original_triangles:,} triangles",
+        ),
+        ("SHA-256 of the original", original["sha256"]),
+        ("Reference system", _system(stated)),
+        ("Unit of lengths", _unit_in_words(original)),
+        ("Extent in the file", box),
+        ("Made by", f"meshsimp_pymoo {version('meshsimp-pymoo')}"),
+    ]
+
+
+def _system(stated: QualityStatement) -> str:
+    name = printable(system_name(stated.compared.surface.model.georeference))
+    said = [printable(stated.system), *([name] if name not in stated.system else [])]
+    return "; ".join(filter(None, said)) or "not stated by the file"
+
+
+def _unit_in_words(original: Mapping[str, Any]) -> str:
+    if original["unit"] is None:
+        return "not stated by the file: model units"
+    metres = original["metres_per_unit"]
+    return str(original["unit"]) + (f" (1 = {metres:.10g} m)" if metres not in (None, 1.0) else "")
+
+
+def _accuracy_rows(stated: QualityStatement) -> Rows:
+    """Return the rows of the table of lengths: label, number, meaning."""
+
+    def length(value: float) -> str:
+        return spelled(value, stated.unit)
+
+    points = f"{stated.check_points:,}"
+    left_out = f"; {stated.weightless:,} of weight 0 are left out" if stated.weightless else ""
+    weighed = "counted by their weights" if stated.weighted else "all count alike"
+    rows: Rows = [("Check points", points, f"vertices of the original, {weighed}{left_out}")]
+    if not stated.closed:
+        costs = {"nearest": "they count with their distance to the mesh", "ignore": "they count as 0"}
+        rows.append(("Not covered", f"{stated.uncovered:,}", costs.get(stated.outside, "") if stated.uncovered else ""))
+    if not math.isnan(stated.coverage):
+        rows.append(("Coverage", in_per_cent(stated.coverage), "of the original's area in the plane"))
+    rows += [
+        ("LE90, as counted", length(stated.le90), "90 % of the check points are no farther off"),
+        ("LE95, as counted", length(stated.le95), "95 % are no farther off (VVA of ASPRS 2014)"),
+        ("LE90 by RMSE", length(stated.le90_normal), f"{NORMAL_90:.4f} RMSE: normal errors without bias (NMAS)"),
+        ("LE95 by RMSE", length(stated.le95_normal), f"{NORMAL_95:.4f} RMSE: the same (NSSDA, FGDC-STD-007.3-1998)"),
+        ("RMSE", length(stated.rms_error), "root mean square"),
+        ("Mean absolute error", length(stated.mean_error), ""),
+    ]
+    if not math.isnan(stated.bias):
+        rows += [
+            ("Bias", length(stated.bias), "mean of original minus mesh, where it is covered"),
+            ("Standard deviation", length(stated.standard_deviation), "about the bias"),
+            ("Median, NMAD", f"{length(stated.median)}, {length(stated.nmad)}", "of original minus mesh; robust"),
+        ]
+    place = ", ".join(f"{value:.10g}" for value in stated.max_at)
+    rows.append(("Maximum", length(stated.max_error), f"at {place} (x, y, z of the file)"))
+    between = "mean at the middles of the original's faces"
+    rows.append(("Between the samples", length(stated.surface_error), between))
+    if stated.space is not None:
+        to, back = stated.space.to_mesh, stated.space.to_original
+        both = f"{length(to.maximum)} to the mesh, {length(back.maximum)} back"
+        rows.append(("Hausdorff distance", length(stated.space.hausdorff), f"in space: {both}"))
+        both = f"{length(to.mean)} to the mesh, {length(back.mean)} back"
+        rows.append(("Mean distance", length(stated.space.mean), f"in space: {both}"))
+    if not math.isnan(stated.line_max_error):
+        rows.append(("Break lines", length(stated.line_max_error), f"largest; mean {length(stated.line_mean_error)}"))
+    return rows
+
+
+def _shape_rows(stated: QualityStatement) -> Rows:
+    angles = stated.angles
+    rows = [("Least angle", f"{angles.minimum:.3g}°", "of all triangles" + (" in the plane" * (not stated.closed)))]
+    rows += [
+        (f"Below {limit:g}°", in_per_cent(share), "of the triangles have a smaller angle")
+        for limit, share in angles.below.items()
+    ]
+    return [*rows, ("Median", f"{angles.percentiles[50]:.3g}°", "of the least angles")]
+
+
+def _method(stated: QualityStatement) -> list[str]:
+    """Return how the numbers came about, sentence by sentence."""
+    if stated.closed:
+        how = "A residual is the distance in space of a vertex of the original from the mesh; it has no sign."
+    else:
+        how = (
+            "A residual is the height of a vertex of the original minus that of the mesh above or below it; positive "
+            "where the original is above the mesh. Where no triangle covers it there is no sign, and bias, standard "
+            "deviation, median and NMAD are without it. NMAD is 1.4826 times the median absolute deviation from the "
+            "median (Höhle and Höhle 2009)."
+        )
+    exact = "Percentiles are exact, by linear interpolation between the check points"
+    if stated.resolution > 0.0:
+        exact = f"Percentiles are taken from bins of {spelled(stated.resolution, stated.unit)}, as there are many"
+    said = [
+        how,
+        f"{exact}. LE90 and LE95 are stated twice: as counted, whatever the distribution, and as 1.6449 and 1.9600 "
+        "times the RMSE, which hold for normal errors without bias.",
+    ]
+    if not stated.closed:
+        said.append("Coverage is the share of the area of those faces of the original whose middles the mesh covers.")
+    if stated.space is not None:
+        to, back = stated.space.to_mesh.points, stated.space.to_original.points
+        said.append(
+            f"Distances in space are from {to:,} points of the original to the mesh and from {back:,} points of the "
+            "mesh to the original: points spread evenly over both surfaces, and for the largest distance all vertices."
+        )
+    if "to a" in stated.system:
+        said.append("Coordinates are angles: the plane was scaled to lengths as the reference system says above.")
+    return said
+
+
 def stated(
     compared: Compared,
     *,
     mesh: Mapping[str, Any] | None = None,
-    space_samples: int = SPACE_SAMPLES,
+    space_samples: int | None = None,
     left_out: tuple[str, ...] = (),
 ) -> QualityStatement:
     """Measure a mesh beside its original and state what was found.
@@ -198,7 +368,7 @@ def stated(
         See :func:`~meshsimp_pymoo.surface.accuracy.compare`.
     mesh : mapping, optional
         What the mesh is called.
-    space_samples : int
+    space_samples : int, optional
         See :func:`~meshsimp_pymoo.surface.accuracy.accuracy_of`.
     left_out : tuple of str
         What is said to be left out.

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.plane.faces import least_angles, used_rows
 from meshsimp_pymoo.surface.closed.nearest import MeshTree
 from meshsimp_pymoo.surface.grid_surface import GridSurface
@@ -46,12 +46,13 @@ ANGLE_PERCENTILES = (1, 5, 10, 25, 50, 75, 90)
 # Shares of triangles with a least angle below these are stated; bins of their histogram are so wide [degrees].
 THIN_ANGLES, ANGLE_BIN = (10.0, 20.0), 2.0
 # Bins of the histogram of the residuals between those of the outermost per cent, which have one on each side.
-BINS, INNER_PERCENTILE = 40, 99.0
+BINS, INNER_PERCENTILE = 41, 99.0
 # Of more check points than these, read by windows, percentiles are those of a histogram of so many bins a sign.
 EXACT_POINTS, FINE_BINS = 20_000_000, 1 << 20
-# Points on each of the two surfaces from which distances in space are taken, and the most faces of an original that
-# are looked at for them.
-SPACE_SAMPLES, MOST_FACES = 200_000, 4_000_000
+# Points on each of the two surfaces from which distances in space are taken: so many to a face of the original, within
+# these bounds; and the most faces of an original that are looked at for them.
+FACE_SAMPLES, LEAST_SAMPLES, MOST_SAMPLES = 20, 10_000, 200_000
+MOST_FACES = 4_000_000
 # Of the points of a sequence that fills a triangle evenly: powers of the inverse of the plastic number.
 _PLASTIC = 1.324717957244746
 
@@ -423,16 +424,17 @@ def _signed(
 # ---------------------------------------------------------------------------------------------------------- the numbers
 
 
-def accuracy_of(compared: Compared, *, space_samples: int = SPACE_SAMPLES) -> Accuracy:
+def accuracy_of(compared: Compared, *, space_samples: int | None = None) -> Accuracy:
     """Return all numbers of a statement of quality.
 
     Parameters
     ----------
     compared : Compared
         The mesh beside its original.
-    space_samples : int
+    space_samples : int, optional
         Points on each of both surfaces for distances in space; 0: these are not taken. They are left out of originals
-        of more than MOST_FACES triangles too.
+        of more than MOST_FACES triangles too. By default FACE_SAMPLES to a triangle of the original, but at least
+        LEAST_SAMPLES and at most MOST_SAMPLES.
     """
     surface, quality, model = compared.surface, compared.quality, compared.surface.model
     weights = compared.weights
@@ -450,7 +452,7 @@ def accuracy_of(compared: Compared, *, space_samples: int = SPACE_SAMPLES) -> Ac
         weightless=surface.n_vertices - taken.check_points,
         weighted=weights is not None and len(np.unique(weights[weights > 0])) > 1,
         uncovered=taken.uncovered,
-        outside="" if is_closed else str(surface.rules.outside),
+        outside="" if is_closed else surface.rules.outside or "",
         coverage=compared.coverage,
         mean_error=quality.mean_error,
         rms_error=quality.rms_error,
@@ -479,11 +481,15 @@ def accuracy_of(compared: Compared, *, space_samples: int = SPACE_SAMPLES) -> Ac
 
 
 class _Values(NamedTuple):
-    """Values (n,), how much each counts, and how often it is there; None: 1."""
+    """Values (n,), how much each counts, and how often it is there; None: 1. No more than one of both."""
 
     values: FloatArray
     weights: FloatArray | None
-    counts: AnyArray | None
+    counts: IntArray | None
+
+    def at(self, shares: Sequence[float]) -> FloatArray:
+        """Return the values below which these shares are."""
+        return quantiles(self.values, shares, self.weights, self.counts)
 
     def where(self, chosen: BoolArray) -> _Values:
         """Return some of them."""
@@ -538,7 +544,7 @@ def _take(compared: Compared) -> _Taken:
             columns.append((values, covered, weights))
     if is_fine:
         width = largest / FINE_BINS
-        centres = (np.arange(2 * FINE_BINS) + 0.5 - FINE_BINS) * width
+        centres = np.asarray((np.arange(2 * FINE_BINS) + 0.5 - FINE_BINS) * width, np.float64)
         signed = _Values(centres, None, fine).where(fine > 0)
         both = fine + bare
         absolute = _Values(np.abs(centres), None, both).where(both > 0)
@@ -549,7 +555,12 @@ def _take(compared: Compared) -> _Taken:
     return _Taken(every.where(covered), every.but(np.abs(values)), n_points, n_uncovered, max_row, 0.0)
 
 
-def quantiles(values: FloatArray, shares: Sequence[float], weights: AnyArray | None = None) -> FloatArray:
+def quantiles(
+    values: FloatArray,
+    shares: Sequence[float],
+    weights: FloatArray | None = None,
+    counts: IntArray | None = None,
+) -> FloatArray:
     """Return the values below which these shares of all are, by linear interpolation between neighbours.
 
     Parameters
@@ -560,6 +571,8 @@ def quantiles(values: FloatArray, shares: Sequence[float], weights: AnyArray | N
         Between 0 and 1.
     weights : (n,) array, optional
         How much each counts, above 0; equal ones give the same as none.
+    counts : (n,) int array, optional
+        Instead, how often each is there.
 
     Examples
     --------
@@ -567,38 +580,40 @@ def quantiles(values: FloatArray, shares: Sequence[float], weights: AnyArray | N
     [0.0, 5.0, 9.0]
     >>> quantiles(np.arange(11.0), [0.0, 0.5, 0.9], np.full(11, 7.0)).tolist()
     [0.0, 5.0, 9.0]
+    >>> quantiles(np.array([4.0, 0.0]), [0.5, 1.0], counts=np.array([1, 3])).tolist()
+    [0.0, 4.0]
     """
     if not len(values):
         return np.full(len(shares), np.nan)
-    if weights is None:
+    if weights is None and counts is None:
         return np.asarray(np.quantile(values, shares))
     order = np.argsort(values, kind="stable")
+    if counts is not None:
+        ordered, end = values[order], np.cumsum(counts[order])
+        at = np.asarray(shares) * (end[-1] - 1)
+        below, above = (ordered[np.searchsorted(end, rank(at), side="right")] for rank in (np.floor, np.ceil))
+        return np.asarray(below + (above - below) * (at - np.floor(at)))
     ordered, w = values[order], np.asarray(weights, float)[order]
     at = np.concatenate([[0.0], np.cumsum((w[1:] + w[:-1]) / 2.0)])
     return np.asarray(np.interp(np.asarray(shares) * at[-1], at, ordered))
 
 
-def _weights_of(values: _Values) -> AnyArray | None:
-    return values.weights if values.counts is None else values.counts
-
-
 def _by_share(values: _Values, percentiles: Sequence[float]) -> dict[float, float]:
-    shares = [percent / 100.0 for percent in percentiles]
-    return dict(zip(percentiles, quantiles(values.values, shares, _weights_of(values)).tolist(), strict=True))
+    found = values.at([percent / 100.0 for percent in percentiles])
+    return dict(zip(percentiles, found.tolist(), strict=True))
 
 
 def _moments(signed: _Values) -> dict[str, float]:
     """Return bias, standard deviation, median and NMAD of signed residuals."""
-    r, w = signed.values, _weights_of(signed)
+    r, w = signed.values, signed.weights if signed.counts is None else signed.counts
     if not len(r):
         return {}
-    bias = float(np.average(r, weights=w))
-    median = float(quantiles(r, [0.5], w)[0])
+    bias, median = float(np.average(r, weights=w)), float(signed.at([0.5])[0])
     return {
         "bias": bias,
         "standard_deviation": math.sqrt(float(np.average((r - bias) ** 2, weights=w))),
         "median": median,
-        "nmad": NORMAL_MAD * float(quantiles(np.abs(r - median), [0.5], w)[0]),
+        "nmad": NORMAL_MAD * float(signed.but(np.abs(r - median)).at([0.5])[0]),
     }
 
 
@@ -608,11 +623,11 @@ def _histogram(values: _Values, signed: bool) -> Histogram:
     if not len(r):
         return Histogram((0.0, 0.0), (0,))
     low, high = float(r.min()), float(r.max())
-    inner = float(quantiles(np.abs(r), [INNER_PERCENTILE / 100.0], values.counts)[0])
+    inner = float(quantiles(np.abs(r), [INNER_PERCENTILE / 100.0], counts=values.counts)[0])
     if inner == 0.0:
         inner = max(-low, high) or 1.0
-    edges = np.arange(-BINS // 2 if signed else 0, BINS // 2 + 1 if signed else BINS + 1) * (inner / BINS)
-    edges *= 2.0 if signed else 1.0
+    # an odd number, the middle one about 0, where the vertices of the mesh lie
+    edges = inner * (np.arange(-BINS, BINS + 1, 2) if signed else np.arange(BINS + 1)) / BINS
     before = [low] if low < edges[0] else []
     after = [high] if high > edges[-1] else []
     edges = np.concatenate([before, edges, after])
@@ -658,9 +673,12 @@ def points_on(vertices: FloatArray, faces: IntArray, count: int) -> FloatArray:
     return found
 
 
-def _space(compared: Compared, samples: int) -> SpaceDistance | None:
+def _space(compared: Compared, samples: int | None) -> SpaceDistance | None:
     surface = compared.surface
-    if samples <= 0 or len(surface.faces) > MOST_FACES:
+    n_faces = len(surface.faces)
+    if samples is None:
+        samples = min(max(FACE_SAMPLES * n_faces, LEAST_SAMPLES), MOST_SAMPLES)
+    if samples <= 0 or n_faces > MOST_FACES:
         return None
     points, faces = np.asarray(surface.points), np.asarray(surface.faces)
     mesh = compared.vertices, compared.faces

@@ -617,16 +617,54 @@ def test_the_policy_stops_a_script_that_got_in_and_any_call(browser, folder, tmp
         visit.close()
 
 
-def test_without_3d_the_rest_of_the_page_works(engine, folder, front, tmp_path):
-    with launched(engine, "--disable-3d-apis") as blind:
-        visit = Visit(blind, folder / "report.html")
-        assert "no WebGL" in visit.page.inner_text("#no-3d")
-        visit.page.locator("#slider").fill("6")
-        assert shown(visit.page) == 6
-        with visit.page.expect_download() as download:
-            visit.page.click("#downloads button[value=obj]")
-        download.value.save_as(tmp_path / "small.obj")
-        assert len(parsed(tmp_path / "small.obj")[1]) == front[6].triangles
+@pytest.fixture(scope="module")
+def blind(engine, folder):
+    """The page in a browser without WebGL."""
+    with launched(engine, "--disable-3d-apis") as browser:
+        yield Visit(browser, folder / "report.html", viewport={"width": 1280, "height": 1000})
+
+
+def test_without_webgl_the_page_says_so_and_all_of_it_works(blind, front, tmp_path):
+    page = blind.page
+    assert "no WebGL" in page.inner_text("#no-3d")
+    page.locator("#slider").fill("6")
+    assert shown(page) == 6
+    page.locator("#slider").fill("14")
+    assert shown(page) == 14
+    before = pixels(page)
+    assert unlike(*before) < 0.05  # nearly all vertices are kept
+    page.locator("#canvas").press("ArrowLeft")
+    assert unlike(pixels(page)[1], before[1]) > 0.02
+    with page.expect_download() as download:
+        page.click("#downloads button[value=obj]")
+    download.value.save_as(tmp_path / "small.obj")
+    assert len(parsed(tmp_path / "small.obj")[1]) == front[14].triangles
+    with page.expect_download() as download:
+        page.click("#picture")
+    assert download.value.suggested_filename.endswith(".png")
+    page.click("#reset")
+    blind.check()
+
+
+@pytest.mark.parametrize(
+    "look", ["", "colours=error&shading=smooth", "colours=height&shading=wireframe", "arrangement=wipe"]
+)
+def test_what_the_page_draws_itself_is_what_webgl_draws(opened, blind, look):
+    pictures = []
+    for visit in (opened, blind):
+        visit.used = True
+        visit.page.goto("about:blank")
+        visit.page.goto(f"{visit.url}#solution=5&{look}")
+        visit.page.wait_for_selector("html[data-shown='5']")
+        until(visit.page, "state.opened && state.viewer !== null")
+        pictures.append(pixels(visit.page))
+        visit.check()
+    for light, own in zip(*pictures, strict=True):
+        height, width = (min(s, t) for s, t in zip(light.shape[:2], own.shape[:2], strict=True))
+        assert len(np.unique(own.reshape(-1, 3), axis=0)) > 50
+        # lines one point wide are softer in the one, and may lie a point beside in the other
+        away = np.abs(light[:height, :width] - own[:height, :width]).mean()
+        assert away < (14 if "wireframe" in look else 3.5), away
 
 
 # --------------------------------------------------------------------------------------------------- size and content

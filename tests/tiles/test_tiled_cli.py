@@ -51,6 +51,7 @@ def out(path, few_moves, sketched, tmp_path_factory):
 
 def test_the_front_its_meshes_and_the_chosen_one_are_there(out, path):
     expected = {"front.csv", "front.png", "report.html", "front.npz", "meshes", "chosen.ply", "run.json"}
+    expected |= {"quality.json", "quality.html"}
     assert {entry.name for entry in out.iterdir()} == expected
     assert (out / "front.png").read_bytes().startswith(b"\x89PNG")
     assert len(list((out / "meshes").iterdir())) == 4
@@ -170,6 +171,18 @@ def test_pictures_of_a_big_grid_are_drawn_from_some_of_its_samples(path, out, mo
     assert np.array_equal(part.deviation, whole.deviation[some])
     assert whole.deviation.sum() == pytest.approx(whole.quality.error)
     assert np.array_equal(part.faces, whole.faces)
+
+
+def test_levels_have_the_sizes_between_two_solutions_too(out, tmp_path, capsys):
+    front = Front.load(out)
+    size = (front[-2].triangles + front[-1].triangles) // 2
+    assert main(["levels", str(out), "-o", str(tmp_path / "levels"), "--triangles", str(size), "300", "--json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)["levels"]
+    assert (first["solution"], first["free"]) == (None, False)
+    assert 0.9 * size < first["triangles"] <= size
+    assert second["triangles"] <= 300
+    for level in (first, second):
+        assert len(read_source(tmp_path / "levels" / level["file"]).faces) == level["triangles"]
 
 
 @pytest.mark.usefixtures("all_moves")

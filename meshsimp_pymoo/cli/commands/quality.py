@@ -53,7 +53,9 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-residuals", dest="residuals", action="store_false", help="do not write the raster of the residuals"
     )
-    parser.add_argument("--model", dest="original", metavar="MODEL", help="the original of OUT, if it is no longer where it was")
+    parser.add_argument(
+        "--model", dest="original", metavar="MODEL", help="the original of OUT, if it is no longer where it was"
+    )
     add_model(parser, Options, help="the folder of a front; with --mesh the original")
     add_settings(parser.add_argument_group("what counts, with --mesh"), Rules, only=RULES, outside="nearest")
     add_shown(parser)
@@ -70,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.report.statement import claim_folder
+    from meshsimp_pymoo.storage import QUALITY
     from meshsimp_pymoo.surface.rules import Rules
 
     wish, number = Wish(wishes_of(args), args.knee), args.solution
@@ -80,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
     options, rules = settings_from(args, Options), settings_from(args, Rules)
     of_front = args.mesh is None
     _refuse(args, options, rules, said)
-    usual = Path(args.model) / "quality" if of_front else Path(f"{Path(args.mesh).stem}_quality")
+    usual = Path(args.model) / QUALITY if of_front else Path(f"{Path(args.mesh).stem}_quality")
     folder = usual if args.output is None else Path(args.output)
     claim_folder(folder, overwrite=args.overwrite)
     with said_when_compiling(args.quiet):
@@ -127,6 +130,9 @@ def _of_front(
     out: str, model: str | None, wish: Wish, number: int | None, *, refitted: bool
 ) -> tuple[QualityStatement | None, str]:
     """Return the statement of a mesh of a front; None and why, if none is within the limits."""
+    from dataclasses import replace
+    from pathlib import Path
+
     from meshsimp_pymoo.cli.arguments import numbered
     from meshsimp_pymoo.cli.results import triangles_of
     from meshsimp_pymoo.front import Front
@@ -140,7 +146,13 @@ def _of_front(
     else:
         chosen = front.run.get("chosen") if number is None else numbered(out, len(front), number)
         solution = front.knee() if chosen is None else front[chosen]
-    return (None if solution is None else solution.accuracy(refitted=refitted)), missed
+    if solution is None:
+        return None, missed
+    statement = solution.accuracy(refitted=refitted)
+    if solution.front is not front:  # which is none of the front's
+        mesh = statement.mesh | {"name": f"{Path(front.name).name}, between two solutions", "solution": None}
+        statement = replace(statement, mesh=mesh)
+    return statement, missed
 
 
 def _of_mesh(model: str, options: Options, rules: Rules, other: str) -> QualityStatement:

@@ -112,7 +112,8 @@ async function pick(row) {
   part("picked").textContent = `solution ${row} of 0 to ${count - 1}`;
   numbers(row);
   const file = `${data.stem}_${columns.triangles[row]}.ply`;
-  part("command").textContent = `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
+  part("command").textContent =
+    data.folder === null ? `front[${row}].save("${file}")` : `meshsimp pick ${data.folder} --solution ${row} -o ${file}`;
   const solution = data.solutions[row];
   part("simplified-title").textContent = sizeOf(row);
   part("not-embedded").hidden = Boolean(solution);

@@ -101,7 +101,7 @@ class MeshPair {
     if (ramp) this.arrays.uv2 = level;
     this.creased = exaggeration; // creases are those of heights as they are first drawn
 
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer = openRenderer(canvas);
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.setClearColor(0x000000, 0);
     this.camera = new THREE.PerspectiveCamera(28, 1, 0.01, 100);
@@ -534,6 +534,7 @@ class MeshPair {
       if (part.rims) this.drawLines(part.rims, width, height);
       if (part.lines && this.linesShown) this.drawLines(part.lines, width, height);
     });
+    if (renderer instanceof SoftwareRenderer) renderer.flush();
     this.onDraw();
   }
 

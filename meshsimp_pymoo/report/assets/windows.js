@@ -312,6 +312,10 @@ async function openViewer() {
     return;
   }
   const viewer = state.viewer;
+  if (viewer.renderer instanceof SoftwareRenderer) {
+    part("no-3d").hidden = false;
+    part("no-3d").textContent = "This browser gives no WebGL, so the page draws the meshes by itself: turning large ones takes its time.";
+  }
   canvas.addEventListener("webglcontextlost", () => withoutWebgl("the graphics card does not answer any more"));
   canvas.addEventListener("webglcontextrestored", () => {
     state.viewer = viewer;
