@@ -24,7 +24,7 @@ from meshsimp_pymoo.report.page import HEIGHT_DECADES, SCALE_QUANTILE, _heights
 from meshsimp_pymoo.surface.surface import LEAST_RELIEF, MOST_RELIEF, View
 
 SIDE = 16
-DESK = {"width": 920, "height": 600}
+DESK = {"width": 920, "height": 1000}
 DRAWN = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
