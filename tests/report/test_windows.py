@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -452,7 +453,25 @@ def test_a_large_image_is_made_smaller_with_a_word(monkeypatch):
     assert "8 x 8 of them" in embedded_image(Material(image=picture(RED, GREEN, BLUE, GREY)))[1]
 
 
-def test_an_image_that_cannot_be_read_is_left_out_with_a_word():
-    found, word = embedded_image(Material(image=picture(RED, GREEN, BLUE, GREY)[:40]))
+@pytest.mark.parametrize("kind", ["PNG", "JPEG"])
+def test_an_image_that_cannot_be_read_is_left_out_with_a_word(kind):
+    stream = io.BytesIO()
+    Image.effect_noise((64, 64), 60).save(stream, kind)
+    found, word = embedded_image(Material(image=stream.getvalue()[: len(stream.getvalue()) // 2]))
     assert found is None
     assert word.startswith("The texture of the model cannot be read (")
+
+
+def test_an_image_that_the_browser_cannot_read_is_said(browser, front, tmp_path):
+    page = (front.folder / "report.html").read_text(encoding="utf-8")
+    image = re.search(r"data:image/png;base64,[^\"]*", page)[0]
+    (tmp_path / "report.html").write_text(page.replace(image, "data:image/png;base64,AAAA"), encoding="utf-8")
+    visit = Visit(browser, tmp_path / "report.html", viewport=DESK)
+    try:
+        assert "cannot read the texture" in visit.page.inner_text("#no-3d")
+        assert visit.page.locator("input[value=texture]").count() == 0
+        assert visit.page.is_checked("input[name=colours][value=plain]")
+        assert len(np.unique(pixels(visit.page)[1].reshape(-1, 3), axis=0)) > 50
+        visit.check()
+    finally:
+        visit.close()
