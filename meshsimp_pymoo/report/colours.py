@@ -81,7 +81,7 @@ def _small_enough(material: Material) -> tuple[str, bytes, str]:
         if width * height > MOST_PIXELS:
             raise ValueError(f"it has {width} x {height} pixels")
         if len(material.image) <= IMAGE_BYTES and max(width, height) <= IMAGE_SIDE:
-            image.verify()
+            image.load()  # whole, or it is refused
             return material.media_type, material.image, ""
         for side in SMALLER_SIDES:
             smaller = image.convert("RGB")

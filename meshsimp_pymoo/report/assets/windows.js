@@ -251,7 +251,14 @@ async function imageOfModel() {
   if (!data.texture) return null;
   const picture = new Image();
   picture.src = data.texture.image;
-  const [uv] = await Promise.all([unpackArray(data.texture.uv), picture.decode()]);
+  const [uv, isShown] = await Promise.all([unpackArray(data.texture.uv), picture.decode().then(() => true, () => false)]);
+  if (!isShown) {
+    document.querySelector("input[name=colours][value=texture]").closest("label").remove();
+    document.querySelector("input[name=colours]").checked = true;
+    part("no-3d").hidden = false;
+    part("no-3d").textContent = "This browser cannot read the texture of the model; the meshes are shown without it.";
+    return null;
+  }
   return { picture, uv: Float32Array.from(uv), colour: data.texture.colour };
 }
 
