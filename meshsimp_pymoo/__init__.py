@@ -10,13 +10,14 @@ The tree is the data flow. Bottom up; one part may import only parts above it in
     plane/         predicates, triangulation, footprint, faces: arrays in, arrays out
     formats/       one file a format, in one table; ends in a SourceMesh
     surface/       what a chromosome means: rules and measures, the height surface, its moves, refit, score; big grids;
-                   the closed surface (surface/closed/); which of both a model makes (surface/kinds)
+                   the closed surface (surface/closed/); which of both a model makes (surface/kinds);
+                   how accurate one mesh is, in a surveyor's words (surface/accuracy)
     datasets       built-in models by name
     opening        the one way in: path, name or arrays, and Options -> model, or a grid read by windows
     problem        MeshProblem: which vertices are kept -> (error, triangles)
     search/        operators, thinning and insertion, annealing, memetic, presets, MOEA/D, GA, checkpoints
     storage        the folder of a front
-    report/        pictures and the page of one front
+    report/        pictures and the page of one front; the statement of quality of one mesh, the raster of its residuals
     front          Front: a sequence of solutions to choose from, whole models' or tiles'
     levels         a front as levels of detail: files, one glTF, 3D Tiles
     tiles/         height grids too big for one piece

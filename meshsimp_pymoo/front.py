@@ -59,6 +59,7 @@ from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import Model, as_stored, stored_arrays, surface_of
 from meshsimp_pymoo.surface.measures import (
     ERROR,
+    LENGTH,
     MAXIMUM,
     MEASURES,
     OF_LINES,
@@ -73,6 +74,7 @@ from meshsimp_pymoo.surface.measures import (
 )
 from meshsimp_pymoo.surface.nested import Chromosomes, Nested
 from meshsimp_pymoo.surface.rules import USUAL_RATIO, Rules, is_file_of_lines
+from meshsimp_pymoo.surface.solid import Solid, as_solid
 from meshsimp_pymoo.surface.surface import (
     FreeMesh,
     Refitted,
@@ -231,27 +233,40 @@ class FrontSolution(_Numbers):
         """The simplified mesh in the frame of the model's file, with its colours and attributes."""
         return mesh_of(self.front.surface, self.faces)
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None) -> Path:
         """Write the mesh in the format of the path's suffix; see :func:`meshsimp_pymoo.formats.table.write_mesh`.
 
         A mesh that the front's folder holds in this format is copied, unless it names files beside it.
 
+        Parameters
+        ----------
+        path : path
+            The file.
+        overwrite : bool
+            Replace a file that exists.
+        solid : float, optional
+            Close the mesh of a height surface for printing: by walls along its outline and holes, and a flat base so
+            far below its lowest point [file units].
+
         Raises
         ------
         ResultError
-            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, or it cannot be written.
+            If the file exists (and ``overwrite`` is not given), its suffix is no mesh format, it cannot be written, or
+            the surface cannot be made solid: it is closed already, or its coordinates are no lengths.
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         suffix = path.suffix.lower()
-        stored = self.front.stored_mesh(self.solution)
+        stored = self.front.stored_mesh(self.solution) if solid is None else None
         with new_file(path) as unfinished:
             if stored is not None and stored.suffix == suffix and not self.front.has_material:
                 shutil.copyfile(stored, unfinished)
             else:
-                write_solution(unfinished, self.front.surface, self.faces)
+                write_solution(unfinished, self.front.surface, self.faces, solid=solid)
         return path
 
-    def save_compressed(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> float:
+    def save_compressed(
+        self, path: str | os.PathLike[str], *, overwrite: bool = False, solid: float | None = None
+    ) -> float:
         """Write the mesh compressed, as GLB can be (extra ``draco``); return how far its vertices moved at most [m].
 
         That is no more than a twentieth of its mean error, as far as single precision lets it.
@@ -263,9 +278,23 @@ class FrontSolution(_Numbers):
         """
         path = claim_file(path, written_suffixes(), overwrite=overwrite)
         with new_file(path) as unfinished:
-            written = write_solution(unfinished, self.front.surface, self.faces, compressed_by=self.mean_error)
+            written = write_solution(
+                unfinished, self.front.surface, self.faces, solid=solid, compressed_by=self.mean_error
+            )
         assert written.packed is not None
         return written.packed.shift
+
+    def solid(self, thickness: float) -> Solid:
+        """Return the mesh closed by walls and a flat base, so far below its lowest point [file units].
+
+        See :mod:`meshsimp_pymoo.surface.solid`.
+
+        Raises
+        ------
+        ResultError
+            If the surface is closed already, or its coordinates are no lengths.
+        """
+        return as_solid(self.front.surface, self.faces, thickness)
 
     def plot(self, ax: Axes | None = None, **kwargs: Any) -> Axes:
         """Draw the mesh; see :func:`meshsimp_pymoo.report.figures.plot_mesh`."""
@@ -297,7 +326,9 @@ class FrontSolution(_Numbers):
 
         figure = Figure(figsize=(5.0, 4.2), dpi=90, layout="constrained")
         self.plot(figure.subplots()).set_title(
-            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}", fontsize=10
+            f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}"
+            + f" {self.front.unit}" * (self.front.unit != LENGTH),
+            fontsize=10,
         )
         return _png(figure)
 
@@ -1000,6 +1031,7 @@ class Front(Sequence[FrontSolution]):
         chosen: int | FrontSolution | None = None,
         piece: int | None = None,
         refit: bool | Mapping[int, Refitted] = False,
+        solid: float | None = None,
         pictures: bool = True,
         page: bool = True,
         run: Mapping[str, Any] | None = None,
@@ -1025,6 +1057,9 @@ class Front(Sequence[FrontSolution]):
             Write each of the meshes once more refitted, and their error to ``front.csv``: with its best heights, see
             :func:`~meshsimp_pymoo.surface.height.refit_heights`, or of a closed surface its best vertices. Or only
             those of these solutions, found already.
+        solid : float, optional
+            Close the chosen mesh for printing, by walls and a flat base so far below its lowest point [file units]; all
+            other meshes stay surfaces.
         pictures : bool
             Go on to :meth:`draw`, once all else is in place.
         page : bool
@@ -1061,6 +1096,7 @@ class Front(Sequence[FrontSolution]):
             chosen=row,
             cut=None if piece is None else lambda faces: pieces(self.model, faces, piece),
             refit=fitted if refit is not False else None,
+            solid=solid,
             series=self.series,
             run=record,
             overwrite=overwrite,
@@ -1222,7 +1258,9 @@ class Front(Sequence[FrontSolution]):
         shown = [name for name, known in MEASURES.items() if not known.meaning or known.wish or name in also]
         shown = [name for name in shown if not all(np.isnan(getattr(q, name)) for q in self.quality)]
         names = sorted(shown, key=lambda name: MEASURES[name].is_error)
-        header = "".join(f"<th>{label}</th>" for label in ("solution", *(MEASURES[name].label for name in names)))
+        unit = "" if self.unit == LENGTH else f" [{html.escape(self.unit)}]"
+        labels = [MEASURES[name].label + unit * MEASURES[name].is_error for name in names]
+        header = "".join(f"<th>{label}</th>" for label in ("solution", *labels))
         body = []
         for row in rows:
             cells = [f"{row}{' (knee)' if row == at else ''}"]

@@ -251,7 +251,11 @@ def _write_one(path: Path, ladder: _Ladder, writer: MeshWriter, record: dict[str
     meshes, said = [], []
     for k, (level, mesh) in enumerate(ladder.meshes(writer)):
         numbers = ladder.said(k) | {"coverage": ladder.coverage[k]}
-        meshes.append(writer.packed(replace(mesh, extras={"unit": record["unit"]} | numbers), level.quality.mean_error))
+        meshes.append(
+            writer.packed(
+                replace(mesh, extras={"unit": record["unit"]} | numbers, shaded=True), level.quality.mean_error
+            )
+        )
         said.append(numbers | _packing(meshes[-1]))
     write_glb(path, meshes, ladder.coverage)
     return said
@@ -263,8 +267,8 @@ def _write_files(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict
     for k, (level, mesh) in enumerate(ladder.meshes(writer)):
         file = f"level-{k}{writer.kind.suffix}"
         numbers = ladder.said(k)
-        with_extras = replace(mesh, extras={"unit": record["unit"]} | numbers)
-        written = writer.write(folder / file, with_extras, level.quality.mean_error)
+        shown = replace(mesh, extras={"unit": record["unit"]} | numbers, shaded=True)
+        written = writer.write(folder / file, shown, level.quality.mean_error)
         said.append({"file": file} | numbers | _packing(written))
     return {"levels": said}
 
@@ -290,6 +294,7 @@ def _write_tiles(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict
             georeference={"unit": "metre"},
             up=None,
             extras={"unit": record["unit"]} | numbers,
+            shaded=True,
         )
         written = writer.write(folder / file, tile, level.quality.mean_error)
         said.append({"file": file} | numbers | _packing(written))

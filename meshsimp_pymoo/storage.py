@@ -43,11 +43,11 @@ import platform
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -81,12 +81,13 @@ from meshsimp_pymoo.formats.table import (
 from meshsimp_pymoo.plane.faces import is_canonical, used_rows
 from meshsimp_pymoo.surface.kinds import stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
-from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
+from meshsimp_pymoo.surface.measures import COUNTED, LENGTH, MEASURES, OF_LINES, OF_MESH, Quality, checked_objectives
 from meshsimp_pymoo.surface.nested import Nested
 from meshsimp_pymoo.surface.rules import is_file_of_lines
 from meshsimp_pymoo.surface.smallest import facts_of_lines
+from meshsimp_pymoo.surface.solid import as_solid, check_solid
 from meshsimp_pymoo.surface.surface import Refitted, Surface, free_faces, mesh_arrays, mesh_lines, require_rules
-from meshsimp_pymoo.surface.units import metres_per_model_unit
+from meshsimp_pymoo.surface.units import length_unit, metres_per_model_unit
 
 # What only a mesh says is empty where nobody has measured it. ``free``: 1 where the edges of a mesh are chosen for the
 # error, 0 where it is Delaunay.
@@ -111,6 +112,8 @@ QUALITY = "quality"  # where a statement of any mesh is written by default
 CHECKPOINT = "checkpoint.npz"  # the state of a search that is not finished
 TILES = "tiles"  # finished tiles of one
 LINES = "break_lines.geojson"  # the thinned break lines
+# A mesh: vertices (V, 3), faces (M, 3), attributes by name.
+MeshArrays: TypeAlias = tuple[FloatArray, IntArray, dict[str, AnyArray]]
 OWN_ENTRIES = (
     "front.csv", "front.npz", "run.json", "meshes", *PICTURES,
     "tables", "figures", "times.csv", "refitted",
@@ -253,6 +256,7 @@ def write_front(
     chosen: int | None = None,
     cut: Callable[[IntArray], Iterable[tuple[str, IntArray]]] | None = None,
     refit: Callable[[int], Refitted | None] | None = None,
+    solid: float | None = None,
     series: Mapping[str, npt.ArrayLike] | None = None,
     run: Mapping[str, Any] | None = None,
     overwrite: bool = False,
@@ -292,6 +296,9 @@ def write_front(
         The refitted mesh of the solution in this row of ``kept`` (see ``refit`` of its surface). Each mesh that is
         written is then written refitted too, as a file of its own, and ``front.csv`` has two more columns,
         REFIT_COLUMNS. None where there is none.
+    solid : float, optional
+        The chosen mesh is closed by walls and a base so far below its lowest point [file units]; see
+        :mod:`~meshsimp_pymoo.surface.solid`. What it encloses is recorded.
     series : mapping of str to (n, 2) array, optional
         Other fronts to compare with, by name: the error that was minimised [model units] and triangles. They are
         written to ``series.csv``.
@@ -327,6 +334,10 @@ def write_front(
             )
     kind = format_to_write(mesh_format)
     kind.check(model)
+    if solid is not None:
+        check_solid(surface, solid, kind)
+        if cut is not None:
+            raise ResultError(f"{model.name}: a solid is one piece; leave the pieces out, or the solid")
     look = _look(kind, surface)
     F = np.array([[q.error, q.triangles] for q in quality], dtype=np.float64)
     if not np.isfinite(F).all():
@@ -346,6 +357,7 @@ def write_front(
     with new_folder(folder, replace=overwrite) as partial:
         digits = max(3, len(str(len(order) - 1)))
         files: dict[int, tuple[str, list[str]]] = {}
+        facts_of_solid: dict[str, Any] = {}
         rounding, pace = Rounding(kind), SECONDS_A_CORNER
         if with_mesh:
             (partial / "meshes").mkdir()
@@ -373,7 +385,8 @@ def write_front(
                 for name, part in cut(triangles):
                     write_mesh(partial / "chosen" / f"{name}{kind.suffix}", *mesh_arrays(model, part), **look)
             elif row == chosen:
-                write_mesh(partial / f"chosen{kind.suffix}", *arrays, **shown)
+                closed, facts_of_solid = _closed(surface, triangles, arrays, solid)
+                write_mesh(partial / f"chosen{kind.suffix}", *closed, **shown)
             better = None if refit is None else refit(int(row))
             if better is not None:
                 raised = (better.vertices, *arrays[1:])
@@ -382,7 +395,8 @@ def write_front(
                 if solution in with_mesh:
                     write_mesh(partial / fitted[1], *raised, **shown)
                 if row == chosen:
-                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *raised, **shown)
+                    closed, _ = _closed(surface, triangles, raised, solid)
+                    write_mesh(partial / f"chosen_refitted{kind.suffix}", *closed, **shown)
             files[solution] = path, fitted
             pace = max(pace, (time.perf_counter() - begun) / size)
         lines = getattr(model, "lines", None)  # which a model of another kind need not have
@@ -415,11 +429,13 @@ def write_front(
             arrays_of |= stored_arrays(surface)
         write_npz(partial / "front.npz", F=F[order], **arrays_of)
         shape = getattr(model, "shape", None)  # of a height grid
+        unit = length_unit(model.georeference)
         record = dict(run or {}) | {
             "model": {
                 "name": model.name,
                 "file": path_from(target, model.name),
                 "hash": model.hash,
+                **({} if unit == LENGTH else {"unit": unit}),
                 "vertices": model.n_vertices,
                 "triangles": len(model.faces),
                 "up": surface.view.rotation[2],
@@ -432,6 +448,7 @@ def write_front(
             **({"mesh_origin": look["origin"]} if look["origin"].any() else {}),
             "solutions": len(order),
             "chosen": None if chosen is None else int(np.flatnonzero(order == chosen)[0]),
+            **({"solid": facts_of_solid} if facts_of_solid else {}),
             "versions": package_versions(),
             "environment": machine(),
         }
@@ -596,19 +613,24 @@ class MeshWriter:
         shown = self._look | _lines_as_written(self.surface, faces)
         return OutMesh(own if vertices is None else vertices, triangles, attributes, **shown)
 
-    def write(self, path: Path, mesh: OutMesh, error: float) -> OutMesh:
+    def write(self, path: Path, mesh: OutMesh, error: float, solid: OutMesh | None = None) -> OutMesh:
         """Write a mesh of this mean error [model units], packed if it is to be, and return what was written."""
-        mesh = self.packed(mesh, error)
+        written = self.packed(mesh, error, solid)
         assert self.kind.write is not None
-        self.kind.write(path, mesh)
-        return mesh
+        self.kind.write(path, written)
+        return written
 
-    def packed(self, mesh: OutMesh, error: float) -> OutMesh:
-        """Return a mesh of this mean error [model units] as it is written, and take note of what is lost by it."""
+    def packed(self, mesh: OutMesh, error: float, solid: OutMesh | None = None) -> OutMesh:
+        """Return a mesh of this mean error [model units] as it is written, and take note of what is lost by it.
+
+        Or the solid that was made of it, whose walls and base say nothing of what is lost.
+        """
         self._rounding.add(mesh, self.surface.view.scale)
+        written = mesh if solid is None else solid
         if not self.compress or self.kind.pack is None:
-            return mesh
-        return self.kind.pack(mesh, COMPRESSION_SHARE * error * metres_per_model_unit(self.surface.model.georeference))
+            return written
+        metres = metres_per_model_unit(self.surface.model.georeference)
+        return self.kind.pack(written, COMPRESSION_SHARE * error * metres)
 
     def warn(self) -> None:
         """Say what is lost by single precision, and what the format does not hold."""
@@ -617,7 +639,9 @@ class MeshWriter:
         warn_of_left_behind(self.kind, model.name, model.attributes)
 
 
-def write_solution(path: Path, surface: Surface, faces: IntArray, *, compressed_by: float | None = None) -> OutMesh:
+def write_solution(
+    path: Path, surface: Surface, faces: IntArray, *, solid: float | None = None, compressed_by: float | None = None
+) -> OutMesh:
     """Write a mesh of a surface, its triangles (M, 3) in vector order, in the format of the path's suffix.
 
     Parameters
@@ -628,6 +652,8 @@ def write_solution(path: Path, surface: Surface, faces: IntArray, *, compressed_
         The original mesh and its rules.
     faces : (M, 3) int array
         The triangles.
+    solid : float, optional
+        Close the mesh by walls and a base so far below its lowest point [file units].
     compressed_by : float, optional
         The mean error of the mesh [model units]: it is compressed as far as that lets it.
 
@@ -639,7 +665,7 @@ def write_solution(path: Path, surface: Surface, faces: IntArray, *, compressed_
     Raises
     ------
     ResultError
-        If the format cannot hold this model, or is none that is compressed.
+        If the format cannot hold this model, or is none that is compressed, or it cannot be made solid.
 
     Warns
     -----
@@ -648,9 +674,30 @@ def write_solution(path: Path, surface: Surface, faces: IntArray, *, compressed_
         all that is known of the vertices.
     """
     writer = MeshWriter(format_of_output(path), surface, compress=compressed_by is not None)
-    written = writer.write(path, writer.mesh(faces), compressed_by or 0.0)
+    mesh, closed = writer.mesh(faces), None
+    if solid is not None:
+        check_solid(surface, solid, writer.kind)
+        own = mesh.vertices, mesh.faces, mesh.attributes
+        (vertices, triangles, attributes), _ = _closed(surface, faces, own, solid)
+        closed = replace(mesh, vertices=vertices, faces=triangles, attributes=attributes)
+    written = writer.write(path, mesh, compressed_by or 0.0, closed)
     writer.warn()
     return written
+
+
+def _closed(
+    surface: Surface, faces: IntArray, arrays: MeshArrays, thickness: float | None
+) -> tuple[MeshArrays, dict[str, Any]]:
+    """Return a mesh of these triangles (M, 3), in vector order, and nothing; with a thickness a solid, and its numbers.
+
+    ``arrays`` is the mesh: its vertices may have moved.
+    """
+    if thickness is None:
+        return arrays, {}
+    vertices, _, attributes = arrays
+    found = as_solid(surface, faces, thickness, vertices)
+    below = {name: values[found.source] for name, values in attributes.items()}
+    return (found.vertices, found.faces, below), {"thickness": thickness, **found.numbers}
 
 
 def _look(kind: Format, surface: Surface) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Programs of the npm registry that open what this package writes, run by Node.js; tests skip where they are missing."""
+"""Programs of the npm registry that open what this package writes, run by Node.js; tests skip where they lack."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ DEFAULT = ("--generations", "2", "--population", "8")
 QUICK = ("--generations", "3", "--population", "12", *PAPERS)
 # The presets that the shell offers.
 ALGORITHMS = [name for name, preset in PRESETS.items() if preset.whole_front]
-COMMANDS = ("simplify", "pick", "score", "info", "run", "report", "warm", "completion")
+COMMANDS = ("simplify", "pick", "levels", "quality", "score", "info", "run", "report", "warm", "completion")
 
 
 @pytest.fixture
@@ -770,7 +770,10 @@ def test_a_wrong_option_is_answered_in_one_line(tmp_path, capsys, options, messa
     [
         ((), r"a command is missing: simplify, pick, .*completion \(see meshsimp --help\)"),
         (("simplify", "-o", "out"), r"required: MODEL"),
-        (("melt", "roof"), r"invalid choice: 'melt' \(choose from simplify, pick, quality, score, .*\) \(see meshsimp --help\)"),
+        (
+            ("melt", "roof"),
+            r"invalid choice: 'melt' \(choose from simplify, pick, levels, quality, .*\) \(see meshsimp --help\)",
+        ),
         (("simplyfy", "roof"), r"invalid choice: 'simplyfy' .*; did you mean simplify\?"),
         (("scan.ply",), r"did you mean meshsimp simplify scan\.ply\?"),
         (("report",), r"required: OUT \(see meshsimp report --help\)"),

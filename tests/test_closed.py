@@ -507,3 +507,19 @@ def test_a_search_of_a_closed_surface_compiles_nothing_more(ball, tmp_path, monk
     assert run("simplify", ball, "-o", tmp_path / "out", "--moves", "2000", "--quiet", "--no-page") == 0
     assert compiled == []
     assert finished == [list(CLOSED_SEARCH)]
+
+
+def test_levels_of_a_closed_model_are_closed_too(front, tmp_path):
+    front.save(tmp_path / "out", meshes=0, pictures=False)
+    levels = front.levels(3)
+    for options in ((), ("--refit",)):
+        out = tmp_path / f"levels{len(options)}"
+        assert run("levels", tmp_path / "out", "-o", out, "--levels", 3, "--format", "glb", "-q", *options) == 0
+        record = json.loads((out / "levels.json").read_text())
+        assert record["geometric_error"].startswith("the largest distance")
+        for said, solution in zip(record["levels"], levels, strict=True):
+            mesh = as_trimesh(out / said["file"])
+            assert mesh.is_watertight
+            assert mesh.volume > 0.0, "not inside out"
+            assert options or mesh.volume == pytest.approx(solution.mesh.volume, rel=1e-5)
+            assert (said["mean_error"] < solution.mean_error) == (bool(options) and solution.mean_error > 0.0)

@@ -8,7 +8,7 @@ import pytest
 
 from meshsimp_pymoo.cli.parser import make_parser
 
-COMMANDS = ("simplify", "pick", "quality", "score", "info", "run", "report", "warm", "completion")
+COMMANDS = ("simplify", "pick", "levels", "quality", "score", "info", "run", "report", "warm", "completion")
 PAGES = Path(__file__).parent.parent / "docs" / "how-to"
 
 

@@ -115,6 +115,17 @@ def add_shown(parser: Any, *, quiet: bool = True) -> None:
     parser.add_argument("--json", action="store_true", help="the summary as JSON" if quiet else "as JSON")
 
 
+def add_solid(parser: Any, what: str) -> None:
+    """Add how a mesh is made solid."""
+    parser.add_argument(
+        "--solid",
+        type=typed(Real(0, strict=True).from_text),
+        metavar="T",
+        help=f"close {what} for printing: by walls along its outline and holes, and a flat base T below its lowest "
+        "point [units of height]",
+    )
+
+
 def add_workers(parser: Any) -> None:
     """Add where work is done."""
     workers = parser.add_mutually_exclusive_group()

@@ -104,6 +104,7 @@ class Output:
     format: str = "ply"
     meshes: int | None = 100
     refit: bool = False
+    solid: float | None = None
     page: bool = True
     quiet: bool = False
     json: bool = False
@@ -160,7 +161,8 @@ class Request:
         """What of it is worth a place in the record of what was searched, beside options and rules."""
         search = {name: value for name, value in asdict(self.search).items() if name not in ("seed", "checkpoint")}
         free = asdict(self.free) if self.free.free else {"free": False}
-        return search | {"algorithm": self.algorithm} | free | self.wanted | {"refit": self.output.refit}
+        solid = {} if self.output.solid is None else {"solid": self.output.solid}
+        return search | {"algorithm": self.algorithm} | free | self.wanted | {"refit": self.output.refit} | solid
 
 
 def request_of(args: argparse.Namespace) -> Request:
@@ -245,6 +247,18 @@ REFUSED: dict[tuple[str, str], tuple[Callable[[Request], bool], str]] = {
         )
         for name in ("free_height", "no_centroids")
     },
+    ("--solid", "a front alone"): (
+        lambda request: request.output.solid is not None and not (request.wish.limits or request.wish.knee),
+        "it is for the chosen mesh; say which is wanted (--triangles N, --pick knee), or make it later (meshsimp pick)",
+    ),
+    ("--solid", "--format {format}"): (
+        lambda request: request.output.solid is not None and written_formats()[request.output.format].one_height,
+        "{title} holds surfaces with one height at each place, and a solid has two; write another format, such as stl",
+    ),
+    ("--solid", CLOSED): (
+        _is_closed_and(lambda request: request.output.solid is not None),
+        "it needs no base; leave --solid out",
+    ),
     ("--format {format}", CLOSED): (
         _is_closed_and(lambda request: written_formats()[request.output.format].one_height),
         "{title} holds surfaces with one height at each place; write another format, such as ply",

@@ -23,6 +23,7 @@ from meshsimp_pymoo.cli.terminal import (
     is_interrupted,
     place_for_matplotlib,
     say,
+    solid_in_words,
     stop_if_interrupted,
     tell,
     tell_origin,
@@ -169,6 +170,7 @@ def _summary(front: Front, output: Output) -> dict[str, Any]:
             "solution": chosen,
             "free": front[chosen].free,
             **in_numbers(front.quality[chosen]),
+            **{name: front.run[name] for name in ("solid",) if name in front.run},
         },
     } | {name: front.run[name] for name in SAID if name in front.run}
 
@@ -195,11 +197,13 @@ def _tell(front: Front, output: Output, wish: Wish) -> None:
     if front.has_lines:
         tell(f"break lines: {lines_in_words(run['model']['lines'], unit)}")
     if run.get("wish"):
-        tell(f"searched: around {in_words(run['wish'])}; the rest of the front is what came along")
+        tell(f"searched: around {in_words(run['wish'], unit)}; the rest of the front is what came along")
     if chosen is not None:
         path = _chosen_path(output)
         which = f"solution {chosen}{', free' * front[chosen].free}"
         tell(f"chosen: {path} ({which}): {described(front.quality[chosen], unit)}")
+        if "solid" in run:
+            tell(f"solid: {solid_in_words(run['solid'], unit)}")
     suffix = format_to_write(output.format).suffix
     written, refitted = (len(list(folder.glob(f"{place}/*{suffix}"))) for place in ("meshes", "refitted"))
     files = [there(folder, "front.csv", *PICTURES)]

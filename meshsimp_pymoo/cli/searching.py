@@ -73,6 +73,7 @@ from meshsimp_pymoo.surface.kinds import OfModel, as_stored, stored_arrays
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import MEASURES
 from meshsimp_pymoo.surface.smallest import tolerance_for
+from meshsimp_pymoo.surface.solid import check_solid
 from meshsimp_pymoo.surface.surface import Refitted
 from meshsimp_pymoo.tiles.front import TILE
 from meshsimp_pymoo.warming import (
@@ -136,6 +137,8 @@ def _simplify(request: Request, shown: Stages) -> int:
             as_found = _of_kind(request, "closed" if isinstance(problem.model, ClosedModel) else "height")
             refuse(as_found)
             format_to_write(output.format).check(problem.model)
+            if output.solid is not None:
+                check_solid(problem.surface, output.solid)
             check_one_piece(problem.n_var, problem.model.name, _smaller(request.model, problem.model))
         read_seconds = shown.seconds["reading"] - compiled.seconds
         compiled.finish(_parts(as_found))
@@ -659,6 +662,7 @@ def _write(found: _Found, keeper: Keeper, shown: Stages) -> int | None:
                 mesh_format=output.format,
                 chosen=chosen,
                 refit=False if fitted is None else fitted,
+                solid=output.solid,
                 pictures=False,
                 run=run,
                 until=found.until,

@@ -470,6 +470,16 @@ def in_unit(unit: str) -> str:
     return "" if unit == LENGTH else f" {unit}"
 
 
+def solid_in_words(numbers: Mapping[str, Any], unit: str) -> str:
+    """Return what there is to say of a mesh that was closed for printing, whose other numbers are its surface's."""
+    volume = f"{numbers['volume']:.6g}" + ("" if unit == LENGTH else f" cubic {unit}")
+    parted = f", parted at {numbers['parted']:,} places where its outline touched itself" if "parted" in numbers else ""
+    return (
+        f"with walls and a base {numbers['thickness']:g}{in_unit(unit)} below the lowest point the file has "
+        f"{numbers['triangles']:,} triangles, volume {volume}{parted}; the numbers above are those of the surface"
+    )
+
+
 def say(line: str) -> None:
     """Print one line on stderr."""
     print(f"meshsimp: {printable(with_options(line))}", file=sys.stderr)

@@ -52,7 +52,7 @@ WAY_OUT = "mend that, and the same command does what is missing"
 KEY_DIGITS = 16
 
 # What is not stored of a model: results can be shown without its colours and the checks it passed.
-NOT_STORED = ("attributes", "facts", "georeference", "found", "material")
+NOT_STORED = ("attributes", "facts", "georeference", "found", "material", "raster")
 # Break lines are stored as arrays whose names begin so.
 LINES = "lines_"
 # What closed models alone have.

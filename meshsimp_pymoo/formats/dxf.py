@@ -106,6 +106,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
     import io
 
     import ezdxf
+    import numpy as np
 
     with _same_bytes():
         drawing = ezdxf.new(EDITION, units=INSUNITS.get(metres_of(mesh.georeference.get("unit")) or 0.0, NO_UNITS))
@@ -115,7 +116,15 @@ def _write(path: Path, mesh: OutMesh) -> None:
             drawing.layers.add(LINE_LAYER, color=1)
         for line in mesh.lines:
             space.add_polyline3d(mesh.vertices[line].tolist(), dxfattribs={"layer": LINE_LAYER})
-        drawing.header["$EXTMIN"], drawing.header["$EXTMAX"] = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        low, high = mesh.vertices.min(axis=0).tolist(), mesh.vertices.max(axis=0).tolist()
+        # what is seen first: all of it, wherever it is on Earth
+        height, center = max(np.subtract(high, low)[:2].tolist()), np.add(low, high)[:2] / 2
+        drawing.set_modelspace_vport(height or 1.0, center.tolist())
+        space.reset_extents(low, high)
+        drawing.header["$EXTMIN"], drawing.header["$EXTMAX"] = (
+            low,
+            high,
+        )  # which the library does not take from a 0, 0, 0
         handles = drawing.entitydb.handles
         first = int(str(handles), 16)
         handles.reset(f"{first + len(mesh.faces):X}")

@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from meshsimp_pymoo.errors import ResultError, reason_of, warn_of, way_to_install
-from meshsimp_pymoo.formats.source.metric import DEGREE, WGS84, epsg_number
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.arrays import FloatArray, IntArray
@@ -79,6 +78,8 @@ def geodetic(georeference: Mapping[str, Any], points: FloatArray, metres: float,
     """
     import numpy as np
 
+    from meshsimp_pymoo.formats.source.metric import epsg_number
+
     number, text = epsg_number(georeference), georeference.get("crs")
     if not (number or text):
         return None
@@ -86,6 +87,7 @@ def geodetic(georeference: Mapping[str, Any], points: FloatArray, metres: float,
     if number == GEOGRAPHIC:
         return np.column_stack([points[:, :2], heights])
     try:
+        from rasterio.crs import CRS
         from rasterio.errors import CRSError
         from rasterio.warp import transform
     except ImportError:
@@ -95,7 +97,10 @@ def geodetic(georeference: Mapping[str, Any], points: FloatArray, metres: float,
         ) from None
     system = f"EPSG:{number}" if number else str(text)
     try:
-        x, y = transform(system, f"EPSG:{GEOGRAPHIC}", points[:, 0].tolist(), points[:, 1].tolist())
+        known = CRS.from_user_input(system)
+        if not (known.is_geographic or known.is_projected):  # a site's own; those would come back as they are
+            raise CRSError("it is neither geographic nor projected")
+        x, y = transform(known, f"EPSG:{GEOGRAPHIC}", points[:, 0].tolist(), points[:, 1].tolist())
     except (CRSError, ValueError, RuntimeError) as problem:
         warn_of(f"{name}: its reference system leads to no place on Earth ({reason_of(problem)}); it stays local")
         return None
@@ -115,6 +120,8 @@ def earth_centred(geodetic: FloatArray) -> FloatArray:
     """
     import numpy as np
 
+    from meshsimp_pymoo.formats.source.metric import DEGREE, WGS84
+
     axis, inverse = WGS84
     squared = (2.0 - 1.0 / inverse) / inverse
     longitude, latitude = geodetic[:, 0] * DEGREE, geodetic[:, 1] * DEGREE
@@ -132,7 +139,7 @@ def place_at(longitude: float, latitude: float, height: float) -> Place:
     """
     import numpy as np
 
-    x, y = longitude * DEGREE, latitude * DEGREE
+    x, y = math.radians(longitude), math.radians(latitude)
     east = [-math.sin(x), math.cos(x), 0.0]
     north = [-math.sin(y) * math.cos(x), -math.sin(y) * math.sin(x), math.cos(y)]
     up = [math.cos(y) * math.cos(x), math.cos(y) * math.sin(x), math.sin(y)]

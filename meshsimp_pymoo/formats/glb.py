@@ -45,6 +45,10 @@ LEAST_EXTENT, MOST_EXTENT = 1e-30, 1e30
 # 7 on it predicts places from their neighbours, and 10 makes files no more than a few per cent smaller.
 FEWEST_BITS, MOST_BITS = 8, 24
 DRACO_LEVEL = 7
+# The bits of a normal, which looks right with fewer, and what Draco calls the attributes. Colours and places on images
+# are kept as they are.
+NORMAL_BITS = 10
+DRACO_KINDS = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2, "TEXCOORD_0": 3}
 LEVELS, DRACO = "MSFT_lod", "KHR_draco_mesh_compression"
 
 
@@ -144,21 +148,23 @@ def _pack(mesh: OutMesh, most: float) -> OutMesh:
     # of a step between two numbers half is rounded, along each axis
     steps = math.sqrt(3) / 2 * extent / most if most > 0.0 else math.inf
     bits = min(max(math.ceil(math.log2(steps + 1)), FEWEST_BITS), MOST_BITS) if math.isfinite(steps) else MOST_BITS
-    color, uv = _colors(mesh), _places(mesh)
+    own = _columns(mesh)
+    of_double = {key: values.astype(np.float64) for key, values in own.items()}
     content = DracoPy.encode(
-        points.astype(np.float64),
+        of_double["POSITION"],
         np.asarray(mesh.faces, np.uint32),
         quantization_bits=bits,
         compression_level=DRACO_LEVEL,
-        colors=color,
-        tex_coord=None if uv is None else uv.astype(np.float64),
+        colors=own.get("COLOR_0"),
+        tex_coord=of_double.get("TEXCOORD_0"),
+        normals=of_double.get("NORMAL"),
+        normal_quantization_bits=NORMAL_BITS,
     )
     found = DracoPy.decode(content)
-    columns = {"POSITION": found.points} | ({} if color is None else {"COLOR_0": found.colors})
-    columns |= {} if uv is None else {"TEXCOORD_0": found.tex_coord}
-    kinds = {"POSITION": 0, "COLOR_0": 2, "TEXCOORD_0": 3}  # of Draco's attributes
-    ids = {key: int(found.get_attribute_by_type(kinds[key])["unique_id"]) for key in columns}
-    was, shift = _nearest(points, found.points)
+    said = {key: found.get_attribute_by_type(DRACO_KINDS[key]) for key in own}
+    columns = {key: attribute["data"] for key, attribute in said.items()}
+    ids = {key: int(attribute["unique_id"]) for key, attribute in said.items()}
+    was, shift = _nearest(upright(mesh)[0], found.points)
     if lost := len(mesh.faces) - len(found.faces):
         warn_of(f"{mesh.name}: {lost:,} triangle(s) without area stay behind: Draco holds none")
     if folded := _turned_over(points[was], found.points, np.asarray(found.faces)):
@@ -220,6 +226,20 @@ def _as_stored(mesh: OutMesh) -> FloatArray:
     return upright(mesh)[0].astype("<f4") + np.float32(0)  # no -0.0
 
 
+def _normals(mesh: OutMesh) -> FloatArray:
+    """Return unit normals (V, 3) of the vertices: the mean of their triangles' by area; up where that is nothing."""
+    import numpy as np
+
+    points, faces = upright(mesh)[0], np.asarray(mesh.faces)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normals = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], np.cross(b - a, c - a))
+    length = np.linalg.norm(normals, axis=1)
+    normals[length == 0.0] = [0.0, 1.0, 0.0]
+    return (normals / np.where(length == 0.0, 1.0, length)[:, None]).astype("<f4")
+
+
 def _colors(mesh: OutMesh) -> AnyArray | None:
     """Return the colours (V, 4) as they are stored."""
     import numpy as np
@@ -242,7 +262,8 @@ def _places(mesh: OutMesh) -> FloatArray | None:
 
 def _columns(mesh: OutMesh) -> dict[str, AnyArray]:
     """Return what is stored of the vertices, by the name of the attribute."""
-    columns = {"POSITION": _as_stored(mesh), "COLOR_0": _colors(mesh), "TEXCOORD_0": _places(mesh)}
+    columns = {"POSITION": _as_stored(mesh), "NORMAL": _normals(mesh) if mesh.shaded else None}
+    columns |= {"COLOR_0": _colors(mesh), "TEXCOORD_0": _places(mesh)}
     return {key: values for key, values in columns.items() if values is not None}
 
 
@@ -252,6 +273,8 @@ def _form(key: str, values: AnyArray) -> dict[str, Any]:
         return {"componentType": GLTF_UBYTE, "type": "VEC4", "normalized": True}
     if key == "TEXCOORD_0":
         return {"componentType": GLTF_FLOAT, "type": "VEC2"}
+    if key == "NORMAL":
+        return {"componentType": GLTF_FLOAT, "type": "VEC3"}
     ends = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
     return {"componentType": GLTF_FLOAT, "type": "VEC3"} | ends
 
@@ -349,7 +372,7 @@ def _write(path: Path, mesh: OutMesh) -> None:
 
 def _looks(mesh: OutMesh, described: Sequence[dict[str, Any]], binary: _Binary) -> dict[str, Any]:
     """Give all primitives the material of a mesh, if it has one, and return what the tree says of it."""
-    material = mesh.material if mesh.uv is None else mesh.material or Material()
+    material = mesh.material or (Material() if mesh.shaded or mesh.uv is not None else None)
     if material is None:
         return {}
     for each in described:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ModelError, warn_of
 from meshsimp_pymoo.formats.material import LIBRARY, Material, put_beside
@@ -187,14 +188,21 @@ def _material_of(path: Path, wanted: str, found: dict[str, str], name: str, *, p
     return Material(wanted, (red, green, blue, opacity), image)
 
 
+def _comments(georeference: Mapping[str, Any]) -> list[str]:
+    """Return what is known of the coordinates as lines that programs pass over: the system, the unit."""
+    known = f"EPSG:{georeference['epsg']}" if georeference.get("epsg") else georeference.get("crs")
+    said = {"crs": known, "unit": georeference.get("unit")}
+    return [f"# {name}: {' '.join(str(fact).split())}" for name, fact in said.items() if fact]
+
+
 def _write(path: Path, mesh: OutMesh) -> None:
     """Write positions and texture coordinates so that they read back equal, colours as fractions of 1."""
     import numpy as np
 
-    heading, rows = [], np.asarray(mesh.vertices, np.float64)
+    heading, rows = _comments(mesh.georeference), np.asarray(mesh.vertices, np.float64)
     if mesh.material is not None:
         library = _put_material(path.parent, mesh.material)
-        heading = [f"mtllib {library}", f"usemtl {_word(mesh.material.name)}"]
+        heading += [f"mtllib {library}", f"usemtl {_word(mesh.material.name)}"]
     if (color := mesh.attributes.get("color")) is not None:
         rows = np.column_stack([rows, color[:, :3] / 255.0])
     columns = [("v", rows.tolist())] + ([] if mesh.uv is None else [("vt", mesh.uv.astype(np.float64).tolist())])

@@ -82,6 +82,8 @@ class OutMesh:
     line_names: tuple[str, ...] = ()
     #: What a GLB says of the mesh in its ``extras``, as plain data.
     extras: Mapping[str, Any] = field(default_factory=dict)
+    #: Whether a GLB says normals of its vertices and a material in any case: some viewers show no relief without.
+    shaded: bool = False
     #: The same mesh compressed, where the format is to hold that instead; see ``Format.pack``.
     packed: Packed | None = None
 

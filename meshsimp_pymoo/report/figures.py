@@ -549,7 +549,9 @@ def error_figure(
     # a few spikes shall not pale all the rest
     plot_error(surface, size, ax, covered=covered, largest=float(np.quantile(size, 0.995)) or None)
     bare = int((~np.asarray(covered, dtype=bool)).sum())
-    ax.set_title("\n".join(filter(None, [title, f"blue: {bare:,} uncovered vertices" if bare else ""])), fontsize=10)
+    system = printable(reference_system(surface.model.georeference))
+    said = [title, system, f"blue: {bare:,} uncovered vertices" if bare else ""]
+    ax.set_title("\n".join(filter(None, said)), fontsize=10)
     return figure
 
 

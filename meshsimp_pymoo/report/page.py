@@ -50,7 +50,7 @@ SCRIPTS = (
 OF_BODIES = "body.js"
 PAGE_BYTES = 15_000_000
 # The libraries, the texts and the numbers of the solutions.
-FIXED_BYTES = 700_000
+FIXED_BYTES = 730_000
 # What one triangle, one deviation and one vertex take, embedded; measured on scans and terrain. Too low an estimate is
 # put right afterwards, too high a one leaves out meshes that would have fitted.
 TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES, UV_BYTES = 4.0, 1.2, 26.0, 9
@@ -62,6 +62,8 @@ SCALE_QUANTILE = 0.98
 DRAWN_LINE_VERTICES = 10_000
 # How the meshes can be coloured, as the page calls it; the first ones only where the model has them.
 COLOURS = {"texture": "texture", "own": "own colours", "plain": "plain", "height": "heights", "error": "error"}
+# A surface that is longer than so many times its breadth is seen in high windows.
+BROAD = 1.15
 # The slider of the heights reaches from a tenth of the lower of their usual factor and 1 to ten times the higher one.
 HEIGHT_DECADES = 1.0
 # Parts of a run's record that the page repeats; the seconds are not among them, they are never the same twice.
@@ -223,10 +225,16 @@ def simplification_page(
         solutions=count,
         unit=unit if unit != LENGTH else "the units of the file",
         system=printable(system),
-        thinned=[*_what_was_searched(front.run), *_what_is_thinned(model, held, missing), *([word] if word else [])],
+        thinned=[
+            *_what_was_searched(front.run, unit),
+            *_what_is_thinned(model, held, missing),
+            *([word] if word else []),
+        ],
         heights=None if view.is_closed else _heights(view.exaggeration),
         colours={name: COLOURS[name] for name in colours},
         own_colours=own,
+        known_unit=unit != LENGTH,
+        broad=not view.is_closed and _is_broad(view.extent),
         examples={
             "triangles": columns["triangles"][count // 2 if chosen is None else chosen],
             "error": f"{columns[first_error][count // 2 if chosen is None else chosen]:.3g}",
@@ -265,7 +273,16 @@ def _heights(exaggeration: float) -> dict[str, str]:
     """Return the ends of the slider of the heights and where it stands: logarithms of the factor."""
     usual = math.log10(exaggeration)
     least, most = min(0.0, usual) - HEIGHT_DECADES, max(0.0, usual) + HEIGHT_DECADES
-    return {"least": f"{least:.2f}", "most": f"{most:.2f}", "usual": f"{usual:.2f}"}
+    return {name: f"{round(value, 2):g}" for name, value in {"least": least, "most": most, "usual": usual}.items()}
+
+
+def _is_broad(extent: FloatArray) -> bool:
+    """Return whether a surface is seen broader than high: then its windows are no higher than broad.
+
+    >>> _is_broad(np.array([30.0, 20.0, 1.0])), _is_broad(np.array([20.0, 30.0, 1.0]))
+    (True, False)
+    """
+    return bool(extent[1] <= BROAD * extent[0])
 
 
 def _errors() -> dict[str, str]:
@@ -425,11 +442,11 @@ def _mesh_files(front: StoredFront, chosen: int | None) -> list[str]:
     return files
 
 
-def _what_was_searched(run: Mapping[str, Any]) -> Iterator[str]:
+def _what_was_searched(run: Mapping[str, Any], unit: str) -> Iterator[str]:
     if run.get("wish"):
         yield (
-            f"What was searched is the mesh with {in_words(run['wish'])}. The others came along: a search for the "
-            "whole front would find better ones far from it."
+            f"What was searched is the mesh with {in_words(run['wish'], unit)}. The others came along: a search for "
+            "the whole front would find better ones far from it."
         )
 
 

@@ -33,6 +33,7 @@ from meshsimp_pymoo.surface.accuracy import (
     accuracy_of,
 )
 from meshsimp_pymoo.surface.measures import LENGTH
+from meshsimp_pymoo.surface.units import system_name
 
 __all__ = ["DATA", "PAGE", "RESIDUALS", "QualityStatement", "stated"]
 
@@ -70,7 +71,7 @@ class QualityStatement(Accuracy):
     """
 
     compared: Compared = field(repr=False, compare=False)
-    mesh: Mapping[str, Any] = field(default_factory=dict)
+    mesh: dict[str, Any] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
     @property
@@ -133,7 +134,7 @@ class QualityStatement(Accuracy):
             "statement": self.sentence,
             "remark": NOT_INDEPENDENT,
             "original": self.original,
-            "mesh": dict(self.mesh),
+            "mesh": self.mesh,
             "accuracy": self.numbers.plain,
             "sources": SOURCES,
             "left_out": list(self.left_out),
@@ -246,11 +247,17 @@ def _subjects(stated: QualityStatement, mesh: str) -> list[tuple[str, str]]:
             f"{stated.original_triangles:,} triangles",
         ),
         ("SHA-256 of the original", original["sha256"]),
-        ("Reference system", printable(stated.system) or "not stated by the file"),
+        ("Reference system", _system(stated)),
         ("Unit of lengths", _unit_in_words(original)),
         ("Extent in the file", box),
         ("Made by", f"meshsimp_pymoo {version('meshsimp-pymoo')}"),
     ]
+
+
+def _system(stated: QualityStatement) -> str:
+    name = printable(system_name(stated.compared.surface.model.georeference))
+    said = [printable(stated.system), *([name] if name not in stated.system else [])]
+    return "; ".join(filter(None, said)) or "not stated by the file"
 
 
 def _unit_in_words(original: Mapping[str, Any]) -> str:
@@ -272,7 +279,8 @@ def _accuracy_rows(stated: QualityStatement) -> Rows:
     rows: Rows = [("Check points", points, f"vertices of the original, {weighed}{left_out}")]
     if not stated.closed:
         costs = {"nearest": "they count with their distance to the mesh", "ignore": "they count as 0"}
-        rows.append(("Not covered", f"{stated.uncovered:,}", costs[stated.outside] if stated.uncovered else ""))
+        rows.append(("Not covered", f"{stated.uncovered:,}", costs.get(stated.outside, "") if stated.uncovered else ""))
+    if not math.isnan(stated.coverage):
         rows.append(("Coverage", in_per_cent(stated.coverage), "of the original's area in the plane"))
     rows += [
         ("LE90, as counted", length(stated.le90), "90 % of the check points are no farther off"),
@@ -282,7 +290,7 @@ def _accuracy_rows(stated: QualityStatement) -> Rows:
         ("RMSE", length(stated.rms_error), "root mean square"),
         ("Mean absolute error", length(stated.mean_error), ""),
     ]
-    if not stated.closed:
+    if not math.isnan(stated.bias):
         rows += [
             ("Bias", length(stated.bias), "mean of original minus mesh, where it is covered"),
             ("Standard deviation", length(stated.standard_deviation), "about the bias"),

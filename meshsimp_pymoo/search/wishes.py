@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from numbers import Real
 from typing import Any
 
-from meshsimp_pymoo.surface.measures import MEASURES, OBJECTIVES
+from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, OBJECTIVES
 
 # Moves where no budget is given, about ten seconds of two cores.
 USUAL_BUDGET = 10_000_000
@@ -89,14 +89,17 @@ def beside(limits: Mapping[str, float], measure: str) -> dict[str, float]:
     return {name: limit for name, limit in limits.items() if name in SEARCHED and SEARCHED[name] != measure}
 
 
-def in_words(limits: Mapping[str, float]) -> str:
-    """Return limits as people say them.
+def in_words(limits: Mapping[str, float], unit: str = LENGTH) -> str:
+    """Return limits as people say them, lengths with their unit where it is known.
 
-    >>> in_words({"triangles": 5000, "max_error": 0.25})
-    'at most 5,000 triangles and a max error of at most 0.25'
+    >>> in_words({"triangles": 5000, "max_error": 0.25}), in_words({"max_error": 0.25}, "m")
+    ('at most 5,000 triangles and a max error of at most 0.25', 'a max error of at most 0.25 m')
     """
+    behind = "" if unit == LENGTH else f" {unit}"
     said = [
-        f"at most {limit:,} triangles" if name == "triangles" else f"a {MEASURES[name].label} of at most {limit:g}"
+        f"at most {limit:,} triangles"
+        if name == "triangles"
+        else f"a {MEASURES[name].label} of at most {limit:g}{behind * MEASURES[name].is_error}"
         for name, limit in limits.items()
     ]
     return " and ".join(said)

@@ -162,7 +162,7 @@ class View:
 
     @property
     def exaggeration(self) -> float:
-        """Factor by which z is drawn: higher where a flat relief would not show, lower where a deep one would be a needle."""
+        """Factor by which z is drawn: more for a relief too flat to show, less for one that would be a needle."""
         width, height = float(self.extent[:2].max()), float(self.extent[2])
         if not height > 0 or self.is_closed:
             return 1.0

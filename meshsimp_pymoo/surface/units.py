@@ -36,6 +36,15 @@ def metres_per_model_unit(georeference: Mapping[str, Any]) -> float:
     return metres_of(length_unit(georeference)) or 1.0
 
 
+def system_name(georeference: Mapping[str, Any]) -> str:
+    """Return what the reference system is called, as far as its text says.
+
+    >>> system_name({"epsg": 32633, "crs": 'PROJCS["WGS 84 / UTM zone 33N",...]'}), system_name({"epsg": 4326})
+    ('WGS 84 / UTM zone 33N', '')
+    """
+    return str(georeference.get("crs") or "").partition('"')[2].partition('"')[0]
+
+
 def reference_system(georeference: Mapping[str, Any]) -> str:
     """Return what the coordinates are, and how the plane is scaled; empty where nobody says.
 
@@ -46,8 +55,8 @@ def reference_system(georeference: Mapping[str, Any]) -> str:
     >>> reference_system({"crs": 'PROJCS["WGS 84 / UTM zone 33N",...]'}), reference_system({})
     ('WGS 84 / UTM zone 33N', '')
     """
-    number, wkt = georeference.get("epsg"), str(georeference.get("crs") or "")
-    said = [f"EPSG:{number}" if number else wkt.partition('"')[2].partition('"')[0]]
+    number = georeference.get("epsg")
+    said = [f"EPSG:{number}" if number else system_name(georeference)]
     if "scale" in georeference:
         x, y = georeference["scale"]
         said.append(f"{x:.8g} x {y:.8g} {length_unit(georeference)} to a {georeference.get('unit') or 'unit'}")

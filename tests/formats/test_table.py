@@ -78,6 +78,11 @@ def test_the_same_mesh_is_the_same_bytes_at_another_time_and_in_upper_case(tmp_p
     assert [content("b", kind, str.upper) for kind in written] == first
 
 
+def test_what_is_written_by_a_library_of_an_extra_says_by_which():
+    without = {kind.name for kind in written_formats().values() if bool(kind.extra) != bool(kind.needs)}
+    assert without == set()
+
+
 @pytest.mark.parametrize("name", [kind.name for kind in all_formats() if kind.needs])
 def test_a_library_that_is_missing_for_writing_is_named_before_any_search(tmp_path, monkeypatch, capsys, name):
     kind = written_formats()[name]

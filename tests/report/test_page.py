@@ -5,21 +5,20 @@ from __future__ import annotations
 import base64
 import gzip
 import hashlib
-import io
 import json
-import math
 import re
 import shlex
 import time
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import Visit, launched
+from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike, until
 from samples import freed
 from scans import bowl
-from scipy.spatial import Delaunay
 from sketching import sketch
 
 from meshsimp_pymoo import MeshProblem
@@ -36,19 +35,9 @@ from meshsimp_pymoo.surface.measures import MEASURES, OF_LINES
 from meshsimp_pymoo.surface.surface import mesh_arrays
 
 ERRORS = ["mean_error", "rms_error", "max_error", "surface_error", "error"]
+# Colours and shading.
+LOOKS = [("plain", "flat"), ("plain", "wireframe"), ("error", "flat"), ("height", "flat")]
 SIDE = 24  # samples along a side of the model
-
-
-def relief(side, rng):
-    """Return a rolling square: points (N, 3) with the height along z, their Delaunay triangles, colours."""
-    y, x = np.mgrid[:side, :side].astype(float)
-    inside = (x % (side - 1) > 0) & (y % (side - 1) > 0)
-    x, y = (part + 0.3 * inside * rng.uniform(-1, 1, x.shape) for part in (x, y))  # one Delaunay triangulation, no ties
-    z = 3 * np.sin(x / 4) * np.cos(y / 5) + rng.normal(scale=0.1, size=x.shape)
-    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    faces = Delaunay(points[:, :2]).simplices
-    colour = np.column_stack([120 + 30 * points[:, 2], 200 - 5 * points[:, 0], 80 + 5 * points[:, 1]])
-    return points, faces, colour.clip(0, 255).astype(np.uint8)
 
 
 def subsets(problem, count, rng):
@@ -115,51 +104,6 @@ def visit(seen):
     """The page, as it was when it was opened."""
     seen.used = True
     return seen
-
-
-def shown(page):
-    """Return the number of the solution whose mesh is shown, when the numbers beside it are the same one's."""
-    row = number(page, "solution")
-    page.wait_for_selector(f"html[data-shown='{row:.0f}']")
-    return int(row)
-
-
-def until(page, condition):
-    """Wait for what the page's policy lets nobody wait for inside it."""
-    for _ in range(200):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(20)
-    pytest.fail(f"never came true: {condition}")
-
-
-def number(page, name):
-    return float(page.locator(f"#number-{name}").get_attribute("value"))
-
-
-def pixels(page):
-    """Return what is drawn in the windows of the original and of the simplified mesh, (height, width, 3) each."""
-    from PIL import Image
-
-    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    with Image.open(io.BytesIO(page.locator(".views").screenshot())) as image:
-        drawn = np.asarray(image.convert("RGB")).astype(int)
-    whole, *windows = (
-        page.locator(place).bounding_box() for place in (".views", "#original-window", "#simplified-window")
-    )
-    scale = drawn.shape[1] / whole["width"]
-    parts = []
-    for box in windows:
-        left, top = scale * (box["x"] - whole["x"]), scale * (box["y"] - whole["y"])
-        rows = slice(math.ceil(top), math.floor(top + scale * box["height"]))
-        parts.append(drawn[rows, math.ceil(left) : math.floor(left + scale * box["width"])])
-    return parts
-
-
-def unlike(a, b):
-    """Return the share of pixels that differ visibly."""
-    height, width = (min(s, t) for s, t in zip(a.shape[:2], b.shape[:2], strict=True))
-    return float((np.abs(a[:height, :width] - b[:height, :width]).max(axis=2) > 24).mean())
 
 
 # ----------------------------------------------------------------------------------------------------------- choosing
@@ -422,28 +366,30 @@ def test_another_solution_changes_the_right_window_alone(visit):
 def test_looks_differ_and_one_colour_bar_holds_for_both_windows(visit, front):
     page = visit.page
     looks = {}
-    for look in ("shaded", "wireframe", "error"):
-        page.check(f"input[value={look}]", force=True)
+    for look in LOOKS:
+        dress(page, *look)
         looks[look] = pixels(page)
-        assert page.locator("#error-key").is_visible() == (look == "error")
+        assert page.locator("#colour-key").is_visible() == (look[0] != "plain")
     for window in (0, 1):
-        assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
-        assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
+        for a, b in combinations(LOOKS, 2):
+            assert unlike(looks[a][window], looks[b][window]) > 0.05, (a, b)
+    dress(page, "error", "flat")
+    page.check("#same-scale")
     # seen from above, both windows show the same map of the error, on the original and on the simplified surface
     page.click("#from-above")
     assert unlike(*pixels(page)) < 0.25
-    end = page.inner_text("#scale-end")
+    end = scale_of_errors(page)
     page.locator("#slider").fill("5")
     assert shown(page) == 5
-    assert page.inner_text("#scale-end") == end
+    assert scale_of_errors(page) == end
     largest = np.quantile(front.knee().simplified.deviation, page_module.SCALE_QUANTILE)
-    assert float(end.removeprefix("≥ ")) == pytest.approx(largest, rel=1e-3)
-    page.select_option("#scale", "one")
+    assert end == pytest.approx(largest, rel=5e-3)
+    page.uncheck("#same-scale")
     fitted = np.quantile(front[5].simplified.deviation, page_module.SCALE_QUANTILE)
-    assert float(page.inner_text("#scale-end").removeprefix("≥ ")) == pytest.approx(fitted, rel=0.02)
+    assert scale_of_errors(page) == pytest.approx(fitted, rel=0.02)
     # where nothing deviates, all is in the palest colour
     page.locator("#slider").fill(str(len(front) - 1))
-    page.select_option("#scale", "all")
+    page.check("#same-scale")
     assert shown(page) == len(front) - 1
     _, drawn = pixels(page)
     middle = drawn[drawn.shape[0] // 2 - 10 :, drawn.shape[1] // 2 - 10 :][:20, :20].reshape(-1, 3)
@@ -582,14 +528,15 @@ def test_everything_can_be_reached_with_the_keyboard_and_shows_its_focus(used):
         used.page.keyboard.press("Tab")
         name, outlined, nothing = used.page.evaluate(
             """() => { const at = document.activeElement;
-            const seen = at.name === "look" ? at.nextElementSibling : at;
+            const seen = at.closest(".switch") ? at.nextElementSibling : at;
             return [at.id || at.value || at.textContent, getComputedStyle(seen).outlineStyle !== "none",
             at === document.body]; }"""
         )
         if not nothing:
             reached[name] = outlined
     assert {
-        "log-x", "log-y", "chart", "slider", "shaded", "canvas", "from-above", "from-side", "reset", "heights",
+        "log-x", "log-y", "chart", "slider", "canvas", "from-above", "from-side", "reset", "heights",
+        "own", "flat", "hillshade", "picture", "full-screen", "beside", "pin",
         "most-triangles", "most-error", "measure", "ply", "obj", "stl", "command", "copy",
     } <= set(reached)  # fmt: skip
     assert all(reached.values()), reached
@@ -997,8 +944,8 @@ def test_break_lines_are_drawn_on_both_meshes_and_can_be_hidden(browser, lined):
     for name in MEASURES:
         assert number(page, name) == getattr(front[2], name)
     assert "line max error" in page.locator("#measure option").all_inner_texts()
-    for look in ("shaded", "wireframe", "error"):
-        page.check(f"input[value={look}]", force=True)
+    for look in LOOKS[:3]:
+        dress(page, *look)
         with_lines = pixels(page)
         page.uncheck("#lines")
         without = pixels(page)
@@ -1069,19 +1016,10 @@ def closed_opened(browser, closed_folder):
 @pytest.fixture
 def closed(closed_opened):
     """The page of a closed model, seen from where it opens."""
-    closed_opened.page.check("input[value=shaded]", force=True)
+    dress(closed_opened.page, "plain", "flat")
     closed_opened.page.click("#reset")
     yield closed_opened
     closed_opened.check()
-
-
-def camera(page):
-    """Return where the camera is and what is up, relative to what it looks at, and its magnification."""
-    found = page.evaluate(
-        """() => { const { camera, target } = state.viewer;
-        return [camera.position.clone().sub(target).toArray(), camera.up.toArray(), camera.zoom, target.toArray()]; }"""
-    )
-    return tuple(map(np.array, found))
 
 
 def test_the_page_of_a_closed_model_says_nothing_of_heights(closed):
@@ -1189,25 +1127,27 @@ def test_the_error_on_a_simplified_body_is_that_of_the_nearest_original_vertex(c
     page.locator("#slider").fill("4")
     assert shown(page) == 4
     looks = {}
-    for look in ("shaded", "wireframe", "error"):
-        page.check(f"input[value={look}]", force=True)
-        looks[look] = pixels(page)
+    for look in LOOKS:
+        if "height" not in look:
+            dress(page, *look)
+            looks[look] = pixels(page)
     for window in (0, 1):
-        assert unlike(looks["shaded"][window], looks["wireframe"][window]) > 0.05
-        assert unlike(looks["shaded"][window], looks["error"][window]) > 0.05
+        for a, b in combinations(looks, 2):
+            assert unlike(looks[a][window], looks[b][window]) > 0.05, (a, b)
+    dress(page, "error", "flat")
+    before = pixels(page)
     # another scale and another mesh show at once
     page.locator("#slider").fill("2")
     assert shown(page) == 2
     same = pixels(page)[1]
-    assert unlike(same, looks["error"][1]) > 0.05
-    page.select_option("#scale", "one")
+    assert unlike(same, before[1]) > 0.05
+    page.check("#same-scale")
     assert unlike(pixels(page)[1], same) > 0.02
-    page.select_option("#scale", "all")
     places, sources, faces, points = (
         np.array(page.evaluate(f"Array.from({what})"))
         for what in (
-            "state.viewer.fine.getAttribute('position').array", "state.viewer.sources",
-            "state.viewer.fine.index.array", "state.viewer.arrays.position",
+            "state.viewer.simplified.fine.geometry.attributes.position.array", "state.viewer.simplified.fine.sources",
+            "state.viewer.simplified.fine.geometry.index.array", "state.viewer.arrays.position",
         )
     )  # fmt: skip
     places, points, faces = places.reshape(-1, 3), points.reshape(-1, 3), faces.reshape(-1, 3)
@@ -1249,7 +1189,18 @@ def test_all_of_the_page_of_a_closed_model_is_reached_with_the_keyboard(closed):
     for _ in range(40):
         closed.page.keyboard.press("Tab")
         reached.add(closed.page.evaluate("document.activeElement.id || document.activeElement.value"))
-    assert {"chart", "slider", "shaded", "canvas", "quarter-turn", "other-side", "reset", "measure", "ply"} <= reached
+    assert {
+        "chart",
+        "slider",
+        "plain",
+        "flat",
+        "canvas",
+        "quarter-turn",
+        "other-side",
+        "reset",
+        "measure",
+        "ply",
+    } <= reached
 
 
 def test_two_fingers_magnify_and_roll_a_closed_model(browser, closed_folder):
@@ -1305,7 +1256,7 @@ def test_the_page_of_what_has_holes_shows_its_inside_its_rims_and_what_is_uncove
                 red, _, blue = window[window.shape[0] // 2, window.shape[1] // 2]
                 assert (blue > red + 5) == is_inside
                 assert (red > blue + 5) != is_inside
-        page.check("input[value=error]", force=True)
+        dress(page, "error")
         assert page.locator("#uncovered-key").is_visible() == any(solution.uncovered for solution in Front.load(front))
         visit.check()
     finally:

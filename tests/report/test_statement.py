@@ -376,3 +376,20 @@ def test_a_folder_of_other_things_is_not_replaced(front, tmp_path, capsys):
     assert "holds no front" in capsys.readouterr().err
     with pytest.raises(ResultError, match="exists already"):
         Front.load(front)[0].accuracy().save(tmp_path)
+
+
+def test_unit_and_system_stand_in_the_summary_the_record_the_information_and_in_obj(tmp_path, capsys):
+    dem = write_tiff(tmp_path / "dem.tif", terrain())
+    how = ("--mean-error", "2.5", "--moves", "2000", "--format", "obj", "--meshes", "none", "--no-page")
+    assert run("simplify", dem, "-o", tmp_path / "out", *how) == 0
+    assert "EPSG:25832" in (said := capsys.readouterr().out)
+    assert "searched: around a mean error of at most 2.5 m;" in said
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["model"]["unit"] == "m"
+    assert (tmp_path / "out" / "chosen.obj").read_text().startswith("# crs: EPSG:25832\n# unit: metre\nv ")
+    assert run("info", dem, "--json") == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert (facts["epsg"], facts["unit"], facts["coordinate_unit"]) == (25832, "m", "metre")
+    front = Front.load(tmp_path / "out")
+    assert "<th>mean error [m]</th>" in front._repr_html_()
+    assert not (tmp_path / "out" / "quality.html").exists()
+    assert read(tmp_path / "out")["original"]["system"] == "EPSG:25832"

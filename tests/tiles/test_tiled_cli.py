@@ -173,6 +173,18 @@ def test_pictures_of_a_big_grid_are_drawn_from_some_of_its_samples(path, out, mo
     assert np.array_equal(part.faces, whole.faces)
 
 
+def test_levels_have_the_sizes_between_two_solutions_too(out, tmp_path, capsys):
+    front = Front.load(out)
+    size = (front[-2].triangles + front[-1].triangles) // 2
+    assert main(["levels", str(out), "-o", str(tmp_path / "levels"), "--triangles", str(size), "300", "--json"]) == 0
+    first, second = json.loads(capsys.readouterr().out)["levels"]
+    assert (first["solution"], first["free"]) == (None, False)
+    assert 0.9 * size < first["triangles"] <= size
+    assert second["triangles"] <= 300
+    for level in (first, second):
+        assert len(read_source(tmp_path / "levels" / level["file"]).faces) == level["triangles"]
+
+
 @pytest.mark.usefixtures("all_moves")
 def test_two_processes_write_the_same_bytes(path, tmp_path):
     np.save(tmp_path / "strip.npy", np.load(path)[:20])  # two tiles

@@ -92,6 +92,7 @@ def _describe(model: str, options: Options, rules: Rules, *, as_json: bool) -> i
         "low": low.tolist(),
         "extent": extent.tolist(),
         **known_units(source.georeference),
+        "coordinate_unit": source.georeference.get("unit"),
         "attributes": sorted(source.attributes),
         "mended": asdict(mended),
         "surface": None,

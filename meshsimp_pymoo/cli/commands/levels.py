@@ -153,6 +153,7 @@ def _write(args: argparse.Namespace, path: Any) -> int:
 def _tell(front: Front, record: Mapping[str, Any], path: Any) -> None:
     """Say what was written."""
     from meshsimp_pymoo.cli.terminal import in_unit, tell
+    from meshsimp_pymoo.surface.measures import LENGTH
 
     unit = in_unit(front.unit)
     for level in record["levels"]:
@@ -162,7 +163,7 @@ def _tell(front: Front, record: Mapping[str, Any], path: Any) -> None:
             f"level {level['level']}: {level['triangles']:,} triangles, {level['vertices']:,} vertices, mean error "
             f"{level['mean_error']:.4g}{unit}, geometric error {level['geometric_error']:.4g}{unit} "
             f"({kind}{', free' * level['free']}{', refitted' * level['refitted']}); "
-            + ("exact" if most is None else f"good up to {most:.3g} screen heights")
+            + ("exact" if most is None else f"within a pixel up to {most:.3g} screen heights")
             + (f"; compressed, off by at most {level['moved_by_at_most_m']:.2g} m" if "bits" in level else "")
         )
     if "frame" in record:
@@ -172,5 +173,6 @@ def _tell(front: Front, record: Mapping[str, Any], path: Any) -> None:
             + f"{frame['latitude']:.6f}, {frame['longitude']:.6f}; heights are taken for those above the ellipsoid"
             if frame["system"]
             else "no reference system is known: the tiles stand in local coordinates"
+            + ", units taken for metres" * (front.unit == LENGTH)
         )
     tell(f"written: {path}")

@@ -6,6 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     from meshsimp_pymoo.cli.requests import Wish
@@ -24,6 +25,8 @@ examples:
       the most accurate of at most 500 triangles
   meshsimp pick out --max-error 0.1 -o small.obj
       the smallest that deviates nowhere by more than 0.1
+  meshsimp pick out --triangles 2000 --solid 5 -o print.stl
+      that mesh as a solid to print, its base 5 below the lowest point
   meshsimp pick out --knee
       only say what the best compromise is
 """
@@ -31,7 +34,7 @@ examples:
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments."""
-    from meshsimp_pymoo.cli.arguments import add_shown, add_wishes, whole
+    from meshsimp_pymoo.cli.arguments import add_shown, add_solid, add_wishes, whole
     from meshsimp_pymoo.formats.table import written_suffixes
 
     parser.add_argument("front", metavar="OUT", help="the folder of a front")
@@ -51,6 +54,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="compress a GLB (Draco): vertices move by at most a twentieth of the mean error",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace FILE if it exists")
+    add_solid(parser, "the mesh")
     parser.add_argument("--model", metavar="MODEL", help="the original, if it is no longer where it was")
     add_shown(parser)
 
@@ -71,11 +75,14 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError("which solution is wanted? say limits, such as --triangles 500, or --knee, or --solution K")
     if len(said) > 1:
         raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
+    if args.solid is not None and args.output is None:
+        raise UsageError("--solid is of a file that is written; name it (-o FILE), or leave --solid out")
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)
     if args.compress and path is None:
         raise UsageError("--compress is of the mesh that is written; name its file (-o FILE.glb)")
     with said_when_compiling(args.quiet):
-        return _pick(args.front, args.model, wish, args.solution, path, args.overwrite, args.compress, **shown)
+        how = {"overwrite": args.overwrite, "solid": args.solid}
+        return _pick(args.front, args.model, wish, args.solution, path, how, compress=args.compress, **shown)
 
 
 def _pick(
@@ -84,9 +91,9 @@ def _pick(
     wish: Wish,
     number: int | None,
     path: Path | None,
-    overwrite: bool,
-    compress: bool,
+    how: Mapping[str, Any],
     *,
+    compress: bool,
     quiet: bool,
     as_json: bool,
 ) -> int:
@@ -94,7 +101,7 @@ def _pick(
 
     from meshsimp_pymoo.cli.arguments import numbered
     from meshsimp_pymoo.cli.results import triangles_of
-    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, in_numbers, say, tell
+    from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, described, in_numbers, say, solid_in_words, tell
     from meshsimp_pymoo.front import Front
 
     front = Front.load(folder, model=model)
@@ -108,21 +115,27 @@ def _pick(
         say(f"{folder}: {missed}; nothing is written")
         return TARGET_MISSED
     moved: dict[str, float] = {}
-    if path is not None and compress:
-        moved["moved_by_at_most_m"] = solution.save_compressed(path, overwrite=overwrite)
-    elif path is not None:
-        solution.save(path, overwrite=overwrite)
+    closed: dict[str, Any] = {}
+    if path is not None:
+        if compress:
+            moved["moved_by_at_most_m"] = solution.save_compressed(path, **how)
+        else:
+            solution.save(path, **how)
+        thickness = how["solid"]
+        closed = {} if thickness is None else {"solid": {"thickness": thickness, **solution.solid(thickness).numbers}}
     if note := _how_far(front, folder, model, solution, wish):
         say(f"note: {note}")
     stored = solution.front is front  # else it was made between two that are
     if as_json:
         mesh, number = (None if path is None else str(path)), solution.solution if stored else None
         said = {"mesh": mesh, "solution": number, "free": solution.free, **moved}
-        said |= in_numbers(solution.quality)
+        said |= in_numbers(solution.quality) | closed
         tell(json.dumps(said, indent=2))
     elif not quiet:
         which = f"solution {solution.solution}" if stored else "between two solutions"
         tell(f"{which} of {folder}{', free' * solution.free}: {described(solution.quality, front.unit)}")
+        if closed:
+            tell(f"solid: {solid_in_words(closed['solid'], front.unit)}")
         off = f" (compressed; vertices moved by at most {moved['moved_by_at_most_m']:.2g} m)" if moved else ""
         tell(f"written: {path}{off}" if path else "nothing is written; name a file with -o")
     return OK
@@ -146,7 +159,7 @@ def _how_far(front: Front, folder: str, model: str | None, solution: FrontSoluti
     is_whole = solution.quality.vertices == front.run["model"].get("vertices")
     if own in searched or (not is_whole and any(near <= FAR * own <= FAR**2 * near for near in searched)):
         return ""
-    around = f"{folder} was searched around {in_words(limits)}"
+    around = f"{folder} was searched around {in_words(limits, front.unit)}"
     said = f"this is the original itself; {around}" if is_whole else f"{around}; far from it the meshes are poor"
     if is_whole and not wish.spelled:
         return said

@@ -130,6 +130,9 @@ def _of_front(
     out: str, model: str | None, wish: Wish, number: int | None, *, refitted: bool
 ) -> tuple[QualityStatement | None, str]:
     """Return the statement of a mesh of a front; None and why, if none is within the limits."""
+    from dataclasses import replace
+    from pathlib import Path
+
     from meshsimp_pymoo.cli.arguments import numbered
     from meshsimp_pymoo.cli.results import triangles_of
     from meshsimp_pymoo.front import Front
@@ -143,7 +146,13 @@ def _of_front(
     else:
         chosen = front.run.get("chosen") if number is None else numbered(out, len(front), number)
         solution = front.knee() if chosen is None else front[chosen]
-    return (None if solution is None else solution.accuracy(refitted=refitted)), missed
+    if solution is None:
+        return None, missed
+    statement = solution.accuracy(refitted=refitted)
+    if solution.front is not front:  # which is none of the front's
+        mesh = statement.mesh | {"name": f"{Path(front.name).name}, between two solutions", "solution": None}
+        statement = replace(statement, mesh=mesh)
+    return statement, missed
 
 
 def _of_mesh(model: str, options: Options, rules: Rules, other: str) -> QualityStatement:

@@ -52,6 +52,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         add_model,
         add_settings,
         add_shown,
+        add_solid,
         add_wishes,
         add_workers,
         duration,
@@ -183,6 +184,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         help="write each mesh once more in OUT/refitted, its vertices raised or lowered (of a closed surface: moved) "
         "to where the sum of the deviations is least; front.csv says refitted_error",
     )
+    add_solid(output, "the chosen mesh")
     output.add_argument(
         "--no-page", dest="page", action="store_false", help="do not write OUT/report.html, the page to look and choose"
     )

@@ -244,6 +244,5 @@ def _put_layers(path: Path, driver: str, layers: Sequence[Layer], system: str, o
                 driver=driver,
                 geometry_type=layer.sort,
                 crs=system or None,
-                append=place > 0,
                 dataset_options=None if place else dict(options),
             )

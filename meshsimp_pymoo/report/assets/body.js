@@ -94,6 +94,10 @@ class BodyPair extends MeshPair {
     );
   }
 
+  get middle() {
+    return this.target;
+  }
+
   // Two fingers: one stays, the other one has moved; what is between them grows and turns with them.
   pinch(still, before, now) {
     const [a, b] = [before, now].map((at) => ({ x: at.x - still.x, y: at.y - still.y }));

@@ -6,7 +6,8 @@ const CLAY = "#e6d6c4";
 const NO_VERTEX = "#9aa0a6"; // simplified surface where the original has none
 const TURN_STEP = Math.PI / 36;
 const TEXTURE_SIZE = 1024; // of the map of the error
-const PALE_WIRES = 5_000; // triangles whose edges are as dark as any
+const INK = "#2a3442"; // edges over colours that are read, whatever the page's own colours
+const [DARK_WIRES, FAINTEST_WIRE] = [6_000, 0.12]; // triangles whose edges are as dark as any; opacity of those of very many
 const FILLED = 0.94; // of the window, by the original as it is first seen
 const CREASE = Math.cos((55 * Math.PI) / 180); // edges at which faces turn by more stay sharp on smooth surfaces
 const VIEWER_LIGHT = [-0.5, 0.6, 0.75]; // from the upper left, in front of the picture
@@ -81,6 +82,7 @@ class MeshPair {
     }
     this.heights = [low[2], high[2]];
     const size = Math.max(high[0] - low[0], high[1] - low[1]) || 1;
+    this.size = size; // model units to one of the scene
     this.extent = [0, 1, 2].map((k) => (high[k] - low[k]) / size);
     const local = new Float32Array(3 * count);
     const uv = new Float32Array(2 * count);
@@ -113,7 +115,6 @@ class MeshPair {
       line: new THREE.LineBasicMaterial(),
       rim: new THREE.LineBasicMaterial(),
       paper: new THREE.MeshBasicMaterial({ side: THREE.DoubleSide, ...this.lifted }),
-      wire: new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide }),
     };
     this.textures = {
       texture: image && this.textureOf(image.picture, IMAGE_CHANNEL),
@@ -175,15 +176,12 @@ class MeshPair {
   part(faces, ends) {
     const scene = new THREE.Scene();
     const mesh = new THREE.Mesh(this.geometry(faces), this.materials.paper);
-    const wire = new THREE.Mesh(mesh.geometry, this.materials.wire);
+    const wire = new THREE.Mesh(mesh.geometry, new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide, transparent: true }));
     mesh.frustumCulled = wire.frustumCulled = false;
     scene.add(mesh, wire);
-    // over colours that are read, edges are paler the more there are
-    const opacity = Math.min(0.5, (3 * PALE_WIRES) / faces.length);
-    const thin = new THREE.MeshBasicMaterial({ wireframe: true, side: THREE.DoubleSide, color: "#2a3442", transparent: true, opacity });
     const own = new THREE.BufferAttribute(this.own, 3);
     const errors = new THREE.BufferAttribute(new Float32Array(this.own.length), 3);
-    return { faces, scene, mesh, wire, thin, lines: ends && this.linesOf(ends), own, errors, indexed: mesh.geometry, smooth: null, map: null };
+    return { faces, scene, mesh, wire, lines: ends && this.linesOf(ends), own, errors, indexed: mesh.geometry, smooth: null, map: null };
   }
 
   // Its triangles one by one, with normals of their own at each corner.
@@ -243,7 +241,7 @@ class MeshPair {
 
   dispose(part) {
     part.indexed.dispose();
-    part.thin.dispose();
+    part.wire.material.dispose();
     part.smooth?.dispose();
     part.map?.target.dispose();
     part.map?.material.forEach((material) => material.dispose());
@@ -360,7 +358,7 @@ class MeshPair {
   theme() {
     const style = getComputedStyle(document.documentElement);
     this.materials.paper.color.set(style.getPropertyValue("--card").trim());
-    this.materials.wire.color.set(style.getPropertyValue("--wire").trim());
+    this.wireColour = style.getPropertyValue("--wire").trim();
     this.lineColours = { shaded: "#00574b", wireframe: style.getPropertyValue("--breakline").trim() };
     this.rimColours = { shaded: this.open?.rim, wireframe: style.getPropertyValue("--rim").trim() };
     this.request();
@@ -485,7 +483,9 @@ class MeshPair {
     const { colours, isRead } = this;
     const isWire = this.shading === "wireframe";
     part.wire.visible = isWire;
-    part.wire.material = isRead ? part.thin : this.materials.wire;
+    // the more edges, the paler each, or they would cover everything
+    part.wire.material.opacity = Math.max(FAINTEST_WIRE, Math.min(1, (3 * DARK_WIRES) / part.faces.length)) * (isRead ? 0.5 : 1);
+    part.wire.material.color.set(isRead ? INK : this.wireColour);
     part.mesh.geometry = this.isSmooth ? this.smoothed(part) : part.indexed;
     if (isWire && !isRead) part.mesh.material = this.materials.paper;
     else if (colours === "error" && !isOriginal) this.dressInErrors(part);
@@ -538,6 +538,23 @@ class MeshPair {
     this.onDraw();
   }
 
+  get middle() {
+    return this.controls.target;
+  }
+
+  // Pixels of the page to a model unit across the picture, where the camera looks at.
+  get pixelsPerUnit() {
+    const { camera } = this;
+    const distance = camera.position.distanceTo(this.middle);
+    return (this.window(0)[3] * camera.zoom) / (2 * Math.tan((camera.fov * Math.PI) / 360) * distance * this.size);
+  }
+
+  // How far north is turned from upwards in the picture, clockwise.
+  get north() {
+    const arm = this.camera.position.clone().sub(this.middle);
+    return Math.atan2(arm.x, (-arm.y * arm.z) / arm.length());
+  }
+
   // What the canvas shows now, drawn with so many pixels to one of the page.
   picture(ratio) {
     const before = this.renderer.getPixelRatio();
@@ -549,11 +566,5 @@ class MeshPair {
     this.renderer.setPixelRatio(before);
     this.draw();
     return copy;
-  }
-
-  // The graphics card came back: what it had is to be made again.
-  restore() {
-    for (const part of [this.original, this.pinned, this.simplified]) if (part) part.isMapOld = true;
-    this.request();
   }
 }

@@ -5,6 +5,7 @@ const errorAt = (row, level) => data.solutions[row].largest * (level / 254) ** 2
 const TICK_ROOM = 74; // pixels that a tick of the colour bar takes
 const LEAST_PICTURE_RATIO = 2; // pixels of a saved picture to one of the page, at least
 const DIVIDER_STEP = 0.05;
+const RULER_SHARE = 0.4; // of a window, at most
 
 const looks = { colours: "plain", end: 1 }; // what the colours are, and where those of errors end
 
@@ -92,10 +93,9 @@ function showKey() {
 function compareWith(mesh) {
   state.pinned = mesh;
   state.viewer.show(mesh && mesh.faces, mesh && mesh.edges, true);
-  if (mesh) paintErrors();
+  paintErrors();
   part("left-name").textContent = mesh ? `solution ${mesh.row}` : "original";
   part("left-title").textContent = mesh ? sizeOf(mesh.row) : `${plainNumber(model.triangles)} triangles`;
-  showKey();
 }
 
 // The divider of the wipe stands where the meshes are, which the captions above them are not.
@@ -130,6 +130,18 @@ function steerDivider(viewer) {
   new ResizeObserver(() => viewer.wiped && placeDivider()).observe(part("canvas"));
 }
 
+// How long a round length of the model is in the middle of the picture, and where north is.
+function showRuler() {
+  if (!part("ruler")) return; // of no model whose unit nobody knows
+  const perUnit = state.viewer.pixelsPerUnit;
+  const most = part("original-window").clientWidth * RULER_SHARE;
+  const decade = 10 ** Math.floor(Math.log10(most / perUnit));
+  const length = [5, 2, 1].map((lead) => lead * decade).find((one) => one * perUnit <= most);
+  part("ruler-bar").style.width = `${length * perUnit}px`;
+  part("ruler-length").textContent = `${readable(length)}${data.unit}`;
+  if (part("north")) part("north").style.transform = `rotate(${(state.viewer.north * 180) / Math.PI}deg)`;
+}
+
 // ------------------------------------------------------------------------------------------------------- pictures
 
 // The windows as they are, under what they show and above what the colours mean: a canvas.
@@ -155,7 +167,8 @@ function pictureOfWindows() {
   pen.fillText(document.querySelector("h1").textContent, edge, 24, width - 2 * edge);
   pen.font = font(13);
   pen.fillStyle = colour("--soft");
-  pen.fillText(describe(state.row), edge, 44, width - 2 * edge);
+  const drawnHigher = part("heights") && heightFactor() !== 1 ? `; heights × ${readable(heightFactor())}` : "";
+  pen.fillText(describe(state.row) + drawnHigher, edge, 44, width - 2 * edge);
   const rectangle = (box) => [edge + box.left - views.left, head + box.top - views.top, box.width, box.height];
   const frames = ["original-window", "simplified-window"].map((id) => part(id).getBoundingClientRect());
   pen.fillStyle = colour("--window");
@@ -170,6 +183,26 @@ function pictureOfWindows() {
     const [x, y, , tall] = rectangle(part("divider").getBoundingClientRect());
     pen.fillStyle = colour("--ink");
     pen.fillRect(x + part("divider").clientWidth / 2 - 1, y, 2, tall);
+  }
+  if (part("ruler")) {
+    const [x, y, , tall] = rectangle(part("ruler-bar").getBoundingClientRect());
+    const long = part("ruler-bar").clientWidth;
+    pen.fillStyle = colour("--ink");
+    pen.fillRect(x, y, 1, tall);
+    pen.fillRect(x + long - 1, y, 1, tall);
+    pen.fillRect(x, y + tall - 2, long, 2);
+    pen.fillText(part("ruler-length").textContent, x + long + 6, y + tall);
+    if (part("north")) {
+      const [left, top, wide, high] = rectangle(part("north").getBoundingClientRect());
+      pen.fillText("N", rectangle(part("north").parentElement.getBoundingClientRect())[0], y + tall);
+      pen.save();
+      pen.translate(left + wide / 2, top + high / 2);
+      pen.rotate(state.viewer.north);
+      pen.textAlign = "center";
+      pen.textBaseline = "middle";
+      pen.fillText(part("north").textContent, 0, 0);
+      pen.restore();
+    }
   }
   if (isRead) {
     const [left, top] = [edge + 130, head + views.height + edge];
@@ -205,6 +238,7 @@ function withoutWebgl(reason) {
   part("no-3d").hidden = !reason;
   part("no-3d").textContent = `The meshes cannot be shown: ${reason}. All else works.`;
   for (const needing of document.querySelectorAll(".needs-webgl")) needing.hidden = Boolean(reason);
+  part("divider").hidden = !state.viewer?.wiped;
 }
 
 // The factor of the slider of heights, whose scale is logarithmic: exactly 1 is easily found again.
@@ -265,6 +299,7 @@ async function openViewer() {
       first: data.closed && data.closed.front.map((degrees) => (degrees * Math.PI) / 180),
       open: data.closed && data.closed.open,
       onDraw() {
+        if (state.viewer) showRuler();
         if (!first || !state.mesh) return;
         first = false;
         performance.mark("first picture");
@@ -285,7 +320,6 @@ async function openViewer() {
   canvas.addEventListener("webglcontextrestored", () => {
     state.viewer = viewer;
     withoutWebgl(null);
-    viewer.restore();
     showMesh();
   });
   steerLook(viewer);
