@@ -367,6 +367,22 @@ def test_tiles_stand_on_earth_where_the_reference_system_says(tmp_path, system):
     assert record["levels"][-1]["below_the_bent_earth_m"] > 0.0
 
 
+def test_feet_become_metres_on_earth(tmp_path):
+    pytest.importorskip("rasterio", reason="no rasterio: pip install rasterio")
+    source = far(epsg=2286, unit="US survey foot")
+    source = dataclasses.replace(source, points=source.points + np.array([600_000.0, -5_000_000.0, 0.0]))
+    front = front_of(source)
+    record = save_levels(front, tmp_path / "tiles", list(front)[1:3], form="3d-tiles")
+    foot = 1200 / 3937
+    for level in record["levels"]:
+        assert level["tile_error_m"] == pytest.approx(level["max_error"] * foot + level["below_the_bent_earth_m"])
+    box = np.array(json.loads((tmp_path / "tiles" / "tileset.json").read_text())["root"]["boundingVolume"]["box"])
+    corners = np.concatenate([corners_of(solution).reshape(-1, 3) for solution in list(front)[1:3]])
+    sides = np.ptp(corners, axis=0)
+    assert np.diag(box[3:].reshape(3, 3)) == pytest.approx(sides * foot / 2, rel=0.05), "turned by less than a degree"
+    assert record["frame"]["height"] == pytest.approx(front.model.file_box.mean(axis=0)[2] * foot)
+
+
 def test_the_earth_is_an_ellipsoid():
     poles = earth_centred(np.array([[7.0, 90.0, 0.0], [7.0, -90.0, 0.0], [90.0, 0.0, 10.0]]))
     np.testing.assert_allclose(poles, [[0, 0, 6356752.314245], [0, 0, -6356752.314245], [0, 6378147, 0]], atol=1e-6)

@@ -43,8 +43,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     )
     wanted = parser.add_argument_group(
         "which levels",
-        "by default from the most accurate mesh of the front on, or from the one that it was searched for, each of at "
-        "most a quarter of the triangles",
+        "By default from the most accurate mesh of the front on, or from the one that it\n"
+        "was searched for, each of at most a quarter of the triangles of the one before.",
     ).add_mutually_exclusive_group()
     wanted.add_argument("--levels", type=whole(1), metavar="N", help="at most so many, the finest first")
     wanted.add_argument(
