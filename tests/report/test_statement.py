@@ -395,3 +395,19 @@ def test_unit_and_system_stand_in_the_summary_the_record_the_information_and_in_
     assert "<th>mean error [m]</th>" in front._repr_html_()
     assert not (tmp_path / "out" / "quality.html").exists()
     assert read(tmp_path / "out")["original"]["system"] == "EPSG:25832"
+
+
+def test_of_the_largest_models_the_statement_is_left_out_and_the_way_to_it_is_said(tmp_path, monkeypatch, capsys):
+    np.save(tmp_path / "dem.npy", terrain())
+    for module in ("front", "cli.results"):
+        monkeypatch.setattr(f"meshsimp_pymoo.{module}.STATED_VERTICES", 100)
+    how = ("--pick", "knee", "--moves", "2000", "--meshes", "none", "--no-page")
+    assert run("simplify", tmp_path / "dem.npy", "-o", tmp_path / "out", *how) == 0
+    assert f"make it by meshsimp quality {tmp_path / 'out'}" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "quality.json").exists()
+    monkeypatch.setattr("meshsimp_pymoo.front.STATED_VERTICES", 1000)
+    monkeypatch.setattr("meshsimp_pymoo.front.SPACE_VERTICES", 100)
+    Front.load(tmp_path / "out").draw(page=False)
+    found = read(tmp_path / "out")
+    assert found["accuracy"]["space"] is None
+    assert "Distances in space are left out" in found["left_out"][0]
