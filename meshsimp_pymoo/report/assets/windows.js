@@ -241,10 +241,9 @@ function withoutWebgl(reason) {
   part("divider").hidden = !state.viewer?.wiped;
 }
 
-// The factor of the slider of heights, whose scale is logarithmic: exactly 1 is easily found again.
+// The factor of the slider of heights, whose scale is logarithmic; of two digits, so that exactly 1 is easily found again.
 function heightFactor() {
-  const exponent = part("heights").valueAsNumber;
-  return Math.abs(exponent) < 0.015 ? 1 : Number((10 ** exponent).toPrecision(2));
+  return Number((10 ** part("heights").valueAsNumber).toPrecision(2));
 }
 
 async function imageOfModel() {
