@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from node import module
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Software graphics, and none of the browser's own calls to its makers. Its sandbox does not start for root.
@@ -65,3 +66,12 @@ class Visit:
         assert self.said == []
         away = [url for url in self.asked if url != self.url and not url.startswith(("data:", "blob:"))]
         assert away == []
+
+
+def faults(visit: Visit) -> list[str]:
+    """Return what axe-core finds wrong, all of a page unfolded, as lines."""
+    script = (module("axe-core") / "axe.min.js").read_text(encoding="utf-8")
+    visit.page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    visit.page.evaluate(script)
+    found = visit.page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
+    return [f"{rule['impact']} {rule['id']}: {rule['nodes'][0]['html'][:100]}" for rule in found]

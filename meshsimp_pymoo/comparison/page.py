@@ -21,6 +21,7 @@ from meshsimp_pymoo.comparison.findings import CLAIMS, DOES_NOT_HOLD, HOLDS, UND
 from meshsimp_pymoo.comparison.study import INDICATORS, PROCEDURES, SCORINGS, Case, Study
 from meshsimp_pymoo.indicators import merged_front
 from meshsimp_pymoo.report.document import html_document, slug
+from meshsimp_pymoo.surface.measures import MEASURES
 
 __all__ = ["experiment_page"]
 
@@ -121,7 +122,9 @@ def _section(
     models = []
     for case in cases:
         key = f"chart-{len(charts)}"
-        charts[key] = {"name": f"Fronts of {case.problem.name}", "series": list(_series(study, case))}
+        measure = MEASURES[case.problem.rules.measure]
+        label = f"{measure.label}, {measure.meaning} [{case.problem.unit}]"
+        charts[key] = {"name": f"Fronts of {case.problem.name}", "label": label, "series": list(_series(study, case))}
         alt = f"{case.problem.name}: the original and the best trade-offs of some methods, and their error"
         models.append(
             {
@@ -175,7 +178,14 @@ def _xy(F: FloatArray) -> dict[str, list[float]]:
 
 def _models(study: Study) -> Iterator[tuple[str, ...]]:
     for problem in study.problems:
-        yield problem.name, problem.source, f"{problem.vertices:,}", f"{problem.triangles:,}"
+        yield (
+            problem.name,
+            problem.source,
+            f"{problem.vertices:,}",
+            f"{problem.triangles:,}",
+            problem.unit,
+            problem.system,
+        )
 
 
 def _picture(path: Path, alt: str) -> dict[str, Any] | None:

@@ -90,6 +90,7 @@ from meshsimp_pymoo.storage import machine, now, package_versions
 from meshsimp_pymoo.surface.kinds import surface_of
 from meshsimp_pymoo.surface.measures import COUNTED, MEASURES, OF_LINES, TRIANGLES, Quality, measured
 from meshsimp_pymoo.surface.surface import measured_meshes
+from meshsimp_pymoo.surface.units import length_unit, reference_system
 from meshsimp_pymoo.workers import Engine, EngineError, Processes, Serial
 
 __all__ = ["Done", "Task", "perform", "plan", "run_experiment"]
@@ -603,6 +604,8 @@ def _content(experiment: Experiment, tasks: Sequence[Task], out: Path) -> dict[s
                 "hash": problem.model.hash,
                 "vertices": problem.model.n_vertices,
                 "triangles": len(problem.model.faces),
+                "unit": length_unit(problem.model.georeference),
+                "system": reference_system(problem.model.georeference),
             }
             for problem in experiment.problems
         ],

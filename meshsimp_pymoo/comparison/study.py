@@ -69,6 +69,7 @@ from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.search.presets import PRESETS
 from meshsimp_pymoo.settings import read_back
 from meshsimp_pymoo.surface.kinds import OfModel, surface_of
+from meshsimp_pymoo.surface.measures import LENGTH
 from meshsimp_pymoo.surface.rules import Rules
 
 __all__ = [
@@ -133,6 +134,8 @@ class Problem:
     limits: dict[str, float]
     stored: str
     hash: str
+    unit: str
+    system: str
 
     def meets_limits(self, F: FloatArray) -> npt.NDArray[np.bool_]:
         """Return which solutions (n, 2), by the error that was searched, a search of this problem could find."""
@@ -432,6 +435,8 @@ class Study:
                 limits=item["limits"],
                 stored=item["stored"],
                 hash=item["hash"],
+                unit=item.get("unit", LENGTH),  # which records of before do not have
+                system=item.get("system", ""),
             )
             for item in self.content["problems"]
         ]

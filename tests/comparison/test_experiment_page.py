@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
-from browser import Visit
+from browser import Visit, faults
 from handmade import BUDGET, store
 from PIL import Image
 
@@ -109,6 +111,17 @@ def test_on_paper_all_fronts_are_drawn(browser, page, tmp_path):
     visit.close()
 
 
+def test_errors_have_their_unit_and_models_their_system(tmp_path):
+    out = store(tmp_path / "out", {"M1": {"N1": GOOD, "G1": POOR}})
+    record = json.loads((out / "experiment.json").read_text(encoding="utf-8"))
+    assert "errors in</th>" in experiment_page(Study(out), [])  # and a record of before says nothing of them
+    record["problems"][0] |= {"unit": "US survey foot", "system": "EPSG:2263"}
+    (out / "experiment.json").write_text(json.dumps(record), encoding="utf-8")
+    said = experiment_page(Study(out), [])
+    assert "<td>US survey foot</td><td>EPSG:2263</td>" in said
+    assert '"label":"error, sum over all original vertices [US survey foot]"' in said
+
+
 def test_pictures_are_embedded_no_wider_than_can_be_shown(visit):
     widths = visit.page.evaluate("[...document.images].map((image) => [image.src.slice(0, 23), image.naturalWidth])")
     assert widths == [["data:image/webp;base64,", 1600]] * 2
@@ -132,11 +145,12 @@ def test_tables_and_configuration_can_be_opened(visit):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_page_fits_a_phone(browser, page, tmp_path, scheme):
+def test_the_page_fits_a_phone_and_has_no_fault(browser, page, tmp_path, scheme):
     path = tmp_path / "report.html"
     path.write_text(page, encoding="utf-8")
     visit = Visit(browser, path, viewport={"width": 360, "height": 740}, color_scheme=scheme)
     assert visit.page.evaluate("document.documentElement.scrollWidth") == 360
+    assert faults(visit) == []
     visit.check()
     visit.close()
 

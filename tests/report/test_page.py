@@ -15,8 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from browser import Visit, launched
-from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike, until
+from node import run_script
+from pages import camera, chunks, dress, number, pixels, relief, scale_of_errors, shown, taken, unlike, until
 from samples import freed
 from scans import bowl
 from sketching import sketch
@@ -425,24 +427,6 @@ def parsed(path):
     return corners, np.arange(len(corners)).reshape(-1, 3)
 
 
-def taken(page, suffix, folder):
-    """Return the path of the file that a button downloads."""
-    with page.expect_download() as download:
-        page.click(f"#downloads button[value={suffix}]")
-    path = folder / f"page.{suffix}"
-    download.value.save_as(path)
-    return path
-
-
-def chunks(path):
-    """Return the tree of a GLB and the parts of its buffer, by accessor."""
-    content = path.read_bytes()
-    size = int.from_bytes(content[12:16], "little")
-    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
-    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
-    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]
-
-
 def words(path):
     """Return the words of a text, numbers as such, however they are spelled, in an order of their own."""
     found = []
@@ -471,6 +455,10 @@ def test_a_downloaded_glb_is_the_file_that_the_package_writes(visit, front, tmp_
     used = np.unique(front[2].faces)
     away = np.abs(source.points - front.model.file_points[used]).max()
     assert 0 < away < 1e-5  # half a step of single precision from the local origin, at 23 units
+    mesh = trimesh.load(tmp_path / "page.glb").to_geometry()  # Y up, as the model's file has it, and where that has it
+    assert np.abs(mesh.vertices - front.model.file_points[used]).max() == pytest.approx(away, rel=1e-2)
+    (said,) = json.loads(run_script("validated.mjs", tmp_path / "page.glb", needs=("gltf-validator",)))
+    assert said == {"issues": [], "triangles": front[2].triangles}
     assert source.attributes["color"].tolist() == front.model.attributes["color"][used].tolist()
 
 
@@ -665,6 +653,26 @@ def test_what_the_page_draws_itself_is_what_webgl_draws(opened, blind, look):
         # lines one point wide are softer in the one, and may lie a point beside in the other
         away = np.abs(light[:height, :width] - own[:height, :width]).mean()
         assert away < (14 if "wireframe" in look else 3.5), away
+
+
+@pytest.mark.parametrize("is_stored", [True, False])
+def test_a_notebook_shows_the_page_in_a_frame(browser, front, is_stored):
+    shown_front = front if is_stored else Front(front.quality, front.kept, problem=front.problem)
+    frame = shown_front.show(height=700, limit=FIXED_BYTES + 60_000)
+    assert len(frame.page) <= FIXED_BYTES + 60_000
+    context = browser.new_context(viewport={"width": 900, "height": 800})
+    page = context.new_page()
+    page.set_content(f"<style>* {{ color: red !important }}</style><h1>A notebook</h1>{frame._repr_html_()}")
+    assert page.locator("iframe").bounding_box()["height"] == 700
+    (inside,) = (one for one in page.frames if one.parent_frame is not None)
+    inside.wait_for_selector("html[data-ready]")
+    row = int(inside.locator("#number-solution").get_attribute("value"))
+    assert row == (2 if is_stored else front.knee().solution)
+    assert inside.inner_text("#command") == f'front[{row}].save("hill-side_{front[row].triangles}.ply")'
+    assert inside.locator("#copy-link").is_hidden()  # it has no address of its own
+    inside.locator("#slider").press("Home")
+    inside.wait_for_selector("html[data-shown='0']")
+    context.close()
 
 
 # --------------------------------------------------------------------------------------------------- size and content

@@ -7,8 +7,8 @@ const drawn = [];
 function draw(target) {
   if (target.dataset.drawn) return;
   watcher.unobserve(target);
-  const { name, series } = charts[target.id];
-  const labels = { x: "triangles", y: "error [file units]" };
+  const { name, label, series } = charts[target.id];
+  const labels = { x: "triangles", y: label };
   drawn.push(new FrontChart(target, { name, series, labels, log: { x: boxes.x.checked, y: boxes.y.checked } }));
   target.dataset.drawn = "yes";
 }

@@ -277,7 +277,7 @@ async function openViewer() {
     data.paint && unpackArray(data.paint),
     imageOfModel(),
   ]);
-  state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
+  state.geometry = { points, paint, uv: image?.uv, measured: new Uint32Array(new Set(faces)).sort() };
   const { pivot, rotation, scale } = model; // scaled, coordinates are lengths
   const upright = new Float64Array(points.length);
   for (let i = 0; i < points.length; i += 3) {
