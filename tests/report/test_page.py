@@ -18,7 +18,7 @@ import pytest
 import trimesh
 from browser import Visit, launched
 from node import run_script
-from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike, until
+from pages import camera, chunks, dress, number, pixels, relief, scale_of_errors, shown, taken, unlike, until
 from samples import freed
 from scans import bowl
 from sketching import sketch
@@ -425,24 +425,6 @@ def parsed(path):
         return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=np.int64) - 1
     corners = np.array([words[1:] for words in lines if words[0] == "vertex"], dtype=float)
     return corners, np.arange(len(corners)).reshape(-1, 3)
-
-
-def taken(page, suffix, folder):
-    """Return the path of the file that a button downloads."""
-    with page.expect_download() as download:
-        page.click(f"#downloads button[value={suffix}]")
-    path = folder / f"page.{suffix}"
-    download.value.save_as(path)
-    return path
-
-
-def chunks(path):
-    """Return the tree of a GLB and the parts of its buffer, by accessor."""
-    content = path.read_bytes()
-    size = int.from_bytes(content[12:16], "little")
-    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
-    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
-    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]
 
 
 def words(path):
