@@ -93,7 +93,7 @@ def downloads(
         try:
             kind.check(held)
         except ResultError as refusal:
-            found.refused.append(str(refusal).partition(": ")[2].partition("; ")[0])
+            found.refused.append(f"No {kind.title}: {str(refusal).partition(': ')[2].partition('; ')[0]}.")
             continue
         found.titles[suffix] = kind.title
         if name in TEMPLATES:

@@ -242,9 +242,7 @@ def simplification_page(
         painted=paint is not None,
         is_stored=folder is not None,
         files=files.titles,
-        refused=printable(
-            " ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused if not view.is_closed)
-        ),
+        refused="" if view.is_closed else printable(" ".join(files.refused)),
         covering=has_border,
         holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",

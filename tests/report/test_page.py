@@ -270,6 +270,23 @@ def test_the_chart_shows_any_error_and_the_searches_go_by_it(visit, front, measu
     assert page.input_value("#axis") == "rms_error"
 
 
+@pytest.mark.parametrize("width", [360, 700, 1400])
+def test_no_numbers_of_an_axis_overlap_or_are_cut(browser, folder, width):
+    visit = Visit(browser, folder / "report.html", viewport={"width": width, "height": 900})
+    for log in (True, False):
+        visit.page.set_checked("#log-x", log)
+        boxes = visit.page.locator("#chart .axes text[text-anchor=middle]:not(.name)").evaluate_all(
+            "all => all.map((at) => at.getBoundingClientRect()).map((box) => [box.left, box.right])"
+        )
+        ends = np.array(sorted(boxes))
+        assert len(ends) >= 3
+        assert (ends[1:, 0] > ends[:-1, 1]).all()
+        frame = visit.page.locator("#chart > svg").bounding_box()
+        assert ends.min() >= frame["x"]
+        assert ends.max() <= frame["x"] + frame["width"]
+    visit.close()
+
+
 def test_what_has_no_such_error_is_left_out_of_the_chart_and_named(browser, front, folder, tmp_path):
     known = np.where(np.arange(len(front)) == 2, 5.0, np.nan)
     stored = replace(
