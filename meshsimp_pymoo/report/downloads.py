@@ -21,6 +21,7 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, shared_frame, written_formats
+from meshsimp_pymoo.reprs import brief
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.surface import Surface
@@ -53,6 +54,7 @@ class Downloads:
     refused: list[str]
 
 
+@brief
 @dataclass(frozen=True)
 class _Held:
     """A model as the formats ask for it, of what is drawn of the original."""
