@@ -145,8 +145,12 @@ function showRuler() {
 
 // ------------------------------------------------------------------------------------------------------- pictures
 
-// The ruler and the north arrow; rectangle: where what is in the windows is in the picture.
-function drawRuler(pen, rectangle) {
+// The ruler and the north arrow on a ground of their own; rectangle: where what is in the windows is in the picture.
+function drawRuler(pen, rectangle, ground) {
+  pen.save();
+  [pen.fillStyle, pen.globalAlpha] = [ground, getComputedStyle(part("ruler")).opacity];
+  pen.fillRect(...rectangle(part("ruler").getBoundingClientRect()));
+  pen.restore();
   const bar = part("ruler-bar");
   const [x, y, , tall] = rectangle(bar.getBoundingClientRect());
   const long = bar.clientWidth;
@@ -219,7 +223,7 @@ function pictureOfWindows() {
     const [x, y, , tall] = rectangle(part("divider").getBoundingClientRect());
     pen.fillRect(x + part("divider").clientWidth / 2 - 1, y, 2, tall);
   }
-  if (part("ruler")) drawRuler(pen, rectangle);
+  if (part("ruler")) drawRuler(pen, rectangle, colour("--window"));
   if (isRead) drawKey(pen, edge, head + views.height + edge, views.width);
   return picture;
 }
