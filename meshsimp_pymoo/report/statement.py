@@ -21,9 +21,9 @@ from typing import Any
 from meshsimp_pymoo.errors import ModelError, NoHeightGrid, printable, warn_of
 from meshsimp_pymoo.files import new_folder
 from meshsimp_pymoo.formats.outmesh import metres_of
+from meshsimp_pymoo.report.colours import SCALE_QUANTILE
 from meshsimp_pymoo.report.document import html_document
 from meshsimp_pymoo.report.residuals import write_residuals
-from meshsimp_pymoo.report.statement_figures import SCALE_QUANTILE
 from meshsimp_pymoo.storage import STATEMENT, claim_output
 from meshsimp_pymoo.surface.accuracy import (
     MOST_FACES,
