@@ -112,7 +112,7 @@ HALVED = 0.01
 LEVEL_FACTOR, FEWEST_TRIANGLES = 4, 32
 # Of larger models what is said of the quality of a mesh beside its front leaves distances in space out, and of the
 # largest nothing is said: these take seconds for each million vertices.
-SPACE_VERTICES, STATED_VERTICES = 600_000, 20_000_000
+SPACE_VERTICES, STATED_VERTICES = 600_000, 4_000_000
 # What the best solution can be asked for by.
 LIMITS = tuple(name for name, measure in MEASURES.items() if not measure.more_is_better)
 
@@ -952,7 +952,7 @@ class Front(Sequence[FrontSolution]):
         >>> from meshsimp_pymoo import memetic
         >>> front = Front.from_result(minimize(MeshProblem("face:200"), memetic(12), Moves(20_000), seed=1))
         >>> [level.triangles for level in front.levels()][:2]
-        [362, 90]
+        [350, 86]
         """
         given = {"count": count, "triangles": triangles, "max_error": max_error}
         said = [name for name, value in given.items() if value is not None]

@@ -32,6 +32,7 @@ from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import format_of_output, format_to_write, written_formats, written_suffixes
 from meshsimp_pymoo.formats.tileset import TILESET, write_tileset
 from meshsimp_pymoo.front import Front, FrontSolution
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.storage import MeshWriter, claim_output
 from meshsimp_pymoo.surface.measures import Quality
 from meshsimp_pymoo.surface.surface import Surface
@@ -60,6 +61,7 @@ def forms() -> list[str]:
     return [*written_formats(), TILES]
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class _Level:
     """A mesh of the ladder: its solution, and its numbers and vertices, which differ from those if it is refitted."""

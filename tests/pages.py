@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 
 import numpy as np
@@ -86,3 +87,21 @@ def camera(page):
         return [camera.position.clone().sub(target).toArray(), camera.up.toArray(), camera.zoom, target.toArray()]; }"""
     )
     return tuple(map(np.array, found))
+
+
+def taken(page, suffix, folder):
+    """Return the path of the file that a button downloads."""
+    with page.expect_download() as download:
+        page.click(f"#downloads button[value={suffix}]")
+    path = folder / f"page.{suffix}"
+    download.value.save_as(path)
+    return path
+
+
+def chunks(path):
+    """Return the tree of a GLB and the parts of its buffer, by accessor."""
+    content = path.read_bytes()
+    size = int.from_bytes(content[12:16], "little")
+    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
+    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
+    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]

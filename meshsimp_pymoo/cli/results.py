@@ -32,7 +32,7 @@ from meshsimp_pymoo.cli.terminal import (
 from meshsimp_pymoo.errors import Missed, ResultError
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import format_to_write
-from meshsimp_pymoo.front import Front, FrontSolution
+from meshsimp_pymoo.front import STATED_VERTICES, Front, FrontSolution
 from meshsimp_pymoo.search.checkpoint import difference
 from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
@@ -116,6 +116,11 @@ def hand_over(request: Request, surface: Surface, shown: Stages) -> int:
         say(f"interrupted while it was drawn; {folder} holds the results: meshsimp report {as_argument(folder)}")
     elif slow:
         say(f"pictures are left out, so that you need not wait; make them by meshsimp report {as_argument(folder)}")
+    elif front.run["chosen"] is not None and surface.n_vertices > STATED_VERTICES:
+        say(
+            "the statement of quality is left out, so that you need not wait; make it by meshsimp quality "
+            f"{as_argument(folder)}"
+        )
     if front.run.get("interrupted") or undrawn:
         return INTERRUPTED
     missed = "" if front.run["chosen"] is not None else request.wish.of(front)[1]

@@ -21,6 +21,7 @@ from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ResultError
 from meshsimp_pymoo.formats.outmesh import OutMesh
 from meshsimp_pymoo.formats.table import Format, shared_frame, written_formats
+from meshsimp_pymoo.reprs import brief
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.surface import Surface
@@ -29,6 +30,8 @@ __all__ = ["Downloads", "downloads"]
 
 # The formats that pages write, by the names that the table of formats has for them; their scripts are in meshfile.js.
 WRITTEN = ("ply", "obj", "stl", "glb", "landxml")
+# Those whose one file holds an image.
+WITH_IMAGE = ("glb",)
 TRIANGLE = np.array([[0, 1, 2]])
 
 
@@ -51,6 +54,7 @@ class Downloads:
     refused: list[str]
 
 
+@brief
 @dataclass(frozen=True)
 class _Held:
     """A model as the formats ask for it, of what is drawn of the original."""
@@ -61,7 +65,9 @@ class _Held:
     georeference: Mapping[str, Any]
 
 
-def downloads(surface: Surface, points: FloatArray, faces: IntArray, line_names: Sequence[str]) -> Downloads:
+def downloads(
+    surface: Surface, points: FloatArray, faces: IntArray, line_names: Sequence[str], *, is_textured: bool
+) -> Downloads:
     """Return what a page offers of the meshes of a surface.
 
     Parameters
@@ -74,6 +80,8 @@ def downloads(surface: Surface, points: FloatArray, faces: IntArray, line_names:
         What is drawn of the original, as rows of these.
     line_names : sequence of str
         What messages call the break lines.
+    is_textured : bool
+        Whether the page has the image of the model and where on it vertices lie, for files that hold it.
     """
     model = surface.model
     held = _Held(model.name, points, faces, model.georeference)
@@ -87,15 +95,22 @@ def downloads(surface: Surface, points: FloatArray, faces: IntArray, line_names:
         try:
             kind.check(held)
         except ResultError as refusal:
-            found.refused.append(str(refusal).partition(": ")[2].partition("; ")[0])
+            found.refused.append(f"No {kind.title}: {str(refusal).partition(': ')[2].partition('; ')[0]}.")
             continue
         found.titles[suffix] = kind.title
         if name in TEMPLATES:
+            holds_image = is_textured and name in WITH_IMAGE
             frame = shared_frame(
-                kind, model.file_box, name=model.name, georeference=model.georeference, up=surface.view.rotation[2]
+                kind,
+                model.file_box,
+                name=model.name,
+                georeference=model.georeference,
+                up=surface.view.rotation[2],
+                material=model.material if holds_image else None,
             )
+            held_there = attributes | ({"uv": np.zeros((3, 2))} if holds_image else {})
             lines = tuple(TRIANGLE[0, :2] for _ in line_names)
-            mesh = OutMesh(corners, TRIANGLE, attributes, **frame, lines=lines, line_names=tuple(line_names))
+            mesh = OutMesh(corners, TRIANGLE, held_there, **frame, lines=lines, line_names=tuple(line_names))
             found.templates[suffix] = TEMPLATES[name](_written(kind, mesh))
     return found
 

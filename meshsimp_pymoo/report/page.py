@@ -170,7 +170,7 @@ def simplification_page(
     colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
     own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
     points = model.file_points[held.vertices].astype(np.float64)
-    files = downloads(surface, points, held.faces, held.line_names)
+    files = downloads(surface, points, held.faces, held.line_names, is_textured=texture is not None)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
@@ -242,7 +242,7 @@ def simplification_page(
         painted=paint is not None,
         is_stored=folder is not None,
         files=files.titles,
-        refused=printable(" ".join(f"{reason[0].upper()}{reason[1:]}." for reason in files.refused)),
+        refused="" if view.is_closed else printable(" ".join(files.refused)),
         covering=has_border,
         holes=view.is_closed and has_border,
         lines=lines_in_words(front.run["model"]["lines"], unit) if lines else "",

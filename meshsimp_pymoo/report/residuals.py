@@ -14,6 +14,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError, NoHeightGrid
 from meshsimp_pymoo.formats.geotiff import write_raster
 from meshsimp_pymoo.formats.source import RasterPart
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.accuracy import Compared
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.measures import LENGTH
@@ -24,6 +25,7 @@ TITLE = "residuals: original minus mesh"
 CHECKED, BESIDE = 1000, 1e-2
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Raster:
     """Where the samples of a model are in a raster.

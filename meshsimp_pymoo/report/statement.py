@@ -84,7 +84,7 @@ class QualityStatement(Accuracy):
         """What the mesh was measured against."""
         model = self.compared.surface.model
         facts = model.georeference
-        metres = None if self.unit == LENGTH else metres_of("metre" if self.unit == "m" else self.unit)
+        metres = None if self.unit == LENGTH else metres_of(self.unit)
         return {
             "name": PurePath(model.name).name,
             "sha256": model.hash,

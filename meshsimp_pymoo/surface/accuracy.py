@@ -28,6 +28,7 @@ import numpy as np
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
 from meshsimp_pymoo.plane.faces import least_angles, used_rows
+from meshsimp_pymoo.reprs import brief
 from meshsimp_pymoo.surface.closed.nearest import MeshTree
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.height import HeightSurface
@@ -286,6 +287,7 @@ class Residuals(NamedTuple):
     covered: BoolArray
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Compared:
     """One mesh beside its original: what numbers, maps and rasters of its quality are made of.

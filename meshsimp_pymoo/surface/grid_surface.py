@@ -21,7 +21,7 @@ from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.formats.source.heights import MESH_SAMPLE_BYTES, grid_mesh
 from meshsimp_pymoo.memory import check_free
 from meshsimp_pymoo.plane.faces import border_vertices, canonical_faces, one_rings
-from meshsimp_pymoo.reprs import in_short
+from meshsimp_pymoo.reprs import brief, in_short
 from meshsimp_pymoo.surface.grid import HeightGrid
 from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.measures import REGIONS, Quality
@@ -34,6 +34,7 @@ from meshsimp_pymoo.surface.weld import WeldedMesh, coverage, measured, residual
 FREE_RULES = ("footprint", "outside")
 
 
+@brief
 @dataclass(frozen=True, eq=False)
 class Banded:
     """The mesh of a subset, of whose original not all samples are held at once.

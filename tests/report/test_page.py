@@ -18,7 +18,7 @@ import pytest
 import trimesh
 from browser import Visit, launched
 from node import run_script
-from pages import camera, dress, number, pixels, relief, scale_of_errors, shown, unlike, until
+from pages import camera, chunks, dress, number, pixels, relief, scale_of_errors, shown, taken, unlike, until
 from samples import freed
 from scans import bowl
 from sketching import sketch
@@ -270,6 +270,23 @@ def test_the_chart_shows_any_error_and_the_searches_go_by_it(visit, front, measu
     assert page.input_value("#axis") == "rms_error"
 
 
+@pytest.mark.parametrize("width", [360, 700, 1400])
+def test_no_numbers_of_an_axis_overlap_or_are_cut(browser, folder, width):
+    visit = Visit(browser, folder / "report.html", viewport={"width": width, "height": 900})
+    for log in (True, False):
+        visit.page.set_checked("#log-x", log)
+        boxes = visit.page.locator("#chart .axes text[text-anchor=middle]:not(.name)").evaluate_all(
+            "all => all.map((at) => at.getBoundingClientRect()).map((box) => [box.left, box.right])"
+        )
+        ends = np.array(sorted(boxes))
+        assert len(ends) >= 3
+        assert (ends[1:, 0] > ends[:-1, 1]).all()
+        frame = visit.page.locator("#chart > svg").bounding_box()
+        assert ends.min() >= frame["x"]
+        assert ends.max() <= frame["x"] + frame["width"]
+    visit.close()
+
+
 def test_what_has_no_such_error_is_left_out_of_the_chart_and_named(browser, front, folder, tmp_path):
     known = np.where(np.arange(len(front)) == 2, 5.0, np.nan)
     stored = replace(
@@ -425,24 +442,6 @@ def parsed(path):
         return vertices, np.array([words[1:] for words in lines if words[0] == "f"], dtype=np.int64) - 1
     corners = np.array([words[1:] for words in lines if words[0] == "vertex"], dtype=float)
     return corners, np.arange(len(corners)).reshape(-1, 3)
-
-
-def taken(page, suffix, folder):
-    """Return the path of the file that a button downloads."""
-    with page.expect_download() as download:
-        page.click(f"#downloads button[value={suffix}]")
-    path = folder / f"page.{suffix}"
-    download.value.save_as(path)
-    return path
-
-
-def chunks(path):
-    """Return the tree of a GLB and the parts of its buffer, by accessor."""
-    content = path.read_bytes()
-    size = int.from_bytes(content[12:16], "little")
-    tree, binary = json.loads(content[20 : 20 + size]), content[28 + size :]
-    views = [tree["bufferViews"][accessor["bufferView"]] for accessor in tree["accessors"]]
-    return tree, [binary[view["byteOffset"] :][: view["byteLength"]] for view in views]
 
 
 def words(path):

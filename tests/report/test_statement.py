@@ -52,7 +52,7 @@ def write_tiff(path: Path, heights, transform=PLACE, crs="EPSG:25832") -> Path:
 def with_gap():
     heights = terrain()
     heights[7:9, 8:11] = np.nan
-    heights[0] = np.nan  # a row without any
+    heights[[0, -1]] = np.nan  # rows without any
     heights[:, -2:] = np.nan
     return heights
 
@@ -145,8 +145,10 @@ def test_a_raster_read_by_windows_has_the_raster_of_the_whole(tmp_path, monkeypa
     assert_allclose(mine, known, atol=1e-6)
     assert my_look["transform"] == look["transform"]
     assert my_look["crs"] == look["crs"]
-    firsts = [first for first, _ in residual_rows(compared, statement_figures.raster_of(surface.model))]
-    assert len(firsts) > 4
+    bands = list(residual_rows(compared, statement_figures.raster_of(surface.model)))
+    assert len(bands) > 4
+    assert_array_equal(np.concatenate([values for _, values in bands]).astype(np.float32), mine)
+    assert [first for first, _ in bands] == np.cumsum([0, *(len(values) for _, values in bands[:-1])]).tolist()
 
 
 def test_break_lines_bring_no_samples(tmp_path):
@@ -393,3 +395,19 @@ def test_unit_and_system_stand_in_the_summary_the_record_the_information_and_in_
     assert "<th>mean error [m]</th>" in front._repr_html_()
     assert not (tmp_path / "out" / "quality.html").exists()
     assert read(tmp_path / "out")["original"]["system"] == "EPSG:25832"
+
+
+def test_of_the_largest_models_the_statement_is_left_out_and_the_way_to_it_is_said(tmp_path, monkeypatch, capsys):
+    np.save(tmp_path / "dem.npy", terrain())
+    for module in ("front", "cli.results"):
+        monkeypatch.setattr(f"meshsimp_pymoo.{module}.STATED_VERTICES", 100)
+    how = ("--pick", "knee", "--moves", "2000", "--meshes", "none", "--no-page")
+    assert run("simplify", tmp_path / "dem.npy", "-o", tmp_path / "out", *how) == 0
+    assert f"make it by meshsimp quality {tmp_path / 'out'}" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "quality.json").exists()
+    monkeypatch.setattr("meshsimp_pymoo.front.STATED_VERTICES", 1000)
+    monkeypatch.setattr("meshsimp_pymoo.front.SPACE_VERTICES", 100)
+    Front.load(tmp_path / "out").draw(page=False)
+    found = read(tmp_path / "out")
+    assert found["accuracy"]["space"] is None
+    assert "Distances in space are left out" in found["left_out"][0]

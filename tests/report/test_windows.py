@@ -10,13 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from browser import Visit
-from pages import dress, pixels, relief, scale_of_errors, shown, unlike, until
+from pages import chunks, dress, pixels, relief, scale_of_errors, shown, taken, unlike, until
 from PIL import Image
 from sketching import sketch
 
 from meshsimp_pymoo import MeshProblem
 from meshsimp_pymoo.formats.material import Material
 from meshsimp_pymoo.formats.source import build_source
+from meshsimp_pymoo.formats.table import read_source
 from meshsimp_pymoo.front import Front
 from meshsimp_pymoo.report import colours as colours_module
 from meshsimp_pymoo.report import figures as figures_module
@@ -475,3 +476,15 @@ def test_an_image_that_the_browser_cannot_read_is_said(browser, front, tmp_path)
         visit.check()
     finally:
         visit.close()
+
+
+def test_a_downloaded_glb_has_the_texture_as_the_package_writes_it(page, front, tmp_path):
+    front[3].save(tmp_path / "package.glb")
+    (ours, parts), (theirs, own) = chunks(taken(page, "glb", tmp_path)), chunks(tmp_path / "package.glb")
+    assert ours == theirs
+    assert [parts[0], *parts[2:-1]] == [own[0], *own[2:-1]]
+    places = [np.frombuffer(there[1], "<f4") for there in (parts, own)]  # which the page holds in single precision
+    np.testing.assert_allclose(*places, rtol=0, atol=1e-7)
+    material = read_source(tmp_path / "page.glb").material
+    assert material.image == front.model.material.image
+    assert "GLB keeps the texture" in page.inner_text("section:has(#downloads)")

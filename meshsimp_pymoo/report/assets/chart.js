@@ -181,10 +181,14 @@ class FrontChart {
     box.left = Math.max(58, 14 + LETTER * Math.max(...y.ticks.map(([, text]) => text.length)));
     const x = this.scale("x", parts.flatMap((part) => Array.from(part.x)), box.left, box.right);
     const grid = svgPart(svg, "g", { class: "axes" });
+    let free = 0; // where there is room for the next number
     for (const [value, text] of x.ticks) {
       const at = x.at(value);
       svgPart(grid, "line", { x1: at, x2: at, y1: box.top, y2: box.bottom });
-      const within = Math.min(at, this.width - (LETTER * text.length) / 2);
+      const half = (LETTER * text.length) / 2;
+      const within = Math.min(at, this.width - half);
+      if (within - half < free) continue;
+      free = within + half;
       svgPart(grid, "text", { x: within, y: box.bottom + 16, "text-anchor": "middle" }, text);
     }
     for (const [value, text] of y.ticks) {

@@ -3,7 +3,7 @@
 // coordinates count from a local origin.) What else a file says comes from the package, as a template.
 
 // The vertices that the triangles use, in ascending order, and the triangles and the break lines as rows of those.
-function compactMesh(points, colours, faces, lines) {
+function compactMesh(points, colours, faces, lines, uv) {
   const place = new Int32Array(points.length / 3).fill(-1);
   for (const row of faces) place[row] = 0;
   let count = 0;
@@ -11,14 +11,16 @@ function compactMesh(points, colours, faces, lines) {
   const vertices = new Float64Array(3 * count);
   const channels = colours ? colours.length / place.length : 0;
   const paint = colours ? new Uint8Array(channels * count) : null;
+  const places = uv ? new Float32Array(2 * count) : null;
   for (let row = 0; row < place.length; row++) {
     const to = place[row];
     if (to < 0) continue;
     for (let k = 0; k < 3; k++) vertices[3 * to + k] = points[3 * row + k];
     for (let k = 0; k < channels; k++) paint[channels * to + k] = colours[channels * row + k];
+    for (let k = 0; uv && k < 2; k++) places[2 * to + k] = uv[2 * row + k];
   }
   const own = lines.map(({ rows, name }) => ({ rows: rows.map((row) => place[row]), name }));
-  return { vertices, colours: paint, channels, faces: faces.map((row) => place[row]), lines: own };
+  return { vertices, colours: paint, channels, faces: faces.map((row) => place[row]), lines: own, uv: places };
 }
 
 // The edges that break lines go along, each once, in the order of their ends.
@@ -70,7 +72,7 @@ function objFile({ vertices, colours, channels, faces, lines }) {
 }
 
 // template: the tree of a glTF of one mesh, whose extras say how its coordinates come about.
-function glbFile({ vertices, colours, channels, faces }, template) {
+function glbFile({ vertices, colours, channels, faces, uv, image }, template) {
   const tree = structuredClone(template);
   const { origin, axes, metres_per_unit: scale } = tree.nodes[0].extras;
   const turn = axes.map((axis) => [axis.startsWith("-") ? -1 : 1, "xyz".indexOf(axis.at(-1))]);
@@ -91,16 +93,24 @@ function glbFile({ vertices, colours, channels, faces }, template) {
   put(primitive.attributes.POSITION, place, n, { min: end(Math.min), max: end(Math.max) });
   if (colours) put(primitive.attributes.COLOR_0, paint, n);
   put(primitive.indices, Uint32Array.from(faces), faces.length);
+  if (uv) put(primitive.attributes.TEXCOORD_0, uv.map((value, k) => (k % 2 ? 1 - value : value)), n); // from the upper left corner
+  if (image) {
+    const [, kind, text] = image.match(/^data:(.*);base64,(.*)$/);
+    contents[tree.images[0].bufferView] = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    tree.images[0].mimeType = kind;
+  }
   let size = 0;
-  contents.forEach((content, view) => {
+  const parts = contents.flatMap((content, view) => {
     Object.assign(tree.bufferViews[view], { byteOffset: size, byteLength: content.byteLength });
-    size += content.byteLength; // each of them a multiple of 4
+    const filler = new Uint8Array(-content.byteLength & 3);
+    size += content.byteLength + filler.length;
+    return [content, filler];
   });
   tree.buffers[0].byteLength = size;
   const text = new TextEncoder().encode(JSON.stringify(tree));
   const padding = -text.length & 3;
   const head = new Uint32Array([0x46546c67, 2, 28 + text.length + padding + size, text.length + padding, 0x4e4f534a]);
-  return new Blob([head, text, " ".repeat(padding), new Uint32Array([size, 0x004e4942]), ...contents], { type: "model/gltf-binary" });
+  return new Blob([head, text, " ".repeat(padding), new Uint32Array([size, 0x004e4942]), ...parts], { type: "model/gltf-binary" });
 }
 
 // Points as "northing easting height". template: what stands around them, and how each break line begins.

@@ -211,7 +211,8 @@ part("by-error").addEventListener("submit", (event) => {
 for (const button of document.querySelectorAll("#downloads button")) {
   button.addEventListener("click", () => {
     const kind = button.value;
-    const mesh = compactMesh(state.geometry.points, state.geometry.paint, state.mesh.faces, state.mesh.lines);
+    const { points, paint, uv } = state.geometry;
+    const mesh = { ...compactMesh(points, paint, state.mesh.faces, state.mesh.lines, uv), image: data.texture?.image };
     const link = document.createElement("a");
     link.href = URL.createObjectURL(MESH_FILES[kind](mesh, data.files[kind]));
     link.download = `${data.stem}_${columns.triangles[state.mesh.row]}.${kind}`;

@@ -241,10 +241,9 @@ function withoutWebgl(reason) {
   part("divider").hidden = !state.viewer?.wiped;
 }
 
-// The factor of the slider of heights, whose scale is logarithmic: exactly 1 is easily found again.
+// The factor of the slider of heights, whose scale is logarithmic; of two digits, so that exactly 1 is easily found again.
 function heightFactor() {
-  const exponent = part("heights").valueAsNumber;
-  return Math.abs(exponent) < 0.015 ? 1 : Number((10 ** exponent).toPrecision(2));
+  return Number((10 ** part("heights").valueAsNumber).toPrecision(2));
 }
 
 async function imageOfModel() {
@@ -278,7 +277,7 @@ async function openViewer() {
     data.paint && unpackArray(data.paint),
     imageOfModel(),
   ]);
-  state.geometry = { points, paint, measured: new Uint32Array(new Set(faces)).sort() };
+  state.geometry = { points, paint, uv: image?.uv, measured: new Uint32Array(new Set(faces)).sort() };
   const { pivot, rotation, scale } = model; // scaled, coordinates are lengths
   const upright = new Float64Array(points.length);
   for (let i = 0; i < points.length; i += 3) {
