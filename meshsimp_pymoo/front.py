@@ -1109,7 +1109,8 @@ class Front(Sequence[FrontSolution]):
     def draw(self, *, page: bool = True, missing: bool = False) -> None:
         """Make the picture ``front.png`` and the page ``report.html`` of a stored front anew, each whole or not at all.
 
-        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one.
+        And what is said of the quality of the chosen mesh, ``quality.json`` and ``quality.html``, if there is one and
+        the model has no more than STATED_VERTICES vertices.
 
         Parameters
         ----------

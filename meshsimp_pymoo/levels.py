@@ -120,7 +120,7 @@ class _Ladder:
         return {
             "model": Path(model.name).name,
             "hash": model.hash,
-            **{"unit": length_unit(model.georeference)},
+            "unit": length_unit(model.georeference),
             **known_units(model.georeference),
             **({"crs": crs} if crs else {}),
             "geometric_error": f"{largest}, and not below that of a finer level",

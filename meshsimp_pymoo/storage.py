@@ -599,7 +599,7 @@ class MeshWriter:
         kind.check(surface.model)
         if compress and kind.pack is None:
             known = listed((other.name for other in written_formats().values() if other.pack is not None), "or")
-            raise ResultError(f"{kind.name} is not compressed; write {known}, or leave --compress out")
+            raise ResultError(f"{kind.name} is not compressed; write {known}, or do without compression")
         self.kind, self.surface, self.compress = kind, surface, compress
         self._look = _look(kind, surface)
         self._rounding = Rounding(kind)

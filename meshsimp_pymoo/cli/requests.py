@@ -69,6 +69,20 @@ class Wish:
         said = [f"{option(name)} {limit:.15g}" for name, limit in self.limits.items()]
         return " ".join(said + ["--pick knee"] * self.knee)
 
+    def choices(self, number: int | None) -> list[str]:
+        """Return the option that chooses a mesh, in a list: limits, the knee or the number of a solution; or none.
+
+        Raises
+        ------
+        UsageError
+            If there are two of them.
+        """
+        choices = {self.options: self.limits, "--knee": self.knee, "--solution": number is not None}
+        said = [choice for choice, is_said in choices.items() if is_said]
+        if len(said) > 1:
+            raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
+        return said
+
     def of(self, front: Any) -> tuple[Any | None, str]:
         """Return the solution of a front that is wanted, if one is, and why there is none, if so."""
         if self.knee:

@@ -121,10 +121,8 @@ def _write(path: Path, mesh: OutMesh) -> None:
         height, center = max(np.subtract(high, low)[:2].tolist()), np.add(low, high)[:2] / 2
         drawing.set_modelspace_vport(height or 1.0, center.tolist())
         space.reset_extents(low, high)
-        drawing.header["$EXTMIN"], drawing.header["$EXTMAX"] = (
-            low,
-            high,
-        )  # which the library does not take from a 0, 0, 0
+        # the library does not take over an extent that ends at 0, 0, 0
+        drawing.header["$EXTMIN"], drawing.header["$EXTMAX"] = low, high
         handles = drawing.entitydb.handles
         first = int(str(handles), 16)
         handles.reset(f"{first + len(mesh.faces):X}")

@@ -411,7 +411,7 @@ def write_raster(
     transform : (6,) floats
         As in `_read`.
     crs : str, optional
-        The reference system as WKT.
+        The reference system, as WKT or by its number: ``"EPSG:25832"``.
     unit : str
         Unit of the values; empty where it is not known.
     title : str

@@ -31,10 +31,10 @@ def _write(path: Path, mesh: OutMesh) -> None:
     cells = cells_of(mesh)
     starts = np.concatenate([[0], cells.ends[:-1]])
     lists = np.insert(cells.corners, starts, np.diff(cells.ends, prepend=0)).astype(np.int32)
-    n, m = len(mesh.vertices), len(cells.kinds)
+    n, m, title = len(mesh.vertices), len(cells.kinds), " ".join(mesh.name.split())[:250]
     parts = [
         b"# vtk DataFile Version 3.0\n",
-        f"{mesh.name.encode('ascii', 'replace').decode()[:250]}\nBINARY\nDATASET UNSTRUCTURED_GRID\n".encode(),
+        title.encode("ascii", "replace") + b"\nBINARY\nDATASET UNSTRUCTURED_GRID\n",
         _fields(facts_of(mesh)),
         f"POINTS {n} double\n".encode() + _binary(np.asarray(mesh.vertices, np.float64)),
         f"CELLS {m} {len(lists)}\n".encode() + _binary(lists),

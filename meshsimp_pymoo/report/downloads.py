@@ -95,7 +95,8 @@ def downloads(
         try:
             kind.check(held)
         except ResultError as refusal:
-            found.refused.append(f"No {kind.title}: {str(refusal).partition(': ')[2].partition('; ')[0]}.")
+            reason = str(refusal).removeprefix(f"{model.name}: ").partition("; ")[0]
+            found.refused.append(f"No {kind.title}: {reason}.")
             continue
         found.titles[suffix] = kind.title
         if name in TEMPLATES:
@@ -129,6 +130,11 @@ def _ply_template(content: bytes) -> list[str]:
     return re.sub(r"^(element \w+) \d+$", r"\1 0", header, flags=re.MULTILINE).splitlines()
 
 
+def _obj_template(content: bytes) -> list[str]:
+    """Return the comments."""
+    return [line for line in content.decode("utf-8").splitlines() if line.startswith("#")]
+
+
 def _glb_template(content: bytes) -> dict[str, Any]:
     """Return the tree, of one node with one mesh."""
     (size,) = struct.unpack_from("<I", content, 12)
@@ -149,4 +155,4 @@ def _landxml_template(content: bytes) -> dict[str, Any]:
     }
 
 
-TEMPLATES = {"ply": _ply_template, "glb": _glb_template, "landxml": _landxml_template}
+TEMPLATES = {"ply": _ply_template, "obj": _obj_template, "glb": _glb_template, "landxml": _landxml_template}

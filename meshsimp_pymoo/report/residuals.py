@@ -141,8 +141,6 @@ def write_residuals(path: Path, compared: Compared) -> None:
     raster, facts = raster_of(model), model.georeference
     unit = length_unit(facts)
     crs = facts.get("crs") or (f"EPSG:{facts['epsg']}" if facts.get("epsg") else None)
-    if not compared.signed:
-        raise ModelError(f"{model.name}: is a closed surface, whose residuals have no place in a raster")
     write_raster(
         path,
         residual_rows(compared, raster),

@@ -18,16 +18,18 @@ from importlib.metadata import version
 from pathlib import Path, PurePath
 from typing import Any
 
-from meshsimp_pymoo.errors import ModelError, NoHeightGrid, ResultError, printable, warn_of
+from meshsimp_pymoo.errors import ModelError, NoHeightGrid, printable, warn_of
 from meshsimp_pymoo.files import new_folder
 from meshsimp_pymoo.formats.outmesh import metres_of
 from meshsimp_pymoo.report.document import html_document
 from meshsimp_pymoo.report.residuals import write_residuals
 from meshsimp_pymoo.report.statement_figures import SCALE_QUANTILE
-from meshsimp_pymoo.storage import STATEMENT
+from meshsimp_pymoo.storage import STATEMENT, claim_output
 from meshsimp_pymoo.surface.accuracy import (
+    MOST_FACES,
     NORMAL_90,
     NORMAL_95,
+    NORMAL_MAD,
     Accuracy,
     Compared,
     accuracy_of,
@@ -50,7 +52,7 @@ SOURCES = {
     "FGDC-STD-007.3-1998 (NSSDA)",
     "le95_normal": f"{NORMAL_95:.4f} x RMSE, which bounds 95 % of normal errors without bias: FGDC-STD-007.3-1998 "
     "(NSSDA); NVA of ASPRS 2014",
-    "nmad": "1.4826 x median absolute deviation from the median: Höhle and Höhle, ISPRS J. 64, 2009",
+    "nmad": f"{NORMAL_MAD} x median absolute deviation from the median: Höhle and Höhle, ISPRS J. 64, 2009",
 }
 
 
@@ -84,14 +86,13 @@ class QualityStatement(Accuracy):
         """What the mesh was measured against."""
         model = self.compared.surface.model
         facts = model.georeference
-        metres = None if self.unit == LENGTH else metres_of(self.unit)
         return {
             "name": PurePath(model.name).name,
             "sha256": model.hash,
             "vertices": self.original_vertices,
             "triangles": self.original_triangles,
             "unit": None if self.unit == LENGTH else self.unit,
-            "metres_per_unit": metres,
+            "metres_per_unit": metres_of(self.unit),
             "system": self.system or None,
             **{name: facts.get(name) for name in ("epsg", "crs", "scale")},
             "box": model.file_box.tolist(),
@@ -329,16 +330,16 @@ def _method(stated: QualityStatement) -> list[str]:
         how = (
             "A residual is the height of a vertex of the original minus that of the mesh above or below it; positive "
             "where the original is above the mesh. Where no triangle covers it there is no sign, and bias, standard "
-            "deviation, median and NMAD are without it. NMAD is 1.4826 times the median absolute deviation from the "
-            "median (Höhle and Höhle 2009)."
+            f"deviation, median and NMAD are without it. NMAD is {NORMAL_MAD} times the median absolute deviation from "
+            "the median (Höhle and Höhle 2009)."
         )
     exact = "Percentiles are exact, by linear interpolation between the check points"
     if stated.resolution > 0.0:
         exact = f"Percentiles are taken from bins of {spelled(stated.resolution, stated.unit)}, as there are many"
     said = [
         how,
-        f"{exact}. LE90 and LE95 are stated twice: as counted, whatever the distribution, and as 1.6449 and 1.9600 "
-        "times the RMSE, which hold for normal errors without bias.",
+        f"{exact}. LE90 and LE95 are stated twice: as counted, whatever the distribution, and as {NORMAL_90:.4f} and "
+        f"{NORMAL_95:.4f} times the RMSE, which hold for normal errors without bias.",
     ]
     if not stated.closed:
         said.append("Coverage is the share of the area of those faces of the original whose middles the mesh covers.")
@@ -371,9 +372,12 @@ def stated(
     space_samples : int, optional
         See :func:`~meshsimp_pymoo.surface.accuracy.accuracy_of`.
     left_out : tuple of str
-        What is said to be left out.
+        What is said to be left out. Distances in space of an original that is too large for them are said so too.
     """
     numbers = accuracy_of(compared, space_samples=space_samples)
+    if numbers.space is None and space_samples != 0:
+        size = f"{numbers.original_triangles:,} triangles, more than {MOST_FACES:,}"
+        left_out = (*left_out, f"Distances in space are left out: the original has {size}.")
     known = {item.name: getattr(numbers, item.name) for item in fields(Accuracy)}
     return QualityStatement(**known, compared=compared, mesh=dict(mesh or {}), left_out=left_out)
 
@@ -405,17 +409,6 @@ def claim_folder(folder: Path, *, overwrite: bool) -> None:
     Raises
     ------
     ResultError
-        If the folder exists (or, with ``overwrite``, holds something else).
+        If the folder exists (or, with ``overwrite``, holds something else), or cannot be made.
     """
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise ResultError(f"{folder}: is a file; name a new folder")
-    if not overwrite:
-        raise ResultError(f"{folder}: exists already; name another folder or allow overwriting (--overwrite)")
-    foreign = sorted(entry.name for entry in folder.iterdir() if entry.name not in (DATA, PAGE, RESIDUALS))
-    if foreign:
-        raise ResultError(
-            f"{folder}: holds {foreign[0]}, which is no part of a statement of quality, and would be deleted with the "
-            "rest; name another folder"
-        )
+    claim_output(folder, overwrite=overwrite, is_own=(DATA, PAGE, RESIDUALS).__contains__)

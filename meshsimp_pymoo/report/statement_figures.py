@@ -74,8 +74,8 @@ def residuals_figure(numbers: Accuracy) -> Figure:
         ax.axvline(numbers.le90, color=MARK, linewidth=1.0, linestyle="--", label=f"LE90 = {numbers.le90:.4g}")
     ax.set_ylabel("check points")
     ax.yaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
-    outer = [("below", counts[0], edges[0], found.edges[0] < edges[0]), ("above", counts[1], edges[-1], True)]
-    said = [f"{count:,} {side} {edge:.3g}" for side, count, edge, _ in outer if count]
+    outer = zip(("below", "above"), counts, (edges[0], edges[-1]), strict=True)
+    said = [f"{count:,} {side} {edge:.3g}" for side, count, edge in outer if count]
     ax.set_title(", ".join(said) + " are not drawn" if said else "", fontsize=9, loc="left")
     ax.legend(frameon=False, fontsize=9)
     return figure
@@ -112,7 +112,7 @@ def angles_figure(numbers: Accuracy) -> Figure:
 def map_figure(compared: Compared, numbers: Accuracy) -> Figure:
     """Draw where the residuals are: a map with their signs, or a closed surface from both sides with their size."""
     if not compared.signed:
-        return _body(compared, numbers)
+        return _body(compared)
     try:
         raster = raster_of(compared.surface.model)
     except ModelError:  # it is no raster, or none that is even
@@ -263,7 +263,7 @@ def round_length(most: float) -> float:
     return float(f"{step * power:.1g}")
 
 
-def _body(compared: Compared, numbers: Accuracy) -> Figure:
+def _body(compared: Compared) -> Figure:
     """Draw the size of the residuals on a body from both sides."""
     surface = compared.surface
     found = compared.at(np.arange(surface.n_vertices))

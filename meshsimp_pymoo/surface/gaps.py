@@ -8,6 +8,7 @@ that its heights are read band by band.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,6 +47,46 @@ def emitted_of(grid: HeightGrid, xy: FloatArray, records: IntArray, rules: Rules
     return emitted.astype(bool)
 
 
+class _Laid(NamedTuple):
+    """A mesh as the functions that pass over the grid take it.
+
+    Attributes
+    ----------
+    xy, z, records : arrays
+        Places, one after the other, and heights of its vertices, and its records.
+    emitted : uint8 array
+        Which of these are triangles of it.
+    ends, key, boxes : arrays
+        Its outline; see :func:`_outline`.
+    """
+
+    xy: FloatArray
+    z: FloatArray
+    records: IntArray
+    emitted: IntArray
+    ends: IntArray
+    key: IntArray
+    boxes: FloatArray
+
+    @classmethod
+    def of(cls, mesh: tuple[FloatArray, FloatArray, IntArray, BoolArray]) -> _Laid:
+        """Find the outline of a mesh."""
+        xy, z, records, shown = mesh
+        flat, emitted = np.ascontiguousarray(xy).ravel(), shown.astype(np.uint8)
+        return cls(flat, z, records, emitted, *_outline(flat, records, emitted))
+
+    def starts(self, grid: HeightGrid, exact_area: float) -> IntArray:
+        """Return a triangle near the beginning of each row.
+
+        A row is measured from the same triangle whatever the bands and the threads: on an edge its neighbours differ by
+        rounding.
+        """
+        rows, columns = grid.span
+        found = np.zeros(grid.shape[0], np.int64)
+        _find_starts(grid.x[columns.start], grid.y[rows], self.xy, self.records, exact_area, found[rows])
+        return found
+
+
 def tabulated_with_gaps(
     grid: HeightGrid,
     mesh: tuple[FloatArray, FloatArray, IntArray, BoolArray],
@@ -68,7 +109,7 @@ def tabulated_with_gaps(
     at, between, n_threads
         As there.
     """
-    xy, z, records, shown = mesh
+    _, z, records, shown = mesh
     row, deviation, covered = np.empty(REGIONS), np.zeros(len(at)), np.zeros(len(at), bool)
     if not shown.any():
         row[[ERROR, SQUARES, MAXIMUM]] = np.inf
@@ -76,16 +117,12 @@ def tabulated_with_gaps(
         return row, deviation, covered, np.nan
     n_columns, lattice = grid.shape[1], grid.lattice
     assert lattice is not None
-    flat, emitted = np.ascontiguousarray(xy).ravel(), shown.astype(np.uint8)
-    rows, columns = grid.span
+    rows, _ = grid.span
     centroids = grid.between if between else None
     cells = centroids if isinstance(centroids, Cells) else None
     exact_area = grid.exact_ranges[0] if cells is None else cells.exact_area
-    ends, key, boxes = _outline(flat, records, emitted)
-    # A row is measured from the same triangle whatever the bands and the threads: on an edge its neighbours differ by
-    # rounding.
-    starts = np.zeros(grid.shape[0], np.int64)
-    _find_starts(grid.x[columns.start], grid.y[rows], flat, records, exact_area, starts[rows])
+    laid = _Laid.of(mesh)
+    starts = laid.starts(grid, exact_area)
     table = np.zeros((grid.shape[0], _COVERED + 1))
     bounds = np.linspace(rows.start, rows.stop, n_threads + 1).astype(int)
     how = grid.unit, nearest, exact_area
@@ -99,7 +136,7 @@ def tabulated_with_gaps(
                 north = first - len(above)
                 _measure_cells_with_gaps(
                     cells.x, cells.y[north:], cells.width, np.concatenate([above, band]), lattice.bits[north:end],
-                    flat, z, records, emitted, ends, key, boxes, starts[north:end], *how, table[north:end],
+                    *laid, starts[north:end], *how, table[north:end],
                 )  # fmt: skip
                 above = band[-1:]
             if first < bounds[part]:
@@ -108,8 +145,8 @@ def tabulated_with_gaps(
             residuals = np.zeros(band.shape if high > low else (0, 0))
             covers = np.zeros(residuals.shape, np.bool_)
             _measure_rows_with_gaps(
-                grid.x, grid.y[first:end], band, lattice.bits[first:end], flat, z, records, emitted, ends, key, boxes,
-                starts[first:end], *how, table[first:end], residuals, covers,
+                grid.x, grid.y[first:end], band, lattice.bits[first:end], *laid, starts[first:end], *how,
+                table[first:end], residuals, covers,
             )  # fmt: skip
             deviation[low:high] = np.abs(residuals.ravel()[at[low:high] - first * n_columns])
             covered[low:high] = covers.ravel()[at[low:high] - first * n_columns]
@@ -124,7 +161,9 @@ def tabulated_with_gaps(
     if cells is not None:
         surface_error = float((cells.height @ table[:-1, _BETWEEN]) / (cells.height @ table[:-1, _FACES]))
     elif isinstance(centroids, Between):
-        surface_error = measure_between(centroids, flat, z, records, len(records), emitted, grid.unit, nearest, False)
+        surface_error = measure_between(
+            centroids, laid.xy, z, records, len(records), laid.emitted, grid.unit, nearest, False
+        )
     return row, deviation, covered, surface_error
 
 
@@ -132,42 +171,33 @@ def residual_bands_with_gaps(
     grid: HeightGrid, mesh: tuple[FloatArray, FloatArray, IntArray, BoolArray], nearest: bool
 ) -> Iterator[tuple[int, FloatArray, BoolArray]]:
     """Do what :func:`~meshsimp_pymoo.surface.weld.residual_bands` does; the mesh is as in the function above."""
-    xy, z, records, shown = mesh
-    flat, emitted = np.ascontiguousarray(xy).ravel(), shown.astype(np.uint8)
-    rows, columns = grid.span
     lattice, exact_area = grid.lattice, grid.exact_ranges[0]
     assert lattice is not None
-    ends, key, boxes = _outline(flat, records, emitted)
-    starts = np.zeros(grid.shape[0], np.int64)
-    _find_starts(grid.x[columns.start], grid.y[rows], flat, records, exact_area, starts[rows])
+    laid = _Laid.of(mesh)
+    starts = laid.starts(grid, exact_area)
     for first, band in grid.bands():
         end = first + len(band)
         residuals, covers = np.full(band.shape, np.nan), np.zeros(band.shape, np.bool_)
         table = np.zeros((len(band), _COVERED + 1))
         _measure_rows_with_gaps(
-            grid.x, grid.y[first:end], band, lattice.bits[first:end], flat, z, records, emitted, ends, key, boxes,
-            starts[first:end], grid.unit, nearest, exact_area, table, residuals, covers,
+            grid.x, grid.y[first:end], band, lattice.bits[first:end], *laid, starts[first:end], grid.unit, nearest,
+            exact_area, table, residuals, covers,
         )  # fmt: skip
         yield first, residuals, covers
 
 
 def covered_share(grid: HeightGrid, mesh: tuple[FloatArray, FloatArray, IntArray, BoolArray], cells: Cells) -> float:
     """Return the share of the area of the faces of a grid with gaps whose centroids a mesh covers."""
-    xy, z, records, shown = mesh
-    flat, emitted = np.ascontiguousarray(xy).ravel(), shown.astype(np.uint8)
-    lattice = grid.lattice
+    lattice, (rows, _) = grid.lattice, grid.span
     assert lattice is not None
-    ends, key, boxes = _outline(flat, records, emitted)
-    rows, columns = grid.span
-    starts = np.zeros(grid.shape[0], np.int64)
-    _find_starts(grid.x[columns.start], grid.y[rows], flat, records, cells.exact_area, starts[rows])
+    laid = _Laid.of(mesh)
+    starts = laid.starts(grid, cells.exact_area)
     table, above = np.zeros((grid.shape[0], _COVERED + 1)), np.empty((0, grid.shape[1]))
     for first, band in grid.bands(first=rows.start, end=rows.stop):
         north, end = first - len(above), first + len(band)
         _measure_cells_with_gaps(
             cells.x, cells.y[north:], cells.width, np.concatenate([above, band]), lattice.bits[north:end],
-            flat, z, records, emitted, ends, key, boxes, starts[north:end],
-            grid.unit, False, cells.exact_area, table[north:end],
+            *laid, starts[north:end], grid.unit, False, cells.exact_area, table[north:end],
         )  # fmt: skip
         above = band[-1:]
     return float((cells.height @ table[:-1, _COVERED]) / (cells.height @ table[:-1, _FACES]))

@@ -151,7 +151,6 @@ from pathlib import Path
 import meshsimp_pymoo.formats
 meshsimp_pymoo.formats.__path__.append("more")
 from meshsimp_pymoo.cli import main
-from meshsimp_pymoo.cli import main
 from meshsimp_pymoo.datasets import load
 from meshsimp_pymoo.errors import ModelError, ModelWarning
 from meshsimp_pymoo.formats.table import read_source, write_mesh

@@ -944,7 +944,7 @@ def lined(tmp_path_factory):
     bend = [[[2.0, 3.0], [9.0, 12.0], [20.0, 14.0]]]
     points, faces, _ = relief(SIDE, np.random.default_rng(8))
     place = tmp_path_factory.mktemp("lined")
-    write_mesh(place / "hill.ply", points, faces)
+    write_mesh(place / "hill.ply", points, faces, georeference={"epsg": 32633, "unit": "metre"})
     problem = MeshProblem(place / "hill.ply", break_lines=bend, line_tolerance=0.5, n_threads=1)
     front = Front.from_subsets(problem, subsets(problem, 6, np.random.default_rng(8)), ends=True)
     return front, front.save(place / "out", chosen=2)

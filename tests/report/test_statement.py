@@ -91,9 +91,8 @@ def test_the_residuals_lie_where_the_samples_do(tmp_path, transform, window):
     row, column = np.divmod(surface.model.source_index, 16)
     assert_array_equal(np.isnan(found[row - top, column - left]), ~part.covered)
     assert np.isfinite(found).sum() == part.covered.sum()
-    mesh_height = surface.points[:, 2] - part.values  # so original minus mesh is what is left
     there = found[row - top, column - left]
-    assert_allclose(there[part.covered], (surface.points[:, 2] - mesh_height)[part.covered], rtol=1e-6, atol=1e-5)
+    assert_allclose(there[part.covered], part.values[part.covered], rtol=1e-6, atol=1e-5)
 
 
 @pytest.mark.parametrize("read", ["npy", "asc", "npz"])
@@ -218,6 +217,14 @@ def test_a_statement_says_what_was_measured_against_what_in_which_unit(tmp_path)
     said = f"Tested {statement.le90:.4g} m vertical accuracy at 90 % (LE90, as counted) against {surface.n_vertices} "
     assert data["statement"].startswith(f"{said}samples of dem.tif")
     assert set(data["sources"]) == {"le90", "le95", "le90_normal", "le95_normal", "nmad"}
+
+
+def test_distances_that_are_not_taken_are_said_unless_nobody_wants_them(monkeypatch):
+    monkeypatch.setattr("meshsimp_pymoo.surface.accuracy.MOST_FACES", 10)
+    compared = some(surface_of(open_model("face:100")))
+    (word,) = stated(compared).as_data()["left_out"]
+    assert word.startswith(f"Distances in space are left out: the original has {len(compared.surface.faces)} triangles")
+    assert stated(compared, space_samples=0).left_out == ()
 
 
 @pytest.mark.usefixtures("drawn")

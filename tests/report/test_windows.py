@@ -469,7 +469,8 @@ def test_an_image_that_the_browser_cannot_read_is_said(browser, front, tmp_path)
     (tmp_path / "report.html").write_text(page.replace(image, "data:image/png;base64,AAAA"), encoding="utf-8")
     visit = Visit(browser, tmp_path / "report.html", viewport=DESK)
     try:
-        assert "cannot read the texture" in visit.page.inner_text("#no-3d")
+        assert "cannot read the texture" in visit.page.inner_text("#no-texture")
+        assert not visit.page.locator("#no-3d").is_visible()
         assert visit.page.locator("input[value=texture]").count() == 0
         assert visit.page.is_checked("input[name=colours][value=plain]")
         assert len(np.unique(pixels(visit.page)[1].reshape(-1, 3), axis=0)) > 50

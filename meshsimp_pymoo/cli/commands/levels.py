@@ -126,8 +126,8 @@ def _write(args: argparse.Namespace, path: Any) -> int:
         return TARGET_MISSED
     if wish := front.run.get("wish"):
         say(
-            f"note: {args.front} was searched around {in_words(wish)}; far from it the meshes are poor; a search "
-            "without a wish is for all sizes"
+            f"note: {args.front} was searched around {in_words(wish, front.unit)}; far from it the meshes are poor; a "
+            "search without a wish is for all sizes"
         )
     asked = len(sizes or args.max_error or ())
     if len(levels) < asked:

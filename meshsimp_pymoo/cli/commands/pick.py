@@ -69,12 +69,8 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.formats.table import written_suffixes
 
     wish, shown = Wish(wishes_of(args), args.knee), {"quiet": args.quiet, "as_json": args.json}
-    choices = {wish.options: wish.limits, "--knee": args.knee, "--solution": args.solution is not None}
-    said = [choice for choice, is_said in choices.items() if is_said]
-    if not said:
+    if not wish.choices(args.solution):
         raise UsageError("which solution is wanted? say limits, such as --triangles 500, or --knee, or --solution K")
-    if len(said) > 1:
-        raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
     if args.solid is not None and args.output is None:
         raise UsageError("--solid is of a file that is written; name it (-o FILE), or leave --solid out")
     path = None if args.output is None else claim_file(args.output, written_suffixes(), overwrite=args.overwrite)

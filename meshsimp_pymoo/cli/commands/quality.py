@@ -69,17 +69,13 @@ def run(args: argparse.Namespace) -> int:
     from meshsimp_pymoo.cli.preparing import said_when_compiling
     from meshsimp_pymoo.cli.requests import Wish
     from meshsimp_pymoo.cli.terminal import OK, TARGET_MISSED, place_for_matplotlib, say
-    from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.report.statement import claim_folder
     from meshsimp_pymoo.storage import QUALITY
     from meshsimp_pymoo.surface.rules import Rules
 
     wish, number = Wish(wishes_of(args), args.knee), args.solution
-    choices = {wish.options: wish.limits, "--knee": args.knee, "--solution": number is not None}
-    said = [choice for choice, is_said in choices.items() if is_said]
-    if len(said) > 1:
-        raise UsageError(f"{said[0]} does not go with {said[1]}: each chooses a mesh; leave one of them out")
+    said = wish.choices(number)
     options, rules = settings_from(args, Options), settings_from(args, Rules)
     of_front = args.mesh is None
     _refuse(args, options, rules, said)
@@ -183,5 +179,5 @@ def _tell(statement: QualityStatement, folder: Path, *, quiet: bool, as_json: bo
         tell(json.dumps({"folder": str(folder), **statement.as_data()}, indent=2))
     elif not quiet:
         tell(statement.sentence)
-        tell(statement.in_words)
+        tell("\n".join([statement.in_words, *statement.left_out]))
         tell(f"written: {folder}: {there(folder, DATA, PAGE, RESIDUALS)}")

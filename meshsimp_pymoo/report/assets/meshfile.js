@@ -58,9 +58,9 @@ function plyFile({ vertices, colours, channels, faces, lines }, header) {
   return new Blob([[...head, "end_header\n"].join("\n"), body], { type: "application/octet-stream" });
 }
 
-// Colours stand behind the coordinates, as fractions of 1.
-function objFile({ vertices, colours, channels, faces, lines }) {
-  const text = [];
+// Colours stand behind the coordinates, as fractions of 1. comments: the lines that begin the file.
+function objFile({ vertices, colours, channels, faces, lines }, comments) {
+  const text = [...comments];
   for (let i = 0; i < vertices.length / 3; i++) {
     const numbers = [...vertices.subarray(3 * i, 3 * i + 3)];
     if (colours) for (let k = 0; k < 3; k++) numbers.push(colours[channels * i + k] / 255);

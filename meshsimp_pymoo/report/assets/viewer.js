@@ -16,7 +16,6 @@ const MAP_LIGHT = [-0.5, 0.5, Math.SQRT1_2]; // from the north-west, at 45 degre
 const LIGHTS = { plain: [0.3, 0.78], read: [0.72, 0.36], hillshade: [0.2, 0.92], readHillshade: [0.52, 0.62] };
 // Where textures look for their coordinates: the map of the error, the image of the model, the colours of heights.
 const [MAP_CHANNEL, IMAGE_CHANNEL, HEIGHT_CHANNEL] = [0, 1, 2];
-const UV_NAMES = ["uv", "uv1", "uv2"]; // as three.js calls those of the channels
 
 // The mean of the faces around each corner of each face, weighted by their angles there, but none beyond a crease:
 // (9 T) of triangles (3 T) of points (3 V). They are smooth where heights are multiplied by a factor.
@@ -295,9 +294,7 @@ class MeshPair {
     }
     if (part.isMapOld) {
       part.isMapOld = false;
-      // an attribute of its own, since that of the part is of another geometry
-      const seen = this.flat.children[0];
-      seen.geometry.setAttribute("color", part.errors);
+      this.flat.children[0].geometry.setAttribute("color", part.errors);
       this.renderer.setScissorTest(false);
       this.renderer.setRenderTarget(part.map.target);
       this.renderer.setClearColor(NO_VERTEX, 1);

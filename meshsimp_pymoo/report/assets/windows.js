@@ -4,6 +4,7 @@ const UNCOVERED_LEVEL = 255; // other levels q mean an error of (q / 254)^2 time
 const errorAt = (row, level) => data.solutions[row].largest * (level / 254) ** 2;
 const TICK_ROOM = 74; // pixels that a tick of the colour bar takes
 const LEAST_PICTURE_RATIO = 2; // pixels of a saved picture to one of the page, at least
+const KEY_NAME = 130; // pixels of its width for what the colours are
 const DIVIDER_STEP = 0.05;
 const RULER_SHARE = 0.4; // of a window, at most
 
@@ -144,6 +145,44 @@ function showRuler() {
 
 // ------------------------------------------------------------------------------------------------------- pictures
 
+// The ruler and the north arrow on a ground of their own; rectangle: where what is in the windows is in the picture.
+function drawRuler(pen, rectangle, ground) {
+  pen.save();
+  [pen.fillStyle, pen.globalAlpha] = [ground, getComputedStyle(part("ruler")).opacity];
+  pen.fillRect(...rectangle(part("ruler").getBoundingClientRect()));
+  pen.restore();
+  const bar = part("ruler-bar");
+  const [x, y, , tall] = rectangle(bar.getBoundingClientRect());
+  const long = bar.clientWidth;
+  pen.fillRect(x, y, 1, tall);
+  pen.fillRect(x + long - 1, y, 1, tall);
+  pen.fillRect(x, y + tall - 2, long, 2);
+  pen.fillText(part("ruler-length").textContent, x + long + 6, y + tall);
+  const arrow = part("north");
+  if (!arrow) return;
+  const [left, top, wide, high] = rectangle(arrow.getBoundingClientRect());
+  pen.fillText("N", rectangle(arrow.parentElement.getBoundingClientRect())[0], y + tall);
+  pen.save();
+  pen.translate(left + wide / 2, top + high / 2);
+  pen.rotate(state.viewer.north);
+  pen.textAlign = "center";
+  pen.textBaseline = "middle";
+  pen.fillText(arrow.textContent, 0, 0);
+  pen.restore();
+}
+
+// What the colours mean, in so much of the picture's width.
+function drawKey(pen, left, top, width) {
+  pen.fillText(part("key-name").textContent, left, top + 11, KEY_NAME - 10);
+  const [from, long] = [left + KEY_NAME, width - KEY_NAME];
+  pen.drawImage(part("bar"), from, top, long, 12);
+  const ticks = [...part("ticks").children];
+  ticks.forEach((tick, k) => {
+    pen.textAlign = k === 0 ? "left" : k === ticks.length - 1 ? "right" : "center";
+    pen.fillText(tick.textContent, from + (parseFloat(tick.style.left) / 100) * long, top + 28);
+  });
+}
+
 // The windows as they are, under what they show and above what the colours mean: a canvas.
 function pictureOfWindows() {
   const ratio = Math.max(LEAST_PICTURE_RATIO, window.devicePixelRatio || 1);
@@ -179,43 +218,13 @@ function pictureOfWindows() {
     pen.fillText(caption.innerText, x + 4, y + tall - 8, wide - 8);
   });
   pen.drawImage(meshes, edge, head, views.width, views.height);
+  pen.fillStyle = colour("--ink");
   if (state.viewer.wiped) {
     const [x, y, , tall] = rectangle(part("divider").getBoundingClientRect());
-    pen.fillStyle = colour("--ink");
     pen.fillRect(x + part("divider").clientWidth / 2 - 1, y, 2, tall);
   }
-  if (part("ruler")) {
-    const [x, y, , tall] = rectangle(part("ruler-bar").getBoundingClientRect());
-    const long = part("ruler-bar").clientWidth;
-    pen.fillStyle = colour("--ink");
-    pen.fillRect(x, y, 1, tall);
-    pen.fillRect(x + long - 1, y, 1, tall);
-    pen.fillRect(x, y + tall - 2, long, 2);
-    pen.fillText(part("ruler-length").textContent, x + long + 6, y + tall);
-    if (part("north")) {
-      const [left, top, wide, high] = rectangle(part("north").getBoundingClientRect());
-      pen.fillText("N", rectangle(part("north").parentElement.getBoundingClientRect())[0], y + tall);
-      pen.save();
-      pen.translate(left + wide / 2, top + high / 2);
-      pen.rotate(state.viewer.north);
-      pen.textAlign = "center";
-      pen.textBaseline = "middle";
-      pen.fillText(part("north").textContent, 0, 0);
-      pen.restore();
-    }
-  }
-  if (isRead) {
-    const [left, top] = [edge + 130, head + views.height + edge];
-    pen.fillStyle = colour("--ink");
-    pen.fillText(part("key-name").textContent, edge, top + 11, 120);
-    const long = width - left - edge;
-    pen.drawImage(part("bar"), left, top, long, 12);
-    const ticks = [...part("ticks").children];
-    ticks.forEach((tick, k) => {
-      pen.textAlign = k === 0 ? "left" : k === ticks.length - 1 ? "right" : "center";
-      pen.fillText(tick.textContent, left + (parseFloat(tick.style.left) / 100) * long, top + 28);
-    });
-  }
+  if (part("ruler")) drawRuler(pen, rectangle, colour("--window"));
+  if (isRead) drawKey(pen, edge, head + views.height + edge, views.width);
   return picture;
 }
 
@@ -231,13 +240,13 @@ function savePicture() {
 
 // ----------------------------------------------------------------------------------------------------- the windows
 
-// The one place that learns that nothing can be drawn by WebGL: its windows, and all that only they answer to, are not shown.
+// The one place that learns that no mesh can be drawn: the windows, and all that only they answer to, are not shown.
 // Without a reason they are there again.
-function withoutWebgl(reason) {
+function without3d(reason) {
   if (reason) state.viewer = null;
   part("no-3d").hidden = !reason;
   part("no-3d").textContent = `The meshes cannot be shown: ${reason}. All else works.`;
-  for (const needing of document.querySelectorAll(".needs-webgl")) needing.hidden = Boolean(reason);
+  for (const needing of document.querySelectorAll(".needs-3d")) needing.hidden = Boolean(reason);
   part("divider").hidden = !state.viewer?.wiped;
 }
 
@@ -254,8 +263,7 @@ async function imageOfModel() {
   if (!isShown) {
     document.querySelector("input[name=colours][value=texture]").closest("label").remove();
     document.querySelector("input[name=colours]").checked = true;
-    part("no-3d").hidden = false;
-    part("no-3d").textContent = "This browser cannot read the texture of the model; the meshes are shown without it.";
+    part("no-texture").hidden = false;
     return null;
   }
   return { picture, uv: Float32Array.from(uv), colour: data.texture.colour };
@@ -313,8 +321,8 @@ async function openViewer() {
       },
     });
   } catch (problem) {
-    withoutWebgl(`this browser gives no WebGL (${problem.message})`);
-    document.documentElement.dataset.ready = "without WebGL";
+    without3d(`this browser cannot draw them (${problem.message})`);
+    document.documentElement.dataset.ready = "without meshes";
     return;
   }
   const viewer = state.viewer;
@@ -322,10 +330,10 @@ async function openViewer() {
     part("no-3d").hidden = false;
     part("no-3d").textContent = "This browser gives no WebGL, so the page draws the meshes by itself: turning large ones takes its time.";
   }
-  canvas.addEventListener("webglcontextlost", () => withoutWebgl("the graphics card does not answer any more"));
+  canvas.addEventListener("webglcontextlost", () => without3d("the graphics card does not answer any more"));
   canvas.addEventListener("webglcontextrestored", () => {
     state.viewer = viewer;
-    withoutWebgl(null);
+    without3d(null);
     showMesh();
   });
   steerLook(viewer);
