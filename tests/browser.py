@@ -46,7 +46,7 @@ class Visit:
     A program draws it, so it has a quarter of the pixels of a common screen unless it is said to have all.
     """
 
-    def __init__(self, browser: Any, path: Path, **look: Any) -> None:
+    def __init__(self, browser: Any, path: Path, *, ready: str = "html[data-ready]", **look: Any) -> None:
         self.context = browser.new_context(accept_downloads=True, **{"device_scale_factor": 0.5} | look)
         self.page = self.context.new_page()
         self.said: list[str] = []
@@ -56,7 +56,7 @@ class Visit:
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.url = path.resolve().as_uri()
         self.page.goto(self.url)
-        self.page.wait_for_selector("html[data-ready]", timeout=20_000)
+        self.page.wait_for_selector(ready, timeout=20_000)
 
     def close(self) -> None:
         self.context.close()

@@ -105,7 +105,7 @@ def fronts_figure(study: Study, case: Case) -> Figure:
             half = attainment_surfaces(runs, [50])[50]
             ax.step(half[:, 1], half[:, 0], where="post", color=colour, linewidth=0.9, alpha=0.7, zorder=2)
     drawn = np.vstack([np.vstack(list(runs.values())) for runs in case.runs.values()])
-    front_axes(ax, drawn, label="error [file units]")
+    front_axes(ax, drawn, label=f"error [{case.problem.unit}]")
     _title(figure, f"{case.problem.name}: fronts merged over runs", [case])
     ax.legend(
         frameon=False,
@@ -188,7 +188,7 @@ def selected_figure(study: Study, cases: Sequence[Case]) -> Figure:
                     points.append(np.array([[s.error, s.triangles]]))
                     panel.plot(s.triangles, s.error, color=colour, marker=mark, markersize=6, zorder=3)
                     panel.plot(s.triangles, s.error, color=colour, marker="o", markersize=11, fillstyle="none")
-        front_axes(panel, np.vstack([optimal, *points]), label="error [file units]")
+        front_axes(panel, np.vstack([optimal, *points]), label=f"error [{case.problem.unit}]")
         panel.set_title(case.problem.name, loc="left", fontsize=10)
     ringed = " (ringed: by the paper's Eq. 11)" if literal else ""
     _title(
@@ -423,7 +423,7 @@ def meshes_figure(study: Study, case: Case) -> Figure:
         if not surface.view.is_closed:  # which is drawn from both sides
             below.set(xlim=panels[0, 0].get_xlim(), ylim=panels[0, 0].get_ylim())
     bar = figure.colorbar(colours, ax=panels[2, :].tolist(), shrink=0.8, pad=0.01, extend="max")
-    bar.set_label("error [file units]", fontsize=9)
+    bar.set_label(f"error [{case.problem.unit}]", fontsize=9)
     _title(figure, case.problem.name, [case])
     return figure
 

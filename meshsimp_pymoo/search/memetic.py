@@ -639,7 +639,7 @@ def between_the_rungs(
         ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
         by_thinning = _best_of(whole, high)[0]
         step = STEP if F[order[k], 0] < (1.0 - 2.0 * STEP) * by_thinning else SMALL_STEP
-        n_rows = min(max(int(np.log(max(ratio, 1.0)) / step), 1), BETWEEN, most_rows)
+        n_rows = int(min(max(np.log(max(ratio, 1.0)) / step, 1.0), BETWEEN, most_rows))  # the ratio may be infinite
         wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
         wanted = wanted[(wanted > low) & (wanted < high)]
         if stop[0] or not len(wanted):

@@ -54,7 +54,7 @@ QUICK = run_of([50, 200], [1.0, 2.0], [[(0, 60)], [(0, 60)]])
 
 
 def case_of(sources, *, outside="ignore", scoring="searched", name="M", **runs):
-    problem = Problem(name, "", 9, 8, Rules(outside=outside), "", "", {})
+    problem = Problem(name, "", 9, 8, Rules(outside=outside), "", "", {}, unit="m", system="")
     fronts = {method: dict.fromkeys(seeds, OPTIMAL) for method, seeds in sources.items()} | runs
     return Case(problem, BUDGET, scoring, fronts, sources, ())
 

@@ -42,6 +42,14 @@ def test_the_page_of_a_simplification_has_no_fault(browser, folder, scheme, look
     visit.close()
 
 
+@pytest.mark.parametrize(("scheme", "look"), [("light", PHONE), ("dark", DESK)])
+def test_neither_has_the_page_of_a_statement_of_quality(browser, folder, scheme, look):
+    visit = Visit(browser, folder / "quality.html", ready="main", color_scheme=scheme, **look)
+    assert faults(visit) == []
+    visit.check()
+    visit.close()
+
+
 def test_without_webgl_it_has_none_either(engine, folder):
     with launched(engine, "--disable-3d-apis") as blind:
         visit = Visit(blind, folder / "report.html", **DESK)

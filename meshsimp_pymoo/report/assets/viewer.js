@@ -499,7 +499,8 @@ class MeshPair {
 
   draw() {
     const { renderer, camera, sun } = this;
-    const lights = LIGHTS[this.isRead ? (this.hillshaded ? "readHillshade" : "read") : this.hillshaded ? "hillshade" : "plain"];
+    const onHeights = this.colours === "height" ? "readHillshade" : "read"; // shadows are no errors
+    const lights = LIGHTS[this.isRead ? (this.hillshaded ? onHeights : "read") : this.hillshaded ? "hillshade" : "plain"];
     this.sky.intensity = Math.PI * lights[0];
     sun.intensity = Math.PI * lights[1];
     sun.position.set(...(this.hillshaded ? MAP_LIGHT : VIEWER_LIGHT));
