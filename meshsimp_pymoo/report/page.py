@@ -33,7 +33,7 @@ from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Me
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import mesh_lines
-from meshsimp_pymoo.surface.units import length_unit, reference_system
+from meshsimp_pymoo.surface.units import in_unit, length_unit, reference_system
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.nested import Chromosomes
@@ -176,7 +176,7 @@ def simplification_page(
         "stem": slug(PurePath(source).stem),
         "folder": None if folder is None else printable(as_argument(folder)),
         "closed": _closed_look(surface) if view.is_closed else None,
-        "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
+        "unit": in_unit(unit),  # behind a number
         "measures": [
             {"name": name, **spoken(measure, unit, closed=view.is_closed)}
             for name, measure in MEASURES.items()

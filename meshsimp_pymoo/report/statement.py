@@ -35,7 +35,7 @@ from meshsimp_pymoo.surface.accuracy import (
     accuracy_of,
 )
 from meshsimp_pymoo.surface.measures import LENGTH
-from meshsimp_pymoo.surface.units import system_name
+from meshsimp_pymoo.surface.units import in_unit, system_name
 
 __all__ = ["DATA", "PAGE", "RESIDUALS", "QualityStatement", "stated"]
 
@@ -388,7 +388,7 @@ def spelled(value: float, unit: str) -> str:
     >>> spelled(0.42, "m"), spelled(1234.5678, "model units")
     ('0.42 m', '1235')
     """
-    return f"{value:.4g}" + f" {unit}" * (unit != LENGTH)
+    return f"{value:.4g}{in_unit(unit)}"
 
 
 def in_per_cent(share: float) -> str:

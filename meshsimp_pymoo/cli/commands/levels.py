@@ -154,8 +154,9 @@ def _write(args: argparse.Namespace, path: Path) -> int:
 
 def _tell(front: Front, record: Mapping[str, Any], path: Path) -> None:
     """Say what was written."""
-    from meshsimp_pymoo.cli.terminal import in_unit, tell
+    from meshsimp_pymoo.cli.terminal import tell
     from meshsimp_pymoo.surface.measures import LENGTH
+    from meshsimp_pymoo.surface.units import in_unit
 
     unit = in_unit(front.unit)
     for level in record["levels"]:
