@@ -43,6 +43,9 @@ __all__ = ["DATA", "PAGE", "RESIDUALS", "QualityStatement", "stated"]
 # Of the keys of quality.json: it rises where one changes its meaning or goes, not where one comes.
 SCHEMA = 1
 NOT_INDEPENDENT = "check points are the samples the mesh was made from, not independent ground truth"
+# What check points do that no triangle covers, by what is outside; of closed surfaces the rules do not say it.
+COSTS = {"nearest": "count with their distance to the mesh", "ignore": "count as 0"}
+COSTS[""] = COSTS["nearest"]
 # Where the numbers of the table come from, by name.
 SOURCES = {
     "le90": "percentile of the absolute residuals, as counted, whatever their distribution",
@@ -105,10 +108,8 @@ class QualityStatement(Accuracy):
         what = "distance from the original surface" if self.closed else "vertical accuracy"
         said = f"Tested {self.le90:.4g} {self.unit} {what} at 90 % (LE90, as counted)"
         said += f" against {count} samples of {source}"
-        if self.uncovered and self.outside == "ignore":
-            said += f"; {self.uncovered:,} of them, which no triangle covers, count as 0"
-        elif self.uncovered:
-            said += f"; {self.uncovered:,} of them, which no triangle covers, count with their distance to the mesh"
+        if self.uncovered:
+            said += f"; {self.uncovered:,} of them, which no triangle covers, {COSTS[self.outside]}"
         return f"{said}."
 
     @property
@@ -279,8 +280,7 @@ def _accuracy_rows(stated: QualityStatement) -> Rows:
     weighed = "counted by their weights" if stated.weighted else "all count alike"
     rows: Rows = [("Check points", points, f"vertices of the original, {weighed}{left_out}")]
     if not stated.closed:
-        costs = {"nearest": "they count with their distance to the mesh", "ignore": "they count as 0"}
-        rows.append(("Not covered", f"{stated.uncovered:,}", costs.get(stated.outside, "") if stated.uncovered else ""))
+        rows.append(("Not covered", f"{stated.uncovered:,}", f"they {COSTS[stated.outside]}" * bool(stated.uncovered)))
     if not math.isnan(stated.coverage):
         rows.append(("Coverage", in_per_cent(stated.coverage), "of the original's area in the plane"))
     rows += [

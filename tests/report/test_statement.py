@@ -21,7 +21,7 @@ from meshsimp_pymoo.opening import open_grid, open_model
 from meshsimp_pymoo.report import statement_figures
 from meshsimp_pymoo.report.residuals import residual_rows, write_residuals
 from meshsimp_pymoo.report.statement import NOT_INDEPENDENT, in_per_cent, stated
-from meshsimp_pymoo.surface.accuracy import compare, compare_subset
+from meshsimp_pymoo.surface.accuracy import compare, compare_any, compare_subset
 from meshsimp_pymoo.surface.grid_surface import GridSurface
 from meshsimp_pymoo.surface.kinds import surface_of
 from meshsimp_pymoo.surface.rules import Rules
@@ -217,6 +217,19 @@ def test_a_statement_says_what_was_measured_against_what_in_which_unit(tmp_path)
     said = f"Tested {statement.le90:.4g} m vertical accuracy at 90 % (LE90, as counted) against {surface.n_vertices} "
     assert data["statement"].startswith(f"{said}samples of dem.tif")
     assert set(data["sources"]) == {"le90", "le95", "le90_normal", "le95_normal", "nmad"}
+
+
+@pytest.mark.parametrize(
+    ("outside", "said"), [("nearest", "count with their distance to the mesh"), ("ignore", "count as 0")]
+)
+def test_the_sentence_and_the_table_say_what_is_not_covered_and_how_it_counts(tmp_path, outside, said):
+    np.save(tmp_path / "dem.npy", np.zeros((11, 11)))
+    surface = surface_of(open_model(tmp_path / "dem.npy"), Rules(outside=outside))
+    half = np.array([[0, -10, 0], [5, -10, 0], [5, 0, 0], [0, 0, 0.0]])
+    statement = stated(compare_any(surface, half, np.array([[0, 1, 2], [0, 2, 3]])))
+    assert statement.sentence.endswith(f"dem.npy; 55 of them, which no triangle covers, {said}.")
+    statement.write_page(tmp_path / "a.html")
+    assert f"<td>55</td><td>they {said}</td>" in (tmp_path / "a.html").read_text(encoding="utf-8")
 
 
 def test_distances_that_are_not_taken_are_said_unless_nobody_wants_them(monkeypatch):
