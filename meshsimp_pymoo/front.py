@@ -85,7 +85,7 @@ from meshsimp_pymoo.surface.surface import (
     measured_meshes,
     mesh_lines,
 )
-from meshsimp_pymoo.surface.units import length_unit
+from meshsimp_pymoo.surface.units import in_unit, length_unit
 from meshsimp_pymoo.surface.weld import pieces
 
 if TYPE_CHECKING:
@@ -327,7 +327,7 @@ class FrontSolution(_Numbers):
         figure = Figure(figsize=(5.0, 4.2), dpi=90, layout="constrained")
         self.plot(figure.subplots()).set_title(
             f"solution {self.solution}: {self.triangles:,} triangles, mean error {self.mean_error:.3g}"
-            + f" {self.front.unit}" * (self.front.unit != LENGTH),
+            + in_unit(self.front.unit),
             fontsize=10,
         )
         return _png(figure)

@@ -19,7 +19,6 @@ from meshsimp_pymoo.cli.terminal import (
     answering,
     described,
     in_numbers,
-    in_unit,
     is_interrupted,
     place_for_matplotlib,
     say,
@@ -38,7 +37,7 @@ from meshsimp_pymoo.search.wishes import in_words
 from meshsimp_pymoo.storage import PICTURES, STATEMENT, claim_output, even_selection, read_front
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import Surface
-from meshsimp_pymoo.surface.units import known_units, reference_system
+from meshsimp_pymoo.surface.units import in_unit, known_units, reference_system
 
 # How long results take at most once the search has come back after Ctrl-C, for which its start may take another 1.2 s;
 # and what drawing takes for each vertex of the model [s]. Together with the rest of the folder that is within five.

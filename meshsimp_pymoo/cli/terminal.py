@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from meshsimp_pymoo.errors import ResultError, printable, reason_of
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, OF_LINES
+from meshsimp_pymoo.surface.units import in_unit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +50,6 @@ __all__ = [
     "bar",
     "described",
     "front_in_words",
-    "in_unit",
     "interrupted_code",
     "interruptible",
     "is_interrupted",
@@ -465,14 +465,9 @@ def in_numbers(quality: Quality) -> dict[str, float | None]:
     return {name: value for name, value in known.items() if value is not None or name not in OF_LINES}
 
 
-def in_unit(unit: str) -> str:
-    """Return what follows a number of this unit: nothing where it is not known."""
-    return "" if unit == LENGTH else f" {unit}"
-
-
 def solid_in_words(numbers: Mapping[str, Any], unit: str) -> str:
     """Return what there is to say of a mesh that was closed for printing, whose other numbers are its surface's."""
-    volume = f"{numbers['volume']:.6g}" + ("" if unit == LENGTH else f" cubic {unit}")
+    volume = f"{numbers['volume']:.6g}{' cubic' * (unit != LENGTH)}{in_unit(unit)}"
     parted = f", parted at {numbers['parted']:,} places where its outline touched itself" if "parted" in numbers else ""
     return (
         f"with walls and a base {numbers['thickness']:g}{in_unit(unit)} below the lowest point the file has "

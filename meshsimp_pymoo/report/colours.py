@@ -14,10 +14,12 @@ from meshsimp_pymoo.errors import reason_of
 if TYPE_CHECKING:
     from meshsimp_pymoo.formats.material import Material
 
-__all__ = ["embedded_image", "hypsometric", "magma"]
+__all__ = ["SCALE_QUANTILE", "embedded_image", "hypsometric", "magma"]
 
 # Colours of the error in all pictures: pale where it is small. The darkest ones would be lost on a dark page.
 COLOUR_MAP, DARKEST, COLOURS = "magma_r", 0.9, 128
+# They end where this share of the vertices are below: a few spikes do not pale all the rest.
+SCALE_QUANTILE = 0.98
 # Colours of heights, as maps have them from lowland to snow. Each is lighter than the one before, so that they are in
 # order whatever colours people see.
 HEIGHTS = ("#35626b", "#5d8a66", "#a3a163", "#d6bc8c", "#f7f1e6")

@@ -28,7 +28,7 @@ from meshsimp_pymoo.report.depth import Seen, seen
 from meshsimp_pymoo.surface.closed.model import ClosedModel
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, require_measure
 from meshsimp_pymoo.surface.surface import Surface, mesh_lines, require_rules
-from meshsimp_pymoo.surface.units import length_unit, reference_system
+from meshsimp_pymoo.surface.units import in_unit, length_unit, reference_system
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -457,7 +457,7 @@ def front_figure(
         error = f"mean error {F[row, 0] / surface.total_weight:.3g}"
         if measure != "error":
             error = f"{MEASURES[measure].label} {F[row, 0]:.3g}"
-        error += f" {unit}" * (unit != LENGTH)
+        error += in_unit(unit)
         names = [name for name, marked in (("knee", knee), ("chosen", chosen)) if marked == row]
         label = f" ({', '.join(names)})" if names else ""
         size = f"{int(F[row, 1]):,} triangle{'' if F[row, 1] == 1 else 's'}"

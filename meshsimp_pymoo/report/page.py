@@ -21,7 +21,7 @@ from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray, Rows
 from meshsimp_pymoo.errors import ResultError, printable
 from meshsimp_pymoo.files import as_argument
 from meshsimp_pymoo.formats.table import listed
-from meshsimp_pymoo.report.colours import embedded_image, hypsometric, magma
+from meshsimp_pymoo.report.colours import SCALE_QUANTILE, embedded_image, hypsometric, magma
 from meshsimp_pymoo.report.document import embedded_array, embedded_faces, html_document, slug
 from meshsimp_pymoo.report.downloads import downloads
 from meshsimp_pymoo.report.figures import INSIDE, RIM, UNCOVERED, VIEWS, original_mesh, winding
@@ -33,7 +33,7 @@ from meshsimp_pymoo.surface.measures import ERROR, LENGTH, MEASURES, REGIONS, Me
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import mesh_lines
-from meshsimp_pymoo.surface.units import length_unit, reference_system
+from meshsimp_pymoo.surface.units import in_unit, length_unit, reference_system
 
 if TYPE_CHECKING:
     from meshsimp_pymoo.surface.nested import Chromosomes
@@ -56,8 +56,6 @@ FIXED_BYTES = 730_000
 TRIANGLE_BYTES, DEVIATION_BYTES, VERTEX_BYTES, UV_BYTES = 4.0, 1.2, 26.0, 9
 # A deviation d is embedded as the level 254 sqrt(d / largest), which keeps small ones apart.
 LEVELS, UNCOVERED_LEVEL = 254, 255
-# The colours of the error end where this share of the knee's vertices are below: a few spikes do not pale all the rest.
-SCALE_QUANTILE = 0.98
 # Of break lines with more vertices than these together, what thinning left of them is drawn on the original.
 DRAWN_LINE_VERTICES = 10_000
 # How the meshes can be coloured, as the page calls it; the first ones only where the model has them.
@@ -178,7 +176,7 @@ def simplification_page(
         "stem": slug(PurePath(source).stem),
         "folder": None if folder is None else printable(as_argument(folder)),
         "closed": _closed_look(surface) if view.is_closed else None,
-        "unit": "" if unit == LENGTH else f" {unit}",  # behind a number
+        "unit": in_unit(unit),  # behind a number
         "measures": [
             {"name": name, **spoken(measure, unit, closed=view.is_closed)}
             for name, measure in MEASURES.items()

@@ -21,9 +21,9 @@ from typing import Any
 from meshsimp_pymoo.errors import ModelError, NoHeightGrid, printable, warn_of
 from meshsimp_pymoo.files import new_folder
 from meshsimp_pymoo.formats.outmesh import metres_of
+from meshsimp_pymoo.report.colours import SCALE_QUANTILE
 from meshsimp_pymoo.report.document import html_document
 from meshsimp_pymoo.report.residuals import write_residuals
-from meshsimp_pymoo.report.statement_figures import SCALE_QUANTILE
 from meshsimp_pymoo.storage import STATEMENT, claim_output
 from meshsimp_pymoo.surface.accuracy import (
     MOST_FACES,
@@ -35,7 +35,7 @@ from meshsimp_pymoo.surface.accuracy import (
     accuracy_of,
 )
 from meshsimp_pymoo.surface.measures import LENGTH
-from meshsimp_pymoo.surface.units import system_name
+from meshsimp_pymoo.surface.units import in_unit, system_name
 
 __all__ = ["DATA", "PAGE", "RESIDUALS", "QualityStatement", "stated"]
 
@@ -388,7 +388,7 @@ def spelled(value: float, unit: str) -> str:
     >>> spelled(0.42, "m"), spelled(1234.5678, "model units")
     ('0.42 m', '1235')
     """
-    return f"{value:.4g}" + f" {unit}" * (unit != LENGTH)
+    return f"{value:.4g}{in_unit(unit)}"
 
 
 def in_per_cent(share: float) -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshsimp_pymoo.arrays import FloatArray
+from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
+from meshsimp_pymoo.report.colours import SCALE_QUANTILE
 from meshsimp_pymoo.report.figures import BREAK_LINE, LINE, MARK, original_mesh, plot_error
 from meshsimp_pymoo.report.residuals import Raster, raster_of
 from meshsimp_pymoo.surface.accuracy import THIN_ANGLES, Accuracy, Compared, Histogram
@@ -22,9 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["address_of", "angles_figure", "map_figure", "pictures", "residuals_figure"]
 
-# Signed residuals: blue where the mesh is above the original, red where it is below; the colours end where this share
-# of their sizes is below.
-SIGNED_COLOURS, SCALE_QUANTILE = "RdBu_r", 0.98
+# Signed residuals: blue where the mesh is above the original, red where it is below.
+SIGNED_COLOURS = "RdBu_r"
 NOTHING, BARE = "#c9ccd1", "#111111"
 # Samples along the longer side of a map, and the share of its width that the scale bar takes about.
 MOST_ACROSS, BAR_SHARE = 1200, 0.22
@@ -180,7 +180,7 @@ def _is_upright(compared: Compared) -> bool:
     return bool(np.array_equal(compared.surface.view.rotation, np.eye(3)))
 
 
-def _places(compared: Compared, rows: Any) -> FloatArray:
+def _places(compared: Compared, rows: IntArray) -> FloatArray:
     """Return where vertices are drawn: in the coordinates of their file, or if it lies otherwise as seen from above."""
     surface = compared.surface
     if _is_upright(compared):

@@ -13,6 +13,7 @@ from numbers import Real
 from typing import Any
 
 from meshsimp_pymoo.surface.measures import LENGTH, MEASURES, OBJECTIVES
+from meshsimp_pymoo.surface.units import in_unit
 
 # Moves where no budget is given, about ten seconds of two cores.
 USUAL_BUDGET = 10_000_000
@@ -95,7 +96,7 @@ def in_words(limits: Mapping[str, float], unit: str = LENGTH) -> str:
     >>> in_words({"triangles": 5000, "max_error": 0.25}), in_words({"max_error": 0.25}, "m")
     ('at most 5,000 triangles and a max error of at most 0.25', 'a max error of at most 0.25 m')
     """
-    behind = "" if unit == LENGTH else f" {unit}"
+    behind = in_unit(unit)
     said = [
         f"at most {limit:,} triangles"
         if name == "triangles"

@@ -13,6 +13,7 @@ from meshsimp_pymoo.surface.height import HeightSurface
 from meshsimp_pymoo.surface.lines import ModelLines
 from meshsimp_pymoo.surface.measures import LENGTH, TRIANGLES
 from meshsimp_pymoo.surface.surface import Surface
+from meshsimp_pymoo.surface.units import in_unit
 
 # The tolerance is doubled until it is large enough, and that interval halved so often.
 HALVINGS = 7
@@ -53,7 +54,7 @@ def lines_in_words(facts: Mapping[str, Any], unit: str = LENGTH) -> str:
     4 lines, 804 vertices thinned to 243 within 0.3 m; every mesh keeps their 239 edges, the smallest has 500 triangles
     """
     lines, edges, smallest = facts["lines"], facts["forced_edges"], facts["smallest"]
-    within = f"{facts['tolerance']:.4g}" + ("" if unit == LENGTH else f" {unit}")
+    within = f"{facts['tolerance']:.4g}{in_unit(unit)}"
     return (
         f"{lines:,} line{'s' * (lines != 1)}, {facts['vertices']:,} vertices thinned to {facts['thinned']:,} within "
         f"{within}; every mesh keeps their {edges:,} edge{'s' * (edges != 1)}, the smallest has {smallest:,} "

@@ -27,6 +27,15 @@ def length_unit(georeference: Mapping[str, Any]) -> str:
     return LENGTH if unit in ("None", *ANGLES) else unit
 
 
+def in_unit(unit: str) -> str:
+    """Return what follows a number of this unit: nothing where it is not known.
+
+    >>> f"0.3{in_unit('m')}", f"0.3{in_unit(LENGTH)}"
+    ('0.3 m', '0.3')
+    """
+    return "" if unit == LENGTH else f" {unit}"
+
+
 def metres_per_model_unit(georeference: Mapping[str, Any]) -> float:
     """Return what the unit of errors is in metres; 1 where nobody says.
 

@@ -41,7 +41,7 @@ EXAMPLES = 8
 
 
 def of_terrain(n=7, seed=1, *, at=(0.0, 0.0, 0.0), scale=1.0, order=None, rules=Rules()):  # noqa: B008
-    """Return a terrain's surface whose vertices lie at no lattice, and the rows of some of them by their places."""
+    """Return a terrain's surface whose vertices lie at no lattice."""
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.random((n * n, 2)) * 50.0, rng.random(n * n) * 8.0])
     source = cloud_source(points, name="terrain")

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from meshsimp_pymoo.front import Front
 
 HELP = "write a front that is stored as levels of detail"
@@ -104,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
         return _write(args, path)
 
 
-def _write(args: argparse.Namespace, path: Any) -> int:
+def _write(args: argparse.Namespace, path: Path) -> int:
     import json
 
     from meshsimp_pymoo.cli.arguments import Share
@@ -150,10 +152,11 @@ def _write(args: argparse.Namespace, path: Any) -> int:
     return OK
 
 
-def _tell(front: Front, record: Mapping[str, Any], path: Any) -> None:
+def _tell(front: Front, record: Mapping[str, Any], path: Path) -> None:
     """Say what was written."""
-    from meshsimp_pymoo.cli.terminal import in_unit, tell
+    from meshsimp_pymoo.cli.terminal import tell
     from meshsimp_pymoo.surface.measures import LENGTH
+    from meshsimp_pymoo.surface.units import in_unit
 
     unit = in_unit(front.unit)
     for level in record["levels"]:

@@ -74,12 +74,12 @@ def _scored(
     """Return what is said of a mesh, as numbers and in words; draw its error if a file is named."""
     from pathlib import Path
 
-    from meshsimp_pymoo.cli.terminal import described, in_numbers, in_unit
+    from meshsimp_pymoo.cli.terminal import described, in_numbers
     from meshsimp_pymoo.errors import UsageError
     from meshsimp_pymoo.formats.options import Options
     from meshsimp_pymoo.opening import open_model, open_source
     from meshsimp_pymoo.surface.kinds import surface_of
-    from meshsimp_pymoo.surface.units import known_units, length_unit
+    from meshsimp_pymoo.surface.units import in_unit, known_units, length_unit
 
     front = None if folder is None else _front_of(folder, model, options, rules, outside)
     surface: Any = surface_of(open_model(model, options), rules) if front is None else front.surface

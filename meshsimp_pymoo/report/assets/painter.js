@@ -383,7 +383,6 @@ class SoftwareRenderer {
       }
     }
   }
-
 }
 
 function mixed(below, above, share) {
