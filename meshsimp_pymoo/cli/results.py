@@ -34,7 +34,7 @@ from meshsimp_pymoo.formats.table import format_to_write
 from meshsimp_pymoo.front import STATED_VERTICES, Front, FrontSolution
 from meshsimp_pymoo.search.checkpoint import difference
 from meshsimp_pymoo.search.wishes import in_words
-from meshsimp_pymoo.storage import PICTURES, claim_output, even_selection, read_front
+from meshsimp_pymoo.storage import PICTURES, STATEMENT, claim_output, even_selection, read_front
 from meshsimp_pymoo.surface.smallest import lines_in_words
 from meshsimp_pymoo.surface.surface import Surface
 from meshsimp_pymoo.surface.units import in_unit, known_units, reference_system
@@ -210,7 +210,7 @@ def _tell(front: Front, output: Output, wish: Wish) -> None:
             tell(f"solid: {solid_in_words(run['solid'], unit)}")
     suffix = format_to_write(output.format).suffix
     written, refitted = (len(list(folder.glob(f"{place}/*{suffix}"))) for place in ("meshes", "refitted"))
-    files = [there(folder, "front.csv", *PICTURES)]
+    files = [there(folder, "front.csv", *PICTURES, *STATEMENT)]
     files += [f"{n} in {place}" for n, place in ((written, "meshes"), (refitted, "refitted")) if n]
     tell(f"written: {folder}: {', '.join(files)}")
     if (compiled := run["compile_seconds"]) >= 1.0:

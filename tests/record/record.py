@@ -33,8 +33,9 @@ from typing import Any
 HERE = Path(__file__).resolve()
 ROOT = HERE.parents[2]
 RECORD = HERE.with_name("record.json")
-# What of a folder of results is no result: it holds the time taken, the name of the folder, or a picture of the rest.
-UNRECORDED = ("run.json", "report.html", "front.png", "times.csv", ".lock")
+# What of a folder of results is no result: it holds the time taken, the name of the folder, a picture or a statement of
+# the rest.
+UNRECORDED = ("run.json", "report.html", "front.png", "quality.json", "quality.html", "times.csv", ".lock")
 
 ROWS: dict[str, Callable[[], str]] = {}
 
