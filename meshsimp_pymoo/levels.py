@@ -120,7 +120,7 @@ class _Ladder:
         return {
             "model": Path(model.name).name,
             "hash": model.hash,
-            "unit": length_unit(model.georeference),
+            "unit": self.unit,
             **known_units(model.georeference),
             **({"crs": crs} if crs else {}),
             "geometric_error": f"{largest}, and not below that of a finer level",
@@ -129,6 +129,14 @@ class _Ladder:
             "screen_height": "the diameter as a share of the screen's height up to which the geometric error is at "
             f"most {PIXELS:g} pixel(s)",
         }
+
+    @property
+    def unit(self) -> str:
+        return length_unit(self.surface.model.georeference)
+
+    def shown(self, mesh: OutMesh, numbers: dict[str, Any], **frame: Any) -> OutMesh:
+        """Return a mesh as it is written: it says its numbers, and looks smooth."""
+        return replace(mesh, extras={"unit": self.unit} | numbers, shaded=True, **frame)
 
     def meshes(self, writer: MeshWriter) -> Iterator[tuple[_Level, OutMesh]]:
         """Yield each level with its mesh, made when it is asked for."""
@@ -201,11 +209,11 @@ def save_levels(
     record = ladder.record | {"form": "MSFT_lod" if in_one else form}
     if in_one:
         with new_file(path) as unfinished:
-            record["levels"] = _write_one(unfinished, ladder, writer, record)
+            record["levels"] = _write_one(unfinished, ladder, writer)
     else:
         with new_folder(path, replace=overwrite) as partial:
             write = _write_tiles if form == TILES else _write_files
-            record |= write(partial, ladder, writer, record)
+            record |= write(partial, ladder, writer)
             (partial / RECORD).write_bytes((json.dumps(record, indent=2, allow_nan=False) + "\n").encode())
     writer.warn()
     return record
@@ -250,34 +258,29 @@ def _packing(mesh: OutMesh) -> dict[str, float]:
     return {} if mesh.packed is None else mesh.packed.said
 
 
-def _write_one(path: Path, ladder: _Ladder, writer: MeshWriter, record: dict[str, Any]) -> list[dict[str, Any]]:
+def _write_one(path: Path, ladder: _Ladder, writer: MeshWriter) -> list[dict[str, Any]]:
     """Write all levels as one GLB; return what is said of them."""
     meshes, said = [], []
     for k, (level, mesh) in enumerate(ladder.meshes(writer)):
         numbers = ladder.said(k) | {"coverage": ladder.coverage[k]}
-        meshes.append(
-            writer.packed(
-                replace(mesh, extras={"unit": record["unit"]} | numbers, shaded=True), level.quality.mean_error
-            )
-        )
+        meshes.append(writer.packed(ladder.shown(mesh, numbers), level.quality.mean_error))
         said.append(numbers | _packing(meshes[-1]))
     write_glb(path, meshes, ladder.coverage)
     return said
 
 
-def _write_files(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict[str, Any]) -> dict[str, Any]:
+def _write_files(folder: Path, ladder: _Ladder, writer: MeshWriter) -> dict[str, Any]:
     """Write a file for each level; return what is said of them."""
     said = []
     for k, (level, mesh) in enumerate(ladder.meshes(writer)):
         file = f"level-{k}{writer.kind.suffix}"
         numbers = ladder.said(k)
-        shown = replace(mesh, extras={"unit": record["unit"]} | numbers, shaded=True)
-        written = writer.write(folder / file, shown, level.quality.mean_error)
+        written = writer.write(folder / file, ladder.shown(mesh, numbers), level.quality.mean_error)
         said.append({"file": file} | numbers | _packing(written))
     return {"levels": said}
 
 
-def _write_tiles(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict[str, Any]) -> dict[str, Any]:
+def _write_tiles(folder: Path, ladder: _Ladder, writer: MeshWriter) -> dict[str, Any]:
     """Write a GLB for each level and the tileset; return what is said of them and of their frame."""
     model, metres = ladder.surface.model, metres_per_model_unit(ladder.surface.model.georeference)
     place, at = _place(ladder, writer), np.zeros(3)
@@ -290,15 +293,8 @@ def _write_tiles(folder: Path, ladder: _Ladder, writer: MeshWriter, record: dict
         errors.append(max([level.error * metres + below, *errors[-1:]]))
         file = f"level-{k}{writer.kind.suffix}"
         numbers = ladder.said(k) | {"below_the_bent_earth_m": below, "tile_error_m": errors[-1]}
-        tile = replace(
-            mesh,
-            vertices=points,
-            origin=np.zeros(3),
-            georeference={"unit": "metre"},
-            up=None,
-            extras={"unit": record["unit"]} | numbers,
-            shaded=True,
-        )
+        in_metres = {"origin": np.zeros(3), "georeference": {"unit": "metre"}, "up": None}
+        tile = ladder.shown(mesh, numbers, vertices=points, **in_metres)
         written = writer.write(folder / file, tile, level.quality.mean_error)
         off = ROUNDING * float(np.ptp(points, axis=0).max()) + (0.0 if written.packed is None else written.packed.shift)
         corners += [points.min(axis=0) - off, points.max(axis=0) + off]
