@@ -190,8 +190,9 @@ def _material_of(path: Path, wanted: str, found: dict[str, str], name: str, *, p
 
 def _comments(georeference: Mapping[str, Any]) -> list[str]:
     """Return what is known of the coordinates as lines that programs pass over: the system, the unit."""
-    known = f"EPSG:{georeference['epsg']}" if georeference.get("epsg") else georeference.get("crs")
-    said = {"crs": known, "unit": georeference.get("unit")}
+    from meshsimp_pymoo.formats.source.metric import spelled_system
+
+    said = {"crs": spelled_system(georeference), "unit": georeference.get("unit")}
     return [f"# {name}: {' '.join(str(fact).split())}" for name, fact in said.items() if fact]
 
 

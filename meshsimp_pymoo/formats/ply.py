@@ -456,10 +456,10 @@ def _image_comments(folder: Path, mesh: OutMesh) -> list[str]:
 
 def _crs_comments(georeference: Mapping[str, Any]) -> list[str]:
     """Return the line of a PLY header that says the coordinate reference system, as QGIS reads it, if it is known."""
-    if georeference.get("epsg"):
-        return [f"comment crs: EPSG:{georeference['epsg']}"]
-    wkt = " ".join(str(georeference.get("crs") or "").split())
-    return [f"comment crs: {wkt}"] if wkt else []
+    from meshsimp_pymoo.formats.source.metric import spelled_system
+
+    system = spelled_system(georeference)
+    return [f"comment crs: {system}"] if system else []
 
 
 # What connects vertices, and the triangles that it means.

@@ -20,7 +20,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import AnyArray, FloatArray
 from meshsimp_pymoo.errors import ModelError, printable, reason_of, warn_of
 from meshsimp_pymoo.formats.source.lines import SourceLines, build_lines, part_names, spelled_name
-from meshsimp_pymoo.formats.source.metric import stated_system
+from meshsimp_pymoo.formats.source.metric import spelled_system, stated_system
 from meshsimp_pymoo.formats.source.numbers import glimpse
 from meshsimp_pymoo.formats.source.triangles import TRIANGLE
 from meshsimp_pymoo.memory import check_free
@@ -210,8 +210,7 @@ def write_layers(
     import pyogrio
     from pyogrio.errors import CRSError
 
-    number = georeference.get("epsg")
-    system = f"EPSG:{number}" if number else str(georeference.get("crs") or "")
+    system = spelled_system(georeference)
     before = pyogrio.get_gdal_config_option(DATE_OPTION)
     pyogrio.set_gdal_config_options({DATE_OPTION: DATE})
     try:

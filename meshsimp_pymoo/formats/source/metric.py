@@ -47,6 +47,19 @@ def stated_system(text: str) -> dict[str, Any]:
     return {"crs": text} if "[" in text else {}
 
 
+def spelled_system(georeference: Mapping[str, Any]) -> str:
+    r"""Return a reference system as files name it: by its number in the EPSG register, else as WKT in one line.
+
+    >>> spelled_system({"epsg": 25832, "crs": "PROJCS[...]"}), spelled_system({"crs": "LOCAL_CS[\n  ...]"})
+    ('EPSG:25832', 'LOCAL_CS[ ...]')
+    >>> spelled_system({})
+    ''
+    """
+    if number := georeference.get("epsg"):
+        return f"EPSG:{number}"
+    return " ".join(str(georeference.get("crs") or "").split())
+
+
 def systems_differ(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
     """Tell whether two georeferences are known to be of different reference systems.
 
