@@ -141,11 +141,13 @@ def way_to_install(extra: str, package: str = "") -> str:
 
     try:
         parts = [text.partition(";") for text in requires("meshsimp-pymoo") or ()]
-    except PackageNotFoundError:  # run from a clone that is not installed
-        return f"pip install '.[{extra}]' in the folder of its pyproject.toml"
+    except PackageNotFoundError:
+        parts = []
     needed = [name.strip() for name, _, marker in parts if re.search(rf"extra\s*==\s*['\"]{extra}['\"]", marker)]
     if package:
         needed = [name for name in needed if re.match(rf"{package}\b(?!-)", name)] or [package]
+    if not needed:  # run from a clone that is not installed, or was before it had this extra
+        return f"pip install '.[{extra}]' in the folder of its pyproject.toml"
     return f"pip install {' '.join(map(repr, needed))}"
 
 

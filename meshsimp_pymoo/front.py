@@ -29,7 +29,7 @@ import numpy.typing as npt
 from pymoo.optimize import minimize
 
 from meshsimp_pymoo.arrays import BoolArray, FloatArray, IntArray
-from meshsimp_pymoo.errors import Missed, ModelError, ResultError, way_to_install
+from meshsimp_pymoo.errors import Missed, ModelError, ResultError, warn_of, way_to_install
 from meshsimp_pymoo.files import claim_file, draw_into, new_file
 from meshsimp_pymoo.formats.options import Options
 from meshsimp_pymoo.formats.table import written_suffixes
@@ -85,7 +85,7 @@ from meshsimp_pymoo.surface.surface import (
     measured_meshes,
     mesh_lines,
 )
-from meshsimp_pymoo.surface.units import in_unit, length_unit
+from meshsimp_pymoo.surface.units import in_unit, length_unit, reference_system
 from meshsimp_pymoo.surface.weld import pieces
 
 if TYPE_CHECKING:
@@ -1324,7 +1324,17 @@ class Front(Sequence[FrontSolution]):
                 * (facts.get("vertices") != surface.n_vertices)
                 + f"; {way_out}"
             )
+        self._warn_of_another_frame(surface.model, where)
         return surface
+
+    def _warn_of_another_frame(self, model: Any, where: Any) -> None:
+        """Say where the same coordinates are said to be in another unit or reference system than they were."""
+        was, now = ((length_unit(facts), reference_system(facts)) for facts in (self.georeference, model.georeference))
+        if any(known and other and known != other for known, other in zip(was, now, strict=True)):
+            then, today = (", ".join(filter(None, said)) for said in (was, now))
+            warn_of(
+                f"{model.name}: says {today}, and said {then} when {where} was made; what is written now says {today}"
+            )
 
     def _with_images(self, surface: Surface, where: Any, way_out: str) -> Surface:
         """Return the surface with the images of its vertices that the chromosomes are of, if it has any."""

@@ -232,7 +232,7 @@ def claim_levels(path: str | os.PathLike[str], *, overwrite: bool = False) -> No
             f"{path}: one file holds levels as {GLB} alone; name a .glb, or a folder and its form "
             f"({format_of_output(path).name})"
         )
-    claim_output(path, overwrite=overwrite, is_own=_is_own)
+    claim_output(path, overwrite=overwrite, is_own=_is_own, what="part of levels of detail")
 
 
 def _is_own(name: str) -> bool:

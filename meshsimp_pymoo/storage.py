@@ -179,7 +179,11 @@ class StoredFront:
 
 
 def claim_output(
-    folder: str | os.PathLike[str], *, overwrite: bool = False, is_own: Callable[[str], bool] | None = None
+    folder: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    is_own: Callable[[str], bool] | None = None,
+    what: str = "result of meshsimp",
 ) -> Path:
     """Check, before any work, that results can be written to this folder; nothing is left behind.
 
@@ -192,6 +196,8 @@ def claim_output(
         complete.
     is_own : callable, optional
         Tells of the name of an entry whether it is one of these results; by default those of a search.
+    what : str
+        What such an entry is.
 
     Returns
     -------
@@ -214,7 +220,7 @@ def claim_output(
         foreign = sorted(e.name for e in target.iterdir() if not (known(e.name) or is_put_beside(e.name)))
         if foreign:
             raise ResultError(
-                f"{folder}: holds {foreign[0]}, which is no result of meshsimp, and would be deleted with the rest; "
+                f"{folder}: holds {foreign[0]}, which is no {what}, and would be deleted with the rest; "
                 "name another folder"
             )
     parent = target.parent

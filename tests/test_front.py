@@ -48,6 +48,8 @@ from meshsimp_pymoo import (
     weighted_ga_v1,
 )
 from meshsimp_pymoo.datasets import load
+from meshsimp_pymoo.errors import ModelWarning
+from meshsimp_pymoo.formats.geotiff import write_raster
 from meshsimp_pymoo.formats.table import write_mesh, written_suffixes
 from meshsimp_pymoo.front import LIMITS, starting_front
 from meshsimp_pymoo.indicators import hypervolume_ratio, knee
@@ -603,6 +605,20 @@ def test_a_model_that_changed_is_refused_with_the_way_out(roof_file, tmp_path):
     roof_file.unlink()
     with pytest.raises(ResultError, match=r"its model cannot be read \(.*roof\.ply: no such file.*\); pass the orig"):
         _ = front[0].mesh
+
+
+def test_the_same_heights_in_another_unit_are_said_to_be_so(tmp_path):
+    pytest.importorskip("rasterio", reason="no rasterio: pip install '.[geo]'")
+    for code in (25832, 2226):
+        heights = iter([(0, np.arange(16.0).reshape(4, 4) ** 2)])
+        write_raster(tmp_path / f"{code}.tif", heights, shape=(4, 4), transform=(1.0, 0.0, 0.0, 0.0, -1.0, 0.0),
+                     crs=f"EPSG:{code}", unit="", title="", tags={}, name="heights")  # fmt: skip
+    problem = MeshProblem(str(tmp_path / "25832.tif"))
+    Front.from_subsets(problem, np.ones((1, 16), bool), ends=True).save(tmp_path / "out", meshes=0)
+    with pytest.warns(
+        ModelWarning, match=r"says US survey foot, EPSG:2226, and said m, EPSG:25832 when .*out was made"
+    ):
+        _ = Front.load(tmp_path / "out", model=tmp_path / "2226.tif").surface
 
 
 def test_how_the_model_was_read_is_remembered(tmp_path):

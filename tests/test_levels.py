@@ -577,7 +577,7 @@ def test_levels_are_replaced_only_when_asked_and_nothing_else_ever_is(folder, tm
     assert not list(out.glob("*.ply"))
     (out / "mine.txt").write_text("x")
     assert run("levels", folder, "-o", out, "-q", "--overwrite") == 2
-    assert "holds mine.txt, which is no result of meshsimp" in capsys.readouterr().err
+    assert "holds mine.txt, which is no part of levels of detail" in capsys.readouterr().err
     assert run("levels", folder, "-o", folder, "-q", "--overwrite") == 2, "never the front itself"
     assert (folder / "front.csv").exists()
 

@@ -158,7 +158,7 @@ def plot_front(
             zorder=5,
         )
     what = "mean error per vertex" if as_mean else MEASURES[measure].label
-    front_axes(ax, np.vstack(drawn), label=f"{what} [{unit}]")
+    front_axes(ax, np.vstack(drawn), label=f"{what} [{verbatim(unit)}]")
     if knee is not None or chosen is not None or series:
         for handle in ax.legend(frameon=False).get_lines():
             handle.set_markersize(min(handle.get_markersize(), 9))
@@ -330,7 +330,7 @@ def plot_error(
     drawn = (_error_of_body if surface.view.is_closed else _error_map)(ax, surface, size, end or 1.0, covered)
     if bar:
         shown = ax.figure.colorbar(drawn, ax=ax, shrink=0.8, pad=0.02, extend="max" if greatest > end else "neither")
-        shown.set_label(f"error [{length_unit(surface.model.georeference)}]")
+        shown.set_label(f"error [{verbatim(length_unit(surface.model.georeference))}]")
         shown.outline.set_visible(False)
     return ax
 
@@ -388,15 +388,24 @@ def _error_of_body(ax: Axes, surface: Surface, size: FloatArray, end: float, cov
     return colours
 
 
+def verbatim(text: object) -> str:
+    r"""Return what a file says as pictures show it: printable, and its dollars are no formula.
+
+    >>> print(verbatim("US$ per $m^2$"))
+    US\$ per \$m^2\$
+    """
+    return printable(text).replace("$", r"\$")
+
+
 def short_name(name: str) -> str:
     """Return what a title calls a model: the name of its file, the middle of a long one left out.
 
     >>> short_name("scans/face.ply"), short_name("x" * 30 + "y" * 30)
     ('face.ply', 'xxxxxxxxxxxxxxxxxxxx…yyyyyyyyyyyyyyyyyyy')
     """
-    whole = printable(PurePath(name).name)
+    whole = PurePath(name).name
     half = LONGEST_NAME // 2
-    return whole if len(whole) <= LONGEST_NAME else f"{whole[:half]}…{whole[len(whole) - half + 1 :]}"
+    return verbatim(whole if len(whole) <= LONGEST_NAME else f"{whole[:half]}…{whole[len(whole) - half + 1 :]}")
 
 
 def front_figure(
@@ -442,7 +451,7 @@ def front_figure(
     front = left.subplots()
     letters = [row for row, _ in meshes]
     marks: dict[str, Any] = {"knee": knee, "chosen": chosen, "marked": letters}
-    unit, system = length_unit(model.georeference), printable(reference_system(model.georeference))
+    unit, system = length_unit(model.georeference), verbatim(reference_system(model.georeference))
     plot_front(F, front, **marks, n_points=surface.total_weight, measure=measure, series=series, unit=unit)
     size = f"{model.n_vertices:,} vertices, {len(model.faces):,} triangles"
     front.set_title(f"{short_name(model.name)}: {size}" + f"\n{system}" * bool(system), loc="left")
@@ -457,7 +466,7 @@ def front_figure(
         error = f"mean error {F[row, 0] / surface.total_weight:.3g}"
         if measure != "error":
             error = f"{MEASURES[measure].label} {F[row, 0]:.3g}"
-        error += in_unit(unit)
+        error += verbatim(in_unit(unit))
         names = [name for name, marked in (("knee", knee), ("chosen", chosen)) if marked == row]
         label = f" ({', '.join(names)})" if names else ""
         size = f"{int(F[row, 1]):,} triangle{'' if F[row, 1] == 1 else 's'}"
@@ -549,7 +558,7 @@ def error_figure(
     # a few spikes shall not pale all the rest
     plot_error(surface, size, ax, covered=covered, largest=float(np.quantile(size, 0.995)) or None)
     bare = int((~np.asarray(covered, dtype=bool)).sum())
-    system = printable(reference_system(surface.model.georeference))
+    system = verbatim(reference_system(surface.model.georeference))
     said = [title, system, f"blue: {bare:,} uncovered vertices" if bare else ""]
     ax.set_title("\n".join(filter(None, said)), fontsize=10)
     return figure

@@ -126,7 +126,7 @@ class QualityStatement(Accuracy):
         said = [f"{name} {spelled(value, self.unit)}" for name, value in known.items() if not math.isnan(value)]
         if not math.isnan(self.coverage):
             said.append(f"coverage {in_per_cent(self.coverage)}")
-        return ", ".join([*said, f"{self.triangles:,} triangles ({in_per_cent(self.reduction)} fewer)"])
+        return ", ".join([*said, f"{self.triangles:,} triangles ({in_per_cent(abs(self.reduction))} {_fewer(self)})"])
 
     def as_data(self) -> dict[str, Any]:
         """Return the content of quality.json: plain data, lengths in ``original.unit``."""
@@ -241,7 +241,7 @@ def _subjects(stated: QualityStatement, mesh: str) -> list[tuple[str, str]]:
         (
             "Mesh",
             f"{mesh}{''.join(f', {kind}' for kind in kinds)}: {stated.triangles:,} triangles, {stated.vertices:,} "
-            f"vertices, {in_per_cent(stated.reduction)} fewer triangles than the original",
+            f"vertices, {in_per_cent(abs(stated.reduction))} {_fewer(stated)} triangles than the original",
         ),
         (
             "Original",
@@ -254,6 +254,10 @@ def _subjects(stated: QualityStatement, mesh: str) -> list[tuple[str, str]]:
         ("Extent in the file", box),
         ("Made by", f"meshsimp_pymoo {version('meshsimp-pymoo')}"),
     ]
+
+
+def _fewer(stated: Accuracy) -> str:
+    return "fewer" if stated.reduction >= 0.0 else "more"
 
 
 def _system(stated: QualityStatement) -> str:

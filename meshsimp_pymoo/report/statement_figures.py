@@ -12,7 +12,7 @@ import numpy as np
 from meshsimp_pymoo.arrays import FloatArray, IntArray
 from meshsimp_pymoo.errors import ModelError
 from meshsimp_pymoo.report.colours import SCALE_QUANTILE
-from meshsimp_pymoo.report.figures import BREAK_LINE, LINE, MARK, original_mesh, plot_error
+from meshsimp_pymoo.report.figures import BREAK_LINE, LINE, MARK, original_mesh, plot_error, verbatim
 from meshsimp_pymoo.report.residuals import Raster, raster_of
 from meshsimp_pymoo.surface.accuracy import THIN_ANGLES, Accuracy, Compared, Histogram
 from meshsimp_pymoo.surface.units import ANGLES
@@ -57,7 +57,7 @@ def address_of(figure: Figure, *, vector: bool = False) -> str:
 
 def residuals_figure(numbers: Accuracy) -> Figure:
     """Draw how often residuals have which size; what is beyond the even bins is said in words."""
-    found, unit = numbers.histogram, numbers.unit
+    found, unit = numbers.histogram, verbatim(numbers.unit)
     figure, ax = _figure((6.4, 3.0))
     edges, counts = _bars(ax, found)
     if numbers.closed:
@@ -89,7 +89,8 @@ def _bars(ax: Axes, found: Histogram) -> tuple[FloatArray, tuple[int, int]]:
     last = len(counts) - (int(abs(edges[-1] - edges[-2] - width) > 1e-6 * width) if len(counts) > 2 else 0)
     inner = edges[first : last + 1]
     ax.bar(inner[:-1], counts[first:last], np.diff(inner), align="edge", color=LINE, edgecolor="white", linewidth=0.3)
-    ax.set_xlim(inner[0], inner[-1])
+    if inner[-1] > inner[0]:  # else nothing is covered
+        ax.set_xlim(inner[0], inner[-1])
     return inner, (int(counts[:first].sum()), int(counts[last:].sum()))
 
 
@@ -210,7 +211,7 @@ def _finish_map(ax: Axes, compared: Compared, numbers: Accuracy, drawn: Any) -> 
         names = ("longitude", "latitude")
     elif upright and (facts.get("epsg") or facts.get("crs")):
         names = ("easting", "northing")
-    of_axes = unit if upright and unit else numbers.unit
+    of_axes = verbatim(unit if upright and unit else numbers.unit)
     ax.set_xlabel(f"{names[0]} [{of_axes}]")
     ax.set_ylabel(f"{names[1]} [{of_axes}]")
     ax.ticklabel_format(useOffset=False, style="plain")
@@ -225,11 +226,11 @@ def _finish_map(ax: Axes, compared: Compared, numbers: Accuracy, drawn: Any) -> 
         x, y, _ = numbers.max_at
         ax.plot([x], [y], "o", markersize=11, fillstyle="none", color=BARE, markeredgewidth=1.3,
                 label=f"maximum {numbers.max_error:.4g}")  # fmt: skip
-    _scale_bar(ax, across, numbers.unit)
+    _scale_bar(ax, across, verbatim(numbers.unit))
     size = np.abs(drawn.get_array().compressed() if hasattr(drawn.get_array(), "compressed") else drawn.get_array())
     beyond = "both" if len(size) and size.max() > drawn.get_clim()[1] else "neither"
     colours = ax.figure.colorbar(drawn, ax=ax, shrink=0.85, pad=0.02, extend=beyond)
-    colours.set_label(f"original minus mesh [{numbers.unit}]")
+    colours.set_label(f"original minus mesh [{verbatim(numbers.unit)}]")
     colours.outline.set_visible(False)
     if ax.get_legend_handles_labels()[0]:
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize=9, borderaxespad=0.2)

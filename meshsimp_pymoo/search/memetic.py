@@ -636,10 +636,10 @@ def between_the_rungs(
 
     def fill(k: int) -> list[NDArray[np.uint8]]:
         low, high = F[order[k - 1], 1], F[order[k], 1]
-        ratio = F[order[k - 1], 0] / max(F[order[k], 0], 1e-300)
+        ratio = float(F[order[k - 1], 0]) / max(float(F[order[k], 0]), 1e-300)  # may be infinite
         by_thinning = _best_of(whole, high)[0]
         step = STEP if F[order[k], 0] < (1.0 - 2.0 * STEP) * by_thinning else SMALL_STEP
-        n_rows = int(min(max(np.log(max(ratio, 1.0)) / step, 1.0), BETWEEN, most_rows))  # the ratio may be infinite
+        n_rows = int(min(max(np.log(max(ratio, 1.0)) / step, 1.0), BETWEEN, most_rows))
         wanted = np.unique(np.round(np.linspace(low, high, n_rows + 2)[1:-1]))
         wanted = wanted[(wanted > low) & (wanted < high)]
         if stop[0] or not len(wanted):

@@ -29,6 +29,8 @@ from meshsimp_pymoo.workers import Reserve
 
 # By how much parts are drawn apart, as a share of the diagonal: some eight steps of single precision.
 APART = 2.0**-20
+# The bounds of a thickness, as shares of the diagonal: beyond them rounding takes the base or the mesh away.
+THINNEST, THICKEST = 1e-9, 1e6
 
 
 class Solid(NamedTuple):
@@ -70,19 +72,26 @@ def check_solid(surface: Surface, thickness: float, kind: Format | None = None) 
     ValueError
         If the thickness is not positive.
     ResultError
-        If the surface is closed already, is one of tiles, or has no lengths for coordinates.
+        If the surface is closed already, is one of tiles, or has no lengths for coordinates, or the thickness is lost
+        beside it, or it beside the thickness.
     """
     if not (np.isfinite(thickness) and thickness > 0.0):
         raise ValueError(f"a solid {thickness!r} thick is none; give how far its base is below the lowest point")
     name = surface.model.name
     if surface.view.is_closed:
-        raise ResultError(f"{name}: is a closed surface, which needs no base; leave the solid out")
+        raise ResultError(f"{name}: is a closed surface, which has no outline for a base; leave the solid out")
     if not isinstance(surface, HeightSurface):
         raise ResultError(f"{name}: a solid is made of what is searched in one piece, not of tiles; leave it out")
     if not (surface.view.scale == 1.0).all():
         raise ResultError(
             f"{name}: a solid is for printing, with lengths alone, and this model is measured in other units than its "
             "file has, such as degrees; project it first (gdalwarp -t_srs)"
+        )
+    least, most = THINNEST * surface.diagonal, THICKEST * surface.diagonal
+    if not least <= thickness <= most:
+        raise ResultError(
+            f"{name}: a base {thickness:g} below the lowest point does not go with a mesh that is "
+            f"{surface.diagonal:.4g} across; give from {least:.4g} to {most:.4g}"
         )
     if kind is not None and kind.one_height:
         raise ResultError(

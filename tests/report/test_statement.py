@@ -431,3 +431,30 @@ def test_of_the_largest_models_the_statement_is_left_out_and_the_way_to_it_is_sa
     found = read(tmp_path / "out")
     assert found["accuracy"]["space"] is None
     assert "Distances in space are left out" in found["left_out"][0]
+
+
+def test_a_mesh_beside_the_original_and_one_of_more_triangles_have_their_statements(tmp_path):
+    surface = surface_of(open_model("roof:5"))
+    points, faces = surface.model.file_points, surface.model.faces
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # matplotlib has nothing to say either
+        beside = stated(compare_any(surface, points + np.array([1e3, 0.0, 0.0]), faces))
+        beside.save(tmp_path / "beside")
+    assert (beside.uncovered, beside.coverage) == (len(points), 0.0)
+    twice = stated(compare_any(surface, points, np.concatenate([faces, faces])))
+    assert twice.in_words.endswith(f"{2 * len(faces)} triangles (100 % more)")
+
+
+def test_units_and_names_with_dollars_are_no_formulas(tmp_path, capsys):
+    text = (
+        'PROJCS["$x^^$",GEOGCS["g",DATUM["d",SPHEROID["s",6378137,298.25]],PRIMEM["Greenwich",0],'
+        'UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["latitude_of_origin",0],'
+        'PARAMETER["central_meridian",3],PARAMETER["scale_factor",1],PARAMETER["false_easting",0],'
+        r'PARAMETER["false_northing",0],UNIT["$\frac{m^^$",0.4572]]'
+    )
+    path = write_tiff(tmp_path / "$a^^$.tif", terrain(), crs=text)
+    assert run("simplify", path, "-o", tmp_path / "out", "--moves", 1000, "--pick", "knee") == 0
+    said = capsys.readouterr()
+    assert r"$\frac{m^^$" in said.out
+    assert "could not be made" not in said.err
+    assert {"front.png", "quality.html"} <= {path.name for path in (tmp_path / "out").iterdir()}

@@ -133,6 +133,15 @@ def test_beyond_the_last_rung_come_meshes_of_thinning_up_to_its_best_one(monkeyp
     np.testing.assert_array_equal(found[-1], front.kept(best))
 
 
+def test_an_exact_rung_below_a_huge_error_is_no_more_than_a_better_one(recwarn):
+    problem = MeshProblem("face:200")
+    X = np.array([thinning(problem.surface).kept(k) for k in (60, 0)])
+    F = problem.evaluate(X)
+    F[:, 0] = [0.0, 1e13]  # the larger mesh comes first
+    assert len(module.between_the_rungs(problem.surface, X, F, most=0)) == module.BETWEEN
+    assert not recwarn.list
+
+
 def test_between_rungs_of_one_error_there_is_nothing_to_find():
     roof = MeshProblem("roof:5")
     front = thinning(roof.surface)

@@ -244,9 +244,15 @@ def test_a_solid_has_a_thickness(thickness):
         as_solid(SURFACES["holey"], SURFACES["holey"].model.faces, thickness)
 
 
+@pytest.mark.parametrize("thickness", [1e-300, 1e300])
+def test_a_base_that_rounding_takes_away_is_refused_with_what_is_held(thickness):
+    with pytest.raises(ResultError, match=r"holey: a base 1e[-+]300 below the lowest point .*; give from .* to "):
+        as_solid(SURFACES["holey"], SURFACES["holey"].model.faces, thickness)
+
+
 def test_what_has_no_base_is_refused_in_one_line(tmp_path):
     ball = surface_of(open_model("blob:200"))
-    with pytest.raises(ResultError, match=r"blob:200: is a closed surface, which needs no base"):
+    with pytest.raises(ResultError, match=r"blob:200: is a closed surface, which has no outline for a base"):
         as_solid(ball, ball.model.faces, 1.0)
     degrees = replace(holey_grid(), georeference={"unit": "degree", "scale": [70_000.0, 111_000.0]})
     on = surface(degrees)
