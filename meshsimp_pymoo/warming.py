@@ -197,6 +197,13 @@ def _scores() -> None:
     surface.score(surface.points, surface.faces[:2])
 
 
+def _distances() -> None:
+    from meshsimp_pymoo.surface.closed.nearest import distances_to_mesh
+
+    surface = _square()
+    distances_to_mesh(surface.points, surface.points, surface.faces)
+
+
 def _lining() -> None:
     from meshsimp_pymoo.surface.height import HeightSurface
     from meshsimp_pymoo.surface.lining import lined_model
@@ -282,6 +289,7 @@ PARTS = (
         _gaps, 5.8, False,
     ),
     Part("scores", ("surface.score:_cover", "surface.score:_measure_outside"), _scores, 1.5, False),
+    Part("distances", ("surface.closed.nearest:_nearest_triangles",), _distances, 1.0, False),
     Part(
         "break lines",
         (
@@ -293,11 +301,7 @@ PARTS = (
     ),
     Part(
         "closed surfaces",
-        (
-            "surface.closed.embedding:_n_flipped", "surface.closed.evaluate:_evaluate",
-            "surface.closed.nearest:_nearest_triangles",
-        ),
-        _closed, 3.7, False,
+        ("surface.closed.embedding:_n_flipped", "surface.closed.evaluate:_evaluate"), _closed, 2.7, False,
     ),
     Part(
         "their meshes", ("surface.closed.live:_build_closed", "surface.moves:snapshot"),
@@ -319,7 +323,9 @@ PARTS = (
 
 #: What a search with the default algorithm needs: of a height surface, and of a closed one.
 SEARCH = ("reading", "evaluation", "building", "thinning", "moves")
-CLOSED_SEARCH = ("closed surfaces", "their meshes", "their thinning", "their moves")
+CLOSED_SEARCH = ("distances", "closed surfaces", "their meshes", "their thinning", "their moves")
+#: What a statement of quality of the chosen mesh needs besides.
+STATED = ("scores", "distances")
 #: What free meshes need besides.
 FREE = ("free meshes",)
 CLOSED_FREE = ("their free meshes",)

@@ -84,6 +84,7 @@ from meshsimp_pymoo.warming import (
     FREE,
     LINED,
     SEARCH,
+    STATED,
     WISH,
     missing,
 )
@@ -199,6 +200,8 @@ def _parts(request: Request) -> list[str]:
     parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
     if request.output.refit or request.free.no_centroids:
         parts.append("scores")
+    if request.wish.spelled:
+        parts.extend(STATED)
     if lined:
         parts.extend(LINED)
     return parts

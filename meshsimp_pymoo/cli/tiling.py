@@ -24,7 +24,7 @@ from meshsimp_pymoo.surface.grid_surface import FREE_RULES, GridSurface
 from meshsimp_pymoo.surface.rules import Rules
 from meshsimp_pymoo.tiles.front import LEAST_TILE, TILE, Folder, identity, tiled_front, usual_most
 from meshsimp_pymoo.tiles.memory import check_memory
-from meshsimp_pymoo.warming import SEARCH
+from meshsimp_pymoo.warming import SEARCH, STATED
 from meshsimp_pymoo.workers import EngineError, open_engine
 
 # What tiles know, or what makes no difference to them; all else is refused where it is not what asks for nothing.
@@ -66,12 +66,13 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what | {"options": plain(request.options)})
     if not is_drawn_only:
         _claim(output)
-    with compiling((*SEARCH, "tiles"), shown) as compiled:
+    parts = (*SEARCH, "tiles", *(STATED if request.wish.spelled else ()))
+    with compiling(parts, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             grid = open_grid(request.model, request.options)
             has_gaps = grid.lattice is not None  # all samples are read once
         read_seconds = shown.seconds["reading"] - compiled.seconds
-        compiled.finish((*SEARCH, "tiles", "gaps in grids") if has_gaps else (*SEARCH, "tiles"))
+        compiled.finish((*parts, "gaps in grids") if has_gaps else parts)
     if request.wish.triangles == 1 and not has_gaps:
         raise UsageError("--triangles 1 is impossible: a mesh of a whole grid has at least 2 triangles")
     wish = request.wish.among(lambda: len(grid.faces))

@@ -52,7 +52,9 @@ class MeshTree:
         corners = np.asarray(vertices, float)[np.asarray(faces)]
         low, high = corners.min(axis=1), corners.max(axis=1)
         self._order = np.argsort(_morton_keys(0.5 * (low + high)), kind="stable")
-        self._xyz = np.ascontiguousarray(vertices, float).ravel()
+        self._xyz = np.array(
+            vertices, float, order="C"
+        ).ravel()  # a copy, as what is read-only is another type to compile for
         self._faces = np.ascontiguousarray(faces, np.int64)[self._order]
         self._boxes = _tree(low[self._order], high[self._order])
 
@@ -63,7 +65,7 @@ class MeshTree:
             place = np.empty(len(self._order), np.int64)
             place[self._order] = np.arange(len(self._order))
             nearest[:] = place[guesses]
-        given = np.ascontiguousarray(points, float)
+        given = np.array(points, float, order="C")
         _nearest_triangles(given, self._xyz, self._faces, self._boxes, squares, nearest)
         return np.sqrt(squares), self._order[nearest]
 
