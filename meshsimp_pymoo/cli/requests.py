@@ -54,6 +54,11 @@ class Wish:
         found = self.limits.get("triangles")
         return None if found is None or isinstance(found, Share) else int(found)
 
+    @property
+    def chooses(self) -> bool:
+        """Whether a mesh is wanted."""
+        return bool(self.limits) or self.knee
+
     def among(self, original: Callable[[], int]) -> Wish:
         """Return what is wanted of an original with so many triangles."""
         return replace(self, limits=in_numbers_of(self.limits, original))

@@ -200,7 +200,7 @@ def _parts(request: Request) -> list[str]:
     parts = [*(WISH if request.is_targeted else SEARCH), *(FREE if request.free.free else ())]
     if request.output.refit or request.free.no_centroids:
         parts.append("scores")
-    if request.wish.spelled:
+    if request.wish.chooses:
         parts.extend(STATED)
     if lined:
         parts.extend(LINED)

@@ -66,7 +66,7 @@ def simplify_tiled(request: Request, shown: Stages) -> int:
     is_drawn_only = lacks_pictures(output, what | {"options": plain(request.options)})
     if not is_drawn_only:
         _claim(output)
-    parts = (*SEARCH, "tiles", *(STATED if request.wish.spelled else ()))
+    parts = (*SEARCH, "tiles", *(STATED if request.wish.chooses else ()))
     with compiling(parts, shown) as compiled:
         with shown.stage("reading", f"reading {Path(request.model).name}"):
             grid = open_grid(request.model, request.options)
