@@ -12,7 +12,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,7 +66,7 @@ class _Held:
 
 
 def downloads(
-    surface: Surface, points: FloatArray, faces: IntArray, line_names: Sequence[str], *, is_textured: bool
+    surface: Surface, points: FloatArray, faces: IntArray, line_names: Sequence[str], folder: Path, *, is_textured: bool
 ) -> Downloads:
     """Return what a page offers of the meshes of a surface.
 
@@ -80,6 +80,8 @@ def downloads(
         What is drawn of the original, as rows of these.
     line_names : sequence of str
         What messages call the break lines.
+    folder : Path
+        That of the front, which holds what is written on the way where there is no place for temporary files.
     is_textured : bool
         Whether the page has the image of the model and where on it vertices lie, for files that hold it.
     """
@@ -112,13 +114,17 @@ def downloads(
             held_there = attributes | ({"uv": np.zeros((3, 2))} if holds_image else {})
             lines = tuple(TRIANGLE[0, :2] for _ in line_names)
             mesh = OutMesh(corners, TRIANGLE, held_there, **frame, lines=lines, line_names=tuple(line_names))
-            found.templates[suffix] = TEMPLATES[name](_written(kind, mesh))
+            found.templates[suffix] = TEMPLATES[name](_written(kind, mesh, folder))
     return found
 
 
-def _written(kind: Format, mesh: OutMesh) -> bytes:
-    with TemporaryDirectory() as folder:
-        path = Path(folder, f"triangle{kind.suffixes[0]}")
+def _written(kind: Format, mesh: OutMesh, folder: Path) -> bytes:
+    try:
+        place = gettempdir()
+    except OSError:
+        place = str(folder)
+    with TemporaryDirectory(dir=place) as made:
+        path = Path(made, f"triangle{kind.suffixes[0]}")
         assert kind.write is not None
         kind.write(path, mesh)
         return path.read_bytes()

@@ -168,7 +168,8 @@ def simplification_page(
     colours = [name for name, is_there in {"texture": texture, "own": paint is not None}.items() if is_there]
     own, colours = colours[0] if colours else "plain", [*colours, "plain", *ramps]
     points = model.file_points[held.vertices].astype(np.float64)
-    files = downloads(surface, points, held.faces, held.line_names, is_textured=texture is not None)
+    names, is_textured = held.line_names, texture is not None
+    files = downloads(surface, points, held.faces, names, front.folder, is_textured=is_textured)
     unit, system = length_unit(model.georeference), reference_system(model.georeference)
     first_error = _same_order(measure)[-1]
     source = printable(front.run["model"]["name"])  # as it was called when the front was made
